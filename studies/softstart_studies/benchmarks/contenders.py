@@ -41,6 +41,7 @@ class Entry:
 HOME = "softstart_studies.benchmarks"
 ENTRIES = {
     "kernel": Entry("softstart", "exact", "Kernel", "compiled kernel over a batch"),
+    "formula": Entry("softstart", "exact", "Formula", "closed forms of [G] over arrays"),
     "batch": Entry("softstart", "exact", "Batch", "simulate of a batch, labelled results"),
     "run": Entry("softstart", "exact", "EachRun", "one simulate call a start; Run with events and stages"),
     "run-traces": Entry(

@@ -10,6 +10,7 @@ from softstart import simulate
 from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor
 from softstart.drive import Drive
+from softstart.formulas import DirectStarts
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
@@ -26,7 +27,7 @@ class Kernel:
 
     def ready(self, gaps: Vector) -> tuple[Any, ...]:
         """All arguments of the kernel; those after the results are its scratch."""
-        drive, count = crane(gaps), len(gaps)
+        drive, count = crane(gaps, self.problem.strategy), len(gaps)
         controller = cast(CompiledController, controller_of(self.problem.strategy, drive))
         own = np.atleast_2d(np.ascontiguousarray(controller.vector(drive), dtype=np.float64))
         size, rows = controller.state_size, rows_of(drive)
@@ -44,6 +45,26 @@ class Kernel:
         return peaks
 
 
+class Formula:
+    """The closed forms of [G] over arrays: direct starts of undamped drives."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def ready(self, gaps: Vector) -> Vector:
+        """The gaps."""
+        return gaps
+
+    def solve(self, work: Vector) -> Vector:
+        """Peak torques, N m, with all other figures of each start."""
+        one = self.problem
+        torque = cast(tuple[float, ...], one.stage_torques)[0]
+        starts = DirectStarts(
+            J1=one.J1, J2=one.J2, c=one.c, Ms=torque, Mc=one.Mc, target_speed=one.target, gap=work
+        )
+        return np.broadcast_to(starts.peak, work.shape)
+
+
 class Batch:
     """`simulate` of a Drive with arrays: the same kernel, and its figures as an xarray.Dataset."""
 
@@ -52,7 +73,7 @@ class Batch:
 
     def ready(self, gaps: Vector) -> tuple[Drive, Any]:
         """The batch and its controller."""
-        drive = crane(gaps)
+        drive = crane(gaps, self.problem.strategy)
         return drive, controller_of(self.problem.strategy, drive)
 
     def solve(self, work: tuple[Drive, Any]) -> Vector:
@@ -70,7 +91,7 @@ class EachRun:
 
     def ready(self, gaps: Vector) -> list[tuple[Drive, Any]]:
         """Drives and controllers."""
-        drives = [crane(float(gap)) for gap in gaps]
+        drives = [crane(float(gap), self.problem.strategy) for gap in gaps]
         return [(drive, controller_of(self.problem.strategy, drive)) for drive in drives]
 
     def solve(self, work: list[tuple[Drive, Any]]) -> Vector:

@@ -46,12 +46,12 @@ def sampled_plan(problem: Problem) -> Plan:
 def peak_torque(problem: Problem, plan: Plan, gap: float) -> float:
     """Largest |T| of one start, N m.
 
-    Three states: twist theta = phi1 - phi2, its rate v, load speed w2. Gap and contact have right-hand
-    sides of their own; leaving a mode, and the target speed, are terminal events with a direction, and the
-    peak is the event v = 0 in contact. solve_ivp makes an interpolant only in a step that holds an event.
+    States: twist theta = phi1 - phi2, its rate v, load speed w2, and behind a lag the motor torque u. Gap
+    and contact have right-hand sides of their own; leaving a mode, and the target speed, are terminal events
+    with a direction, and the peak is the event dT/dt = 0 in contact. solve_ivp makes an interpolant only in a
+    step that holds an event.
     """
-    J1, J2, c, Mc = problem.J1, problem.J2, problem.c, problem.Mc
-    half, target = 0.5 * gap, problem.target
+    half, target, lag = 0.5 * gap, problem.target, problem.lag
 
     def upper(t: float, y: Vector) -> float:
         return float(y[0]) - half
@@ -65,22 +65,20 @@ def peak_torque(problem: Problem, plan: Plan, gap: float) -> float:
     for event, direction in ((upper, 1.0), (lower, -1.0), (reached, 1.0)):
         event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
 
-    t, y, peak = 0.0, np.zeros(3), 0.0
+    t, y, peak = 0.0, np.zeros(4 if lag > 0.0 else 3), 0.0
     side, stage, end, running = 0, 1, T_MAX, True
     while running:
         u, until = plan(t, stage)
         if side == 0:
-            rates, events = _gap_open(u, J1, J2, Mc), [upper, lower]
+            rates, events = _gap_open(problem, u), [upper, lower]
         else:
-            rates, events = _in_contact(u, J1, J2, c, Mc, side, half)
+            rates, torque, events = _in_contact(problem, u, side, half)
         if end == T_MAX:
             events = [*events, reached]
         stop = min(until, end)
         found = solve_ivp(rates, (t, stop), y, method="LSODA", events=events, rtol=TOLERANCE, atol=TOLERANCE)
         if side != 0:
-            tops = found.y_events[1]
-            twists = [*tops[:, 0], found.y[0, -1]] if len(tops) else [found.y[0, -1]]
-            peak = max(peak, *(c * abs(twist - side * half) for twist in twists))
+            peak = max(peak, *(abs(torque(state)) for state in (*found.y_events[1], found.y[:, -1])))
         t, y = float(found.t[-1]), found.y[:, -1]
         if found.status == 0:
             running = stop < end
@@ -89,36 +87,45 @@ def peak_torque(problem: Problem, plan: Plan, gap: float) -> float:
         else:
             stage += 1
             met = side or (1 if len(found.t_events[0]) else -1)
-            y[0] = met * half  # exactly on the flank: with its direction the event does not fire again
+            if side == 0 or problem.d == 0.0:  # damped flanks part while they still overlap
+                y[0] = met * half  # exactly on the flank: with its direction the event does not fire again
             side = 0 if side != 0 else met
     return peak
 
 
-def _gap_open(u: float, J1: float, J2: float, Mc: float) -> Any:
-    a2 = -Mc / J2
-    a = u / J1 - a2
+def _gap_open(problem: Problem, ref: float) -> Any:
+    J1, lag, a2 = problem.J1, problem.lag, -problem.Mc / problem.J2
+    if lag > 0.0:
+        return lambda t, y: (y[1], y[3] / J1 - a2, a2, (ref - y[3]) / lag)
+    a = ref / J1 - a2
     return lambda t, y: (y[1], a, a2)
 
 
-def _in_contact(u: float, J1: float, J2: float, c: float, Mc: float, side: int, half: float) -> Any:
-    """Rates, and the events "gap opens" (terminal) and "torque is largest"."""
+def _in_contact(problem: Problem, ref: float, side: int, half: float) -> Any:
+    """Rates, the torque of a state, and the events "gap opens" (terminal) and "torque is largest"."""
+    J1, J2, c, d, Mc, lag = problem.J1, problem.J2, problem.c, problem.d, problem.Mc, problem.lag
     flank = side * half
 
-    def rates(t: float, y: Vector) -> tuple[float, float, float]:
-        theta, v, _ = y.tolist()
-        T = c * (theta - flank)
+    def torque(y: Vector) -> float:
+        return c * (float(y[0]) - flank) + d * float(y[1])
+
+    def rates(t: float, y: Vector) -> tuple[float, ...]:
+        theta, v, _, *more = y.tolist()
+        T = c * (theta - flank) + d * v
+        u = more[0] if more else ref
         a2 = (T - Mc) / J2
-        return v, (u - T) / J1 - a2, a2
+        found = (v, (u - T) / J1 - a2, a2)
+        return (*found, (ref - u) / lag) if more else found
 
     def opens(t: float, y: Vector) -> float:
-        return side * (float(y[0]) - flank)
+        return side * torque(y)
 
     def top(t: float, y: Vector) -> float:
-        return side * float(y[1])
+        return side * (c * float(y[1]) + d * rates(t, y)[1])
 
     opens.terminal, opens.direction = True, -1.0  # type: ignore[attr-defined]
     top.direction = -1.0  # type: ignore[attr-defined]
-    return rates, [opens, top]
+    return rates, torque, [opens, top]
 
 
 class Lsoda:

@@ -18,11 +18,13 @@ DRIVE = "crane-4amtkf"
 GAPS = (0.5, 2.0)  # rad, the two gaps of [G]; the batches lie between them
 RAMP_TIME = 0.5  # s, longer than most of the start, so that it is sampled nearly throughout
 STRATEGIES = ("direct", "reduced-first-stage", "reduced-two-stage", "ramp")
+DAMPED = "damped "  # before the name of a strategy: a drive with damping and lag
+DAMPING, LAG = 0.03, 0.002  # share of the critical damping; s
 
 
 @dataclass(frozen=True)
 class Problem:
-    """An undamped crane drive with active load, at rest at mid-gap, until an elastic period after `target`.
+    """A crane drive with active load, at rest at mid-gap, until an elastic period after `target`.
 
     `stage_torques`: motor torque of stage 1, of stage 2 and of all later ones. For a ramp they are None and
     the torque is initial + (full - initial) min(1, t_k/time), held from t_k = k period to the next sample.
@@ -41,6 +43,8 @@ class Problem:
     full: float = 0.0
     time: float = 0.0
     period: float = 0.0
+    d: float = 0.0
+    lag: float = 0.0
 
 
 def gaps(count: int) -> Vector:
@@ -54,17 +58,21 @@ def gaps(count: int) -> Vector:
     return middles
 
 
-def crane(gap: Any) -> Drive:
+def crane(gap: Any, strategy: str = "") -> Drive:
     """The drive with this gap (rad), or with an array of gaps: a batch."""
     from softstart.drive import Drive
 
-    return Drive.load(DRIVE).replace(gap=gap)
+    drive = Drive.load(DRIVE).replace(gap=gap)
+    if not strategy.startswith(DAMPED):
+        return drive
+    return drive.replace(damping=2.0 * DAMPING * drive.c / drive.Omega, torque_lag=LAG)
 
 
 def controller_of(strategy: str, drive: Drive) -> Controller:
     """The controller; a ramp takes `RAMP_TIME`, method 2 raises its torque where [G](15) says."""
     from softstart_studies.paper_g.crane import published
 
+    strategy = strategy.removeprefix(DAMPED)
     given = {"time": RAMP_TIME} if strategy == "ramp" else {}
     return published(strategy, **given).fitted(drive)
 
@@ -77,14 +85,14 @@ def crane_problem(strategy: str) -> Problem:
     >>> crane_problem("ramp").period
     0.001
     """
-    drive = crane(GAPS[0])
+    drive = crane(GAPS[0], strategy)
     given = controller_of(strategy, drive).parameters
-    stages = None
-    if strategy == "direct":
+    stages, plain = None, strategy.removeprefix(DAMPED)
+    if plain == "direct":
         stages = (given["torque"],) * 3
-    elif strategy == "reduced-first-stage":
+    elif plain == "reduced-first-stage":
         stages = (given["torque"], given["full_torque"], given["full_torque"])
-    elif strategy == "reduced-two-stage":
+    elif plain == "reduced-two-stage":
         stages = (given["torque"], given["torque"], given["full_torque"])
     problem = Problem(
         strategy=strategy,
@@ -95,6 +103,8 @@ def crane_problem(strategy: str) -> Problem:
         target=float(drive.target_speed),
         elastic_period=float(drive.elastic_period),
         stage_torques=stages,
+        d=float(drive.d),
+        lag=float(drive.torque_lag),
     )
     if stages is not None:
         return problem
