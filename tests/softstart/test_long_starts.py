@@ -13,8 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from tests.twin import chain_of
 
-from softstart import Drive, SimulationError, simulate
+from softstart import Chain, Drive, SimulationError, simulate
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
 from softstart.controller.base import Measured
 from softstart.controller.compiled import Vector
@@ -22,6 +23,12 @@ from softstart.start import engine
 
 CRANE = Drive.load("crane-4amtkf")
 HEAVY = CRANE.replace(load_inertia=35_000.0)  # 960,000 elastic periods to its target speed
+
+
+@pytest.mark.parametrize("machine", [HEAVY, chain_of(HEAVY)], ids=["drive", "chain"])
+def test_a_start_that_is_too_long_is_given_up(machine: Drive | Chain) -> None:
+    with pytest.raises(SimulationError, match="more than 100,000 elastic periods"):
+        simulate(machine, "ramp")
 
 
 def test_a_start_that_is_too_long_is_given_up_with_the_remedy() -> None:

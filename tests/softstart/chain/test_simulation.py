@@ -62,6 +62,13 @@ def test_two_masses_are_the_two_mass_plant(kind, controller):
     assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
 
 
+def test_from_the_driving_flank_there_is_one_contact_however_often_it_is_grazed():
+    """The torque comes back to zero once a period, and rounding alone said whether the flanks parted."""
+    drive = CRANE.replace(start_position="driving-flank")
+    runs = simulate(drive, "direct"), simulate(chain_of(drive), "direct", fitted_to=drive)
+    assert [run.contacts for run in runs] == [1, 1]
+
+
 def test_no_bit_depends_on_the_time_limit():
     """Undamped, the crane rattles and all its masses fly at times: a span lasts an elastic period at most."""
     starts = [simulate("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
