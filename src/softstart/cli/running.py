@@ -26,7 +26,7 @@ else:
 
 LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 EVERY = 30.0  # s between two lines of progress in a pipe
-COMPILING = "compiling, once: a minute or two at the first command after installation, less at others ..."
+COMPILING = "compiling, once: half a minute at the first command after installation, less at others ..."
 _SAID: list[str] = []  # what this process has said of it
 
 
