@@ -347,16 +347,16 @@ def turning_points(
         h = spans[row, S_END] - start
         T = s.torque[k]
         turn(kept, points, start, T[0], still)
-        sign = 0.0
+        sign, low = 0.0, 0  # far from the motor T begins with a high power of time
         for o in range(1, n + 1):
             if sign == 0.0 and T[o] != 0.0:
-                sign = math.copysign(1.0, T[o])
+                sign, low = math.copysign(1.0, T[o]), o - 1
         x = 0.0
         while sign != 0.0:
             for o in range(n):
                 f[o] = sign * (o + 1.0) * T[o + 1]
             begin = x
-            x = crossing(s, 0, n - 1, begin, 1.0)
+            x = crossing(s, low if begin == 0.0 else 0, n - 1, begin, 1.0)
             if x < -1.0:
                 return -2
             if x < 0.0:

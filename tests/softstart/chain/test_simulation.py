@@ -69,6 +69,19 @@ def test_from_the_driving_flank_there_is_one_contact_however_often_it_is_grazed(
     assert [run.contacts for run in runs] == [1, 1]
 
 
+def test_the_reversals_of_a_shaft_far_from_the_motor_are_found():
+    """Its torque begins with a high power of time; the reversals are those of a fine grid."""
+    run = simulate(Chain.load("tractor-like"), "ramp", until=0.05)
+    times = np.linspace(0.0, run.end_time, 50_001)
+    still = 1e-6 * max(run.peak_torques)
+    for k in range(run.T.shape[1]):
+        points = run.recorded.turning_points(k, still)
+        T = run.at(times)["T"][:, k]
+        assert points[:, 1].max() >= T.max() - still
+        assert points[:, 1].min() <= T.min() + still
+        assert np.all(np.abs(np.diff(points[:, 1]))[:-1] > still)
+
+
 def test_no_bit_depends_on_the_time_limit():
     """Undamped, the crane rattles and all its masses fly at times: a span lasts an elastic period at most."""
     starts = [simulate("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
