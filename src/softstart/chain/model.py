@@ -402,6 +402,54 @@ class Chain:
         return self.at_motor_shaft().mean_torques(torque)
 
     @property
+    def stiffnesses(self) -> Vector:
+        """The stiffness of each shaft, N m/rad at the motor shaft; infinite of a rigid one."""
+        return self.at_motor_shaft().c
+
+    @property
+    def dampings(self) -> Vector:
+        """The damping of each shaft, N m s/rad at the motor shaft."""
+        return self.at_motor_shaft().d
+
+    @property
+    def damping_ratio(self) -> float:
+        """Share of the critical damping in the first natural vibration with all gaps closed.
+
+        >>> round(Chain.load("crane-4-mass").with_damping_ratio(0.04).damping_ratio, 12)
+        0.04
+        """
+        from softstart.vibration import natural_vibration
+
+        first, at = natural_vibration(self), self.at_motor_shaft()
+        x, twist = first.shape[1], first.torque[1] / at.c
+        damping = at.d @ twist**2 + at.d_ground @ x**2
+        return float(damping / (2.0 * first.Omega[1] * (at.moving_J @ x**2)))
+
+    def with_damping_ratio(self, ratio: float) -> Self:
+        """The chain with d = 2 ratio c/Omega in each elastic shaft without damping; Omega: first frequency.
+
+        Where no shaft has a damping, `ratio` is that of the first natural vibration.
+        """
+        shafts = zip(self.shafts, self.dampings.tolist(), strict=True)
+        rate = ratio * self.elastic_period / math.pi
+        damped = [
+            one if one.rigid or d > 0.0 else one.replace(damping=rate * one.stiffness, damping_ratio=None)
+            for one, d in shafts
+        ]
+        return replace(self, shafts=tuple(damped))
+
+    def with_gap(self, gap: float) -> Self:
+        """The chain with all gaps widened alike, so that they are `gap` together, rad at the motor shaft.
+
+        >>> Chain.load("crane-4-mass").with_gap(1.0).shafts[1].gap
+        0.4
+        """
+        whole = float(self.gaps.sum())
+        if whole == 0.0:
+            raise InputError("gap: the chain has no gap that could be widened; give its shafts some.")
+        return self.changed(gaps=gap / whole)
+
+    @property
     def permissible_torques(self) -> Vector:
         """What each shaft permits, N m at the motor shaft; NaN where nothing is given."""
         return self.at_motor_shaft().permissible

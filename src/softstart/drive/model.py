@@ -537,6 +537,30 @@ class Drive(ParameterSet):
         """
         return limits_of(vars(self))
 
+    @property
+    def stiffnesses(self) -> Vector:
+        """The stiffness of the shaft, N m/rad, as an array."""
+        return np.array([self.stiffness])
+
+    @property
+    def dampings(self) -> Vector:
+        """The damping of the shaft, N m s/rad, as an array."""
+        return np.array([self.damping])
+
+    @property
+    def damping_ratio(self) -> float:
+        """Share of the critical damping: d/(2 J Omega) with J = J1 J2/(J1 + J2).
+
+        >>> round(Drive.load("hoist-15kw").damping_ratio, 4)
+        0.0602
+        """
+        return float(0.5 * self.d * (1.0 / self.J1 + 1.0 / self.J2) / self.Omega)
+
+    def with_damping_ratio(self, ratio: float) -> Self:
+        """The drive with this damping ratio, if it has no damping."""
+        d = 2.0 * ratio * self.Omega / (1.0 / self.J1 + 1.0 / self.J2)
+        return self if self.damping > 0.0 else self.replace(damping=float(d))
+
     # ---- where the start begins --------------------------------------------------------------------------
 
     @property

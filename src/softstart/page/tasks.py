@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.machines import Machine
 from softstart.chain.model import Chain
 from softstart.controller.finding import make_controller, ready_controller_names
@@ -400,14 +399,9 @@ def _life(machine: Machine, rows: Mapping[str, Row], progress: Progress) -> Part
     progress(0.65, "life of the shaft line")
     runs: Any = [row.run for row in rows.values()]
     try:
-        if isinstance(machine, Chain):
-            shafts = chain_fatigue(runs)
-            shown = lives.chain_tables(shafts)[1]
-            said = [lives.chain_conclusion(shafts), *lives.chain_notes(shafts)]
-        else:
-            found = fatigue(runs)
-            shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
-            said = [lives.conclusion(found), *lives.notes(found)]
+        found = fatigue(runs)
+        shown = lives.fatigue_tables(found, found.ranked)[0]
+        said = [lives.conclusion(found), *lives.notes(found)]
     except InputError as error:
         return Part(name, title, [], [], list(error.sentences))
     headings = [column.heading.replace("\n", " ") for column in shown.columns]

@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.model import Chain
 from softstart.controller import Controller
 from softstart.controller.base import label_of
@@ -31,6 +30,7 @@ from softstart.reporting.result import (
 )
 from softstart.reporting.sheet import Sheet, make_sheet, sheet_drive, sheet_section
 from softstart.start.comparison import REFERENCE, Comparison, compared
+from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 from softstart.vibration import natural_vibration
@@ -404,11 +404,11 @@ def _life(report: ChainReport) -> Html:
     title = tag("h3", "Life of the shafts")
     rows = _gentlest_first(report)
     try:
-        found = chain_fatigue([row.run for row in rows])
+        found = fatigue([row.run for row in rows])
     except InputError as error:
         return html(title, tag("p", f"Not counted: {for_customer(' '.join(error.sentences))}"))
-    shown = lives.chain_tables(found)[1] if len(report.drive.shafts) <= MOST_SHAFTS else None
-    notes = [lives.chain_conclusion(found), *lives.chain_notes(found)]
+    shown = lives.fatigue_tables(found, found.rows)[0] if len(report.drive.shafts) <= MOST_SHAFTS else None
+    notes = [lives.conclusion(found), *lives.notes(found)]
     return html(title, shown and printed(shown), tag("p", " ".join(notes)))
 
 

@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from softstart import Chain, InputError, simulate
-from softstart.chain import chain_fatigue
+from softstart import Chain, InputError, fatigue, simulate
 from softstart.reporting import ChainReport, Project, report_chain
 from softstart.reporting.limit import bound_at
 
@@ -66,10 +65,10 @@ def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(ma
     assert "take up speed 25.83 rpm, " in page  # the chain has its speed in rpm
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report_chain(damped, controllers=["take-up"], budget=0.0).to_html()
-    found = chain_fatigue([simulate(damped, name) for name in ("take-up", "direct")])
+    found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
     last = re.findall(r">take-up</th>(.*?)</tr>", page)[-2]  # the last one is beside the bound
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
-    assert relative == pytest.approx([life.relative for life in found.rows[0]], rel=5e-3)
+    assert relative == pytest.approx([life.relative for life in found.by_run[0]], rel=5e-3)
     assert "Longest life: take-up" in page
 
 
