@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,13 @@ class Chain:
     ----------
     [R]; everything at one shaft: docs/theory/reduction.md; the file: docs/reference/chain-file.md.
     """
+
+    WHAT: ClassVar[str] = "a chain"
+    # as a drive has it
+    brake: ClassVar[str] = "none"
+    release_time: ClassVar[float] = 0.0
+    position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
+    gear_ratio: ClassVar[None] = None  # masses and shafts are given at their own shafts
 
     masses: tuple[Mass, ...]
     shafts: tuple[Shaft, ...]
@@ -400,6 +407,27 @@ class Chain:
         """The mean torque of each shaft under full starting torque, N m; NaN without a motor."""
         torque = math.nan if self.motor is None else self.motor.starting_torque
         return self.at_motor_shaft().mean_torques(torque)
+
+    @property
+    def contact_laws(self) -> tuple[str, ...]:
+        """The contact law of each shaft."""
+        return self.at_motor_shaft().law
+
+    @property
+    def frictions(self) -> tuple[float, float, float]:
+        """Coulomb friction of the motor (none), and dampings to the ground of motor and load mass."""
+        at = self.at_motor_shaft()
+        return 0.0, float(at.d_ground[at.motor]), float(at.d_ground[at.load])
+
+    @property
+    def initial_motor_speed(self) -> float:
+        """Speed of the motor's mass at the start, rad/s at the motor shaft."""
+        return float(self.at_motor_shaft().w0[self.motor_index])
+
+    @property
+    def initial_load_speed(self) -> float:
+        """Speed of the load mass at the start, rad/s at the motor shaft."""
+        return float(self.at_motor_shaft().w0[self.load_index])
 
     @property
     def stiffnesses(self) -> Vector:

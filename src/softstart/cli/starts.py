@@ -149,7 +149,7 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool, details
     if rows[0].intervals:
         more.append(("Intervals of 95 %", starts.INTERVALS))
     if details:
-        events = "Events in the backlash" if isinstance(comparison.drive, Drive) else "Shafts"
+        events = "Events in the backlash" if len(comparison.drive.shaft_names) == 1 else "Shafts"
         more += [("Times", starts.TIMES), (events, starts.details(comparison.drive))]
     for title, figures in more:
         to.print()

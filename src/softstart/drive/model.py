@@ -12,6 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
+from softstart.drive.doubts import TwoMasses
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -555,6 +556,26 @@ class Drive(ParameterSet):
         0.0602
         """
         return float(0.5 * self.d * (1.0 / self.J1 + 1.0 / self.J2) / self.Omega)
+
+    @property
+    def contact_laws(self) -> tuple[str, ...]:
+        """The contact law of the shaft, as of one shaft of several."""
+        return (self.contact_law,)
+
+    @property
+    def position_given(self) -> bool:
+        """Whether the file says where the start begins; else that follows from brake, load and reversal."""
+        return "start_position" in self.given()
+
+    @property
+    def lumped(self) -> TwoMasses:
+        """The drive as two masses, for checks of their size."""
+        ahead = (0.5 * self.gap - one.theta0 for one in self.positions.values())
+        return TwoMasses(
+            J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *ahead),
+            Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
+            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
+        )  # fmt: skip
 
     def with_damping_ratio(self, ratio: float) -> Self:
         """The drive with this damping ratio, if it has no damping."""

@@ -36,6 +36,7 @@ from softstart.start.simulation import simulate
 from softstart.vibration import natural_vibration
 from softstart.views import chain_schemes, chains, starts
 from softstart.views import fatigue as lives
+from softstart.views.drives import drive_lines
 from softstart.views.printed import digits, fixed, short, unit, units_of
 
 CHAIN_BUDGET = 60.0  # s, for the search of the optimum
@@ -439,7 +440,7 @@ def _chain(chain: Chain, figures: Figures) -> Html:
 
 def _sentences(chain: Chain) -> list[str]:
     """The chain in sentences: masses, gaps and sums; motor and load; where it starts, and what is assumed."""
-    lines = [line.strip() for line in chains.chain_lines(chain)[1:]]
+    lines = [" ".join(line.split()) for line in drive_lines(chain)[1:]]
     return [f"{line[0].upper()}{line[1:]}." for line in lines]
 
 

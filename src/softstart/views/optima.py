@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
@@ -50,7 +49,7 @@ else:
     ticker = late("matplotlib.ticker")
 
 AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
-REPLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"
+REPLAY = "softstart simulate {what}.toml --controller profile --param file=profile.csv"
 TALL = 4.0  # largest over smallest K_dyn from which on the axis is logarithmic
 TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 
@@ -95,11 +94,10 @@ def figure_rows(best: Optimum) -> list[list[str]]:
 
 
 def _of_shafts(best: Optimum) -> list[list[str]]:
-    """K_dyn of each shaft of a chain."""
-    run: Any = best.run
-    if isinstance(best.problem.drive, Drive):
+    """K_dyn of each of several shafts."""
+    run, names = best.run, best.run.drive.shaft_names
+    if len(names) == 1:
         return []
-    names = run.drive.shaft_names
     return [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(names, run.k_dyns, strict=True)]
 
 
@@ -227,7 +225,7 @@ def bound_sentence(best: Optimum) -> str:
 def optimum_figure(best: Optimum) -> Any:
     """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
     run = best.run
-    if not isinstance(run.drive, Drive):
+    if len(run.drive.shaft_names) > 1:
         return _chain_figure(best)
     with drawing():
         figure, panels = new_figure(4, 1, (8.0, 9.0), sharex=True)
@@ -341,7 +339,7 @@ def _speeds(axes: Axes, best: Optimum) -> None:
 
 def _twist(axes: Axes, best: Optimum) -> None:
     run = best.run
-    half = 0.5 * float(run.drive.gap)
+    half = 0.5 * float(run.drive.gaps[0])
     axes.plot(run.t, run.theta, color=COLOURS[2], label="twist phi1 - phi2")
     for flank in (half, -half):
         axes.axhline(flank, color="#444444", lw=0.8, ls=DASHES[1], label="flanks" if flank == half else None)
@@ -369,7 +367,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "K_dyn": [number(run.k_dyn, 4) for run in others],
         "start time s": [number(run.start_time, 5) for run in others],
     }
-    replay = REPLAY.replace("drive.toml", "chain.toml") if isinstance(drive, Chain) else REPLAY
+    replay = REPLAY.format(what=drive.WHAT.removeprefix("a "))
     parts = [
         f"# {markdown(drive.name)}: {best_start(drive)}",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
