@@ -19,10 +19,10 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.problem import Problem, Terminal, problem_of
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
 from softstart.optimal.shortest import shortest_start_time
-from softstart.optimal.solving import optimize, refuse_for_chain
+from softstart.optimal.solving import optimize
 from softstart.processes import Pool, checked_workers
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -344,11 +344,8 @@ def pareto(
     ----------
     docs/optimal-starts.md; each point: `optimize`.
     """
-    about: Any = Problem
-    if isinstance(drive, Chain):
-        refuse_for_chain(method, False)
-        about = chains.ChainProblem
-    about(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
+    asked_for: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    problem_of(drive, 1.0, terminal, method=method, **asked_for)
     times = None if start_times is None else _checked(start_times)
     made = [
         make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
@@ -361,7 +358,7 @@ def pareto(
     if times is None:
         _tell(progress, "looking for the shortest start time")
         times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
-    options = {"method": method, "torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    options = {"method": method, **asked_for}
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
     with (

@@ -15,11 +15,10 @@ from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, listed
 from softstart.late import late
-from softstart.optimal.chains import problem
 from softstart.optimal.front import FrontPoint, PointAsked, computed
 from softstart.optimal.lp import ideal, whole_search
-from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
+from softstart.optimal.momentum import momentum_shortest_time
+from softstart.optimal.problem import REACTS, Problem, Terminal, best_start, problem_of
 from softstart.optimal.pulse_coast_hold import applies
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.optimal.solving import optimize
@@ -120,11 +119,7 @@ def bound_at(drive: Drive | Chain, start_time: float) -> float | None:
     if not start_time > 0.0:
         return None
     try:
-        bound = (
-            problem.momentum_bound(problem.ChainProblem(drive, start_time))
-            if isinstance(drive, Chain)
-            else momentum_bound(Problem(drive, start_time, TERMINAL))
-        )
+        bound = problem_of(drive, start_time, TERMINAL).lower_bound()
     except InputError:
         return None
     return bound.k_dyn if math.isfinite(bound.k_dyn) and bound.kind != "none" else None
