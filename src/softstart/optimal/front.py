@@ -384,10 +384,9 @@ def default_start_times(
     curve is steep. `options` go to `Problem`.
     """
     direct = simulate(drive, "direct").start_time
-    if isinstance(drive, Chain) or len(drive.positions) > 1:
-        shortest, count = direct * QUICKEST / SHORT, count if isinstance(drive, Chain) else count // 2
-    else:
-        shortest = shortest_start_time(Problem(drive, 1.0, terminal, **options))
+    shortest = shortest_known(drive, terminal, **options)
+    if math.isnan(shortest):
+        shortest, count = direct * QUICKEST / SHORT, count // 2 if len(drive.positions) > 1 else count
     if not math.isfinite(shortest):
         shortest = direct
     if not math.isfinite(shortest):
@@ -396,6 +395,13 @@ def default_start_times(
     share = np.linspace(0.0, 1.0, count) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
     return times
+
+
+def shortest_known(drive: Drive | Chain, terminal: Terminal, **options: Any) -> float:
+    """The shortest feasible start time, s; NaN of a chain and over several positions: nobody knows it."""
+    if isinstance(drive, Chain) or len(drive.positions) > 1:
+        return math.nan
+    return shortest_start_time(Problem(drive, 1.0, terminal, **options))
 
 
 class PointAsked(NamedTuple):

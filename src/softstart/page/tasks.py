@@ -23,7 +23,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import Problem, best_start
+from softstart.optimal.problem import best_start
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
@@ -142,10 +142,8 @@ def curve(
 
     with no_solution_as_sentence():
         through(long)
-        least = math.inf  # of a chain, or over positions, nobody knows it
-        if isinstance(drive, Drive) and not several:
-            progress(done / total, "the shortest start time")
-            least = shortest.shortest_start_time(Problem(drive, 1.0, terminal))
+        progress(done / total, "the shortest start time")
+        least = front.shortest_known(drive, terminal)
         done += 1
         if math.isfinite(least):
             first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
@@ -344,7 +342,7 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress
         _life(machine, rows, progress),
     ]
     quickest = None
-    if isinstance(machine, Drive) and machine.limits:
+    if machine.limits and machine.limits.used_torque is None:  # those of single shafts bound no optimum
         progress(0.8, "the quickest start that keeps the limits")
         name, title = "quickest", "The quickest start within limits"
         try:
@@ -385,10 +383,8 @@ def _margins(machine: Machine, rows: Mapping[str, Row]) -> Part:
     """Which strategies keep the limits, with what margin."""
     name, title = "limits", "Limits"
     if not machine.limits:
-        lacking = "permissible_torque of its shafts" if isinstance(machine, Chain) else "[limits]"
-        return Part(
-            name, title, [], [], [f"{clipped(machine.name)} has no {lacking}: nothing can be exceeded."]
-        )
+        lacking = "neither [limits] nor a permissible_torque of its shafts"
+        return Part(name, title, [], [], [f"{clipped(machine.name)} has {lacking}: nothing can be exceeded."])
     cells = [[label, row.against_limits] for label, row in rows.items()]
     return Part(name, title, ["strategy", "limits"], cells, [recommend(machine, rows.values()).text])
 
