@@ -420,6 +420,5 @@ def report(
     """The report for a customer, as one HTML text; SOFTSTART_BUDGET, in s, is its `budget`."""
     progress(0.0, "starting the drive")
     budget = os.environ.get("SOFTSTART_BUDGET")
-    options = {"command": command} | ({"budget": float(budget)} if budget else {})
-    made: Any = reporting.report_chain if isinstance(drive, Chain) else reporting.report
-    return str(made(drive, controllers=controllers, progress=progress, **options).to_html())
+    options: dict[str, Any] = {"command": command} | ({"budget": float(budget)} if budget else {})
+    return str(reporting.report(drive, controllers=controllers, progress=progress, **options).to_html())

@@ -539,7 +539,7 @@ def _check_shafts(machine: Any) -> None:
         raise InputError(
             f"damping is missing in {', '.join(lacking)}: an undamped shaft rattles without end, and its "
             "cycles make lives out of nothing; give each shaft a damping, or have its ratio estimated from "
-            'numbers of gears and couplings (estimate_damping={"gears": 3, "couplings": 2}; '
+            'numbers of gears and couplings (estimate_damping={"gears": 3, "couplings": 2}, or '
             "--estimate-damping gears=3,couplings=2)."
         )
 
