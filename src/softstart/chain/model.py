@@ -376,13 +376,18 @@ class Chain:
             return {self.position: self}
         return {one: replace(self, position=one) for one in UNKNOWN_POSITIONS}
 
-    @cached_property
-    def design_drive(self) -> Drive:
-        """The two masses that controllers are set up for: the modal reduction, whatever its error."""
+    @property
+    def two_masses(self) -> Drive:
+        """The drive of two masses that stands for the chain: the modal reduction, whatever its error."""
         from softstart.vibration import reduce_chain
 
+        return reduce_chain(self, force=True).to_drive()
+
+    @cached_property
+    def design_drive(self) -> Drive:
+        """The two masses that controllers are set up for."""
         try:
-            return reduce_chain(self, force=True).to_drive().design_drive
+            return self.two_masses.design_drive
         except InputError as error:
             sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
             raise InputError(sentences) from None

@@ -568,6 +568,11 @@ class Drive(ParameterSet):
         return "start_position" in self.given()
 
     @property
+    def two_masses(self) -> Self:
+        """The drive of two masses that stands for the machine: the drive itself."""
+        return self
+
+    @property
     def lumped(self) -> TwoMasses:
         """The drive as two masses, for checks of their size."""
         ahead = (0.5 * self.gap - one.theta0 for one in self.positions.values())
