@@ -20,7 +20,7 @@ from softstart.start.fatigue import (
     rainflow_cycles,
     turning_points,
     worst_damage,
-)
+)  # fmt: skip
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
 HOIST = Drive.load("hoist-15kw")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -290,18 +290,13 @@ def fatigue(
     for i, run in enumerate(asked, 1):
         for k, counted in enumerate(damages(run, curve)):
             life = _life(counted, curve, reference[k].damage)
-            if near:
-                both = [
-                    life_ratio(first[k].damage, own[k].damage)
-                    for first, own in zip(others[0], others[i], strict=True)
-                ]
-                life = replace(life, relative_range=tuple(both))
+            pairs = zip(others[0], others[i], strict=True)
+            both = tuple(life_ratio(first[k].damage, own[k].damage) for first, own in pairs)
+            life = replace(life, relative_range=both)
             if worn:
-                over = worn[i][k]
-                life = replace(
-                    life, worn_relative=life_ratio(worn[0][k].mean, over.mean), worn_hours=over.hours,
-                    wear_error=over.error,
-                )  # fmt: skip
+                (mean, hours, error), first_mean = worn[i][k], worn[0][k].mean
+                ratio = life_ratio(first_mean, mean)
+                life = replace(life, worn_relative=ratio, worn_hours=hours, wear_error=error)
             rows.append(life)
     return Fatigue(machine, curve, tuple(rows), given, estimate, gap)
 
@@ -405,8 +400,7 @@ def undamped(machine: Any) -> list[str]:
 # what one start does -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Damage:
+class Damage(NamedTuple):
     """One shaft in one start: its turning points, its cycles, and the share of the life that they take."""
 
     run: Run
@@ -459,11 +453,7 @@ def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
 
 
 def life_ratio(reference: float, damage: float) -> float:
-    """Life over that of `direct`, from the damage of both.
-
-    >>> life_ratio(2.0, 1.0), life_ratio(2.0, 0.0)
-    (2.0, inf)
-    """
+    """Life over that of `direct`, from the damage of both."""
     return reference / damage if damage > 0.0 else math.inf
 
 
@@ -476,8 +466,7 @@ def _again(run: Run, machine: Any) -> Run:
 # over wear -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Worn:
+class _Worn(NamedTuple):
     """Damage while the gap grows: its mean in a start, hours to failure, and the error of the mean."""
 
     mean: float

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
 from softstart.chain.elements import LIBRARY
+from softstart.drive import library
+from softstart.views.drives import drive_lines
 
 BASE = """
 [[mass]]
@@ -121,20 +123,19 @@ def test_arrays_are_the_chain_at_the_motor_shaft() -> None:
         arrays.J[0] = 1.0
 
 
-def test_a_drive_as_a_chain_has_its_numbers() -> None:
-    drive = Drive.load("servo-60kw-nordin") if "servo-60kw-nordin" in _drives() else Drive.load(_drives()[-1])
-    arrays = Chain.from_drive(drive).at_motor_shaft()
+@pytest.mark.parametrize("name", library.names())
+def test_a_drive_as_a_chain_has_its_numbers(name: str) -> None:
+    drive = Drive.load(name).replace(brake="none", start_position="mid-gap")
+    chain = Chain.from_drive(drive)
+    arrays = chain.at_motor_shaft()
     assert [arrays.J[0], arrays.J[1], arrays.c[0], arrays.d[0], arrays.gap[0], arrays.Mc[1]] == [
         drive.J1, drive.J2, drive.c, drive.d, drive.gap, drive.Mc,
     ]  # fmt: skip
+    assert drive_lines(chain) == drive_lines(drive)
+    for what in ("damping_ratio", "elastic_period", "stiffnesses", "dampings", "frictions"):
+        assert getattr(chain, what) == pytest.approx(getattr(drive, what), rel=1e-12), what
     with pytest.raises(InputError, match="batch"):
         Chain.from_drive(drive.replace(gap=[0.1, 0.2]))
-
-
-def _drives() -> tuple[str, ...]:
-    from softstart.drive import library
-
-    return library.names()
 
 
 def test_backlash_on_a_diameter_is_the_angle_of_the_paper() -> None:
