@@ -15,22 +15,18 @@ from softstart.chain.model import Chain, ChainArrays
 from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
 
 if TYPE_CHECKING:
-    from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
     from softstart.chain.two_masses import TwoMassError, Verification, two_mass_error, verify_on_chain
 
 __all__ = [
     "Chain",
     "ChainArrays",
-    "ChainFatigue",
     "Mass",
     "Motor",
     "Reduction",
     "Shaft",
-    "ShaftLife",
     "TwoMassError",
     "Verification",
     "Vibration",
-    "chain_fatigue",
     "natural_vibration",
     "reduce_chain",
     "two_mass_error",
@@ -39,11 +35,8 @@ __all__ = [
 
 # loaded when first used: they need compiled code
 _HOME = {
-    "ChainFatigue": "softstart.chain.fatigue",
-    "ShaftLife": "softstart.chain.fatigue",
     "TwoMassError": "softstart.chain.two_masses",
     "Verification": "softstart.chain.two_masses",
-    "chain_fatigue": "softstart.chain.fatigue",
     "two_mass_error": "softstart.chain.two_masses",
     "verify_on_chain": "softstart.chain.two_masses",
 }

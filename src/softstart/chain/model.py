@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,13 @@ class Chain:
     ----------
     [R]; everything at one shaft: docs/theory/reduction.md; the file: docs/reference/chain-file.md.
     """
+
+    WHAT: ClassVar[str] = "a chain"
+    # as a drive has it
+    brake: ClassVar[str] = "none"
+    release_time: ClassVar[float] = 0.0
+    position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
+    gear_ratio: ClassVar[None] = None  # masses and shafts are given at their own shafts
 
     masses: tuple[Mass, ...]
     shafts: tuple[Shaft, ...]
@@ -345,13 +352,18 @@ class Chain:
             return {self.position: self}
         return {one: replace(self, position=one) for one in UNKNOWN_POSITIONS}
 
-    @cached_property
-    def design_drive(self) -> Drive:
-        """The two masses that controllers are set up for: the modal reduction, whatever its error."""
+    @property
+    def two_masses(self) -> Drive:
+        """The drive of two masses that stands for the chain: the modal reduction, whatever its error."""
         from softstart.vibration import reduce_chain
 
+        return reduce_chain(self, force=True).to_drive()
+
+    @cached_property
+    def design_drive(self) -> Drive:
+        """The two masses that controllers are set up for."""
         try:
-            return reduce_chain(self, force=True).to_drive().design_drive
+            return self.two_masses.design_drive
         except InputError as error:
             sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
             raise InputError(sentences) from None
@@ -376,6 +388,75 @@ class Chain:
         """The mean torque of each shaft under full starting torque, N m; NaN without a motor."""
         torque = math.nan if self.motor is None else self.motor.starting_torque
         return self.at_motor_shaft().mean_torques(torque)
+
+    @property
+    def contact_laws(self) -> tuple[str, ...]:
+        """The contact law of each shaft."""
+        return self.at_motor_shaft().law
+
+    @property
+    def frictions(self) -> tuple[float, float, float]:
+        """Coulomb friction of the motor (none), and dampings to the ground of motor and load mass."""
+        at = self.at_motor_shaft()
+        return 0.0, float(at.d_ground[at.motor]), float(at.d_ground[at.load])
+
+    @property
+    def initial_motor_speed(self) -> float:
+        """Speed of the motor's mass at the start, rad/s at the motor shaft."""
+        return float(self.at_motor_shaft().w0[self.motor_index])
+
+    @property
+    def initial_load_speed(self) -> float:
+        """Speed of the load mass at the start, rad/s at the motor shaft."""
+        return float(self.at_motor_shaft().w0[self.load_index])
+
+    @property
+    def stiffnesses(self) -> Vector:
+        """The stiffness of each shaft, N m/rad at the motor shaft; infinite of a rigid one."""
+        return self.at_motor_shaft().c
+
+    @property
+    def dampings(self) -> Vector:
+        """The damping of each shaft, N m s/rad at the motor shaft."""
+        return self.at_motor_shaft().d
+
+    @property
+    def damping_ratio(self) -> float:
+        """Share of the critical damping in the first natural vibration with all gaps closed.
+
+        >>> round(Chain.load("crane-4-mass").with_damping_ratio(0.04).damping_ratio, 12)
+        0.04
+        """
+        from softstart.vibration import natural_vibration
+
+        first, at = natural_vibration(self), self.at_motor_shaft()
+        x, twist = first.shape[1], first.torque[1] / at.c
+        damping = at.d @ twist**2 + at.d_ground @ x**2
+        return float(damping / (2.0 * first.Omega[1] * (at.moving_J @ x**2)))
+
+    def with_damping_ratio(self, ratio: float) -> Self:
+        """The chain with d = 2 ratio c/Omega in each elastic shaft without damping; Omega: first frequency.
+
+        Where no shaft has a damping, `ratio` is that of the first natural vibration.
+        """
+        shafts = zip(self.shafts, self.dampings.tolist(), strict=True)
+        rate = ratio * self.elastic_period / math.pi
+        damped = [
+            one if one.rigid or d > 0.0 else one.replace(damping=rate * one.stiffness, damping_ratio=None)
+            for one, d in shafts
+        ]
+        return replace(self, shafts=tuple(damped))
+
+    def with_gap(self, gap: float) -> Self:
+        """The chain with all gaps widened alike, so that they are `gap` together, rad at the motor shaft.
+
+        >>> Chain.load("crane-4-mass").with_gap(1.0).shafts[1].gap
+        0.4
+        """
+        whole = float(self.gaps.sum())
+        if whole == 0.0:
+            raise InputError("gap: the chain has no gap that could be widened; give its shafts some.")
+        return self.changed(gaps=gap / whole)
 
     @property
     def permissible_torques(self) -> Vector:

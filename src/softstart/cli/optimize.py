@@ -39,7 +39,7 @@ from softstart.cli.running import Attributed, working
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import OBJECTIVES, USUAL, Problem, StartTime, usual_terminal
+from softstart.optimal.problem import OBJECTIVES, USUAL, StartTime, problem_of
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
     present,
@@ -54,8 +54,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart import controller
-    from softstart.optimal import robust, shortest, solving
-    from softstart.optimal.chains import problem as chains
+    from softstart.optimal import robust, shortest
     from softstart.optimal.chains import solving as chain_search
     from softstart.optimal.result import Optimum, SensorWorth
     from softstart.start.run import Run
@@ -64,12 +63,11 @@ if TYPE_CHECKING:
 else:  # no numba for a help, a wrong option or the Tab key
     controller, robust = late("softstart.controller"), late("softstart.optimal.robust")
     shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
-    solving, starts = late("softstart.optimal.solving"), late("softstart.views.starts")
-    chains = late("softstart.optimal.chains.problem")
+    starts = late("softstart.views.starts")
     chain_search = late("softstart.optimal.chains.solving")
 
 
-SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits", "seeds")  # how, not what
+SEARCH = ("tolerance", "time_limit", "confirm", "seeds")  # how, not what
 SEVERAL = ("gaps", "inertias", "load_torques")
 
 
@@ -94,27 +92,14 @@ def _bounds(given: Mapping[str, Any]) -> dict[str, Any]:
 def _check_bounds(given: Mapping[str, Any]) -> None:
     """What an optimum of this drive or chain, or of several drives, does not take."""
     one, bounds = given["drive"], _bounds(given)
-    several = any(given[name] is not None for name in SEVERAL)
-    if isinstance(one, Chain):
-        with named_as_options():
-            _check_chain(one, several, bounds)
-    elif several and (refused := not_for_several(bounds)):
-        raise InputError(refused)
+    if any(given[name] is not None for name in SEVERAL):
+        if refused := not_for_several(bounds):
+            raise InputError(refused)
     elif all_read(given):
         free = bounds.get("minimise") == "start_time" and given["start_time"] is None
         bounds = {name: value for name, value in bounds.items() if name not in SEARCH}
         with named_as_options():
-            Problem(one, None if free else 1.0, **{"terminal": usual_terminal(one), **bounds})  # any above 0
-
-
-def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None:
-    if several:
-        raise InputError(
-            "--gaps, --inertias and --load-torques are for drives: on a chain one profile for several is not "
-            "found; leave them out, or reduce the chain to a drive."
-        )
-    solving.refuse_for_chain(bounds.get("method", "auto"), bounds.get("limits", False))
-    chains.ChainProblem(chain, 1.0, **{name: value for name, value in bounds.items() if name not in SEARCH})
+            problem_of(one, None if free else 1.0, **bounds)  # any above 0
 
 
 def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
@@ -199,7 +184,7 @@ def optimize(
     computed for all combinations. For a chain, the largest torque of all its shafts is minimised.
     """
     varied = {name: given[name] or [] for name in SEVERAL}
-    if any(given[name] is not None for name in SEVERAL) and isinstance(drive, Drive):
+    if any(given[name] is not None for name in SEVERAL):
         _optimize_for_all(drive, start_time or USUAL, varied, as_json, out)
     else:
         _optimize_one(drive, typed("start_time"), _bounds(given), as_json, out)
@@ -249,7 +234,7 @@ def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
 
 
 def _optimize_for_all(
-    drive: Drive, asked: StartTime, varied: Mapping[str, Sequence[float]], as_json: bool, out: str | None
+    drive: Any, asked: StartTime, varied: Mapping[str, Sequence[float]], as_json: bool, out: str | None
 ) -> None:
     """One profile for all combinations of the values given, blind and with a contact sensor."""
     with no_solution_reported(as_json), output_folder(out) as folder:

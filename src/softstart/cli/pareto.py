@@ -36,7 +36,7 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
-from softstart.optimal.problem import Problem, StartTime
+from softstart.optimal.problem import StartTime, problem_of
 from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import present, print_conclusion, print_json, print_lines, print_tables
 
@@ -44,12 +44,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.optimal import shortest
-    from softstart.optimal.chains import problem as chains
     from softstart.views import optima as views
     from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
-    chains, views = late("softstart.optimal.chains.problem"), late("softstart.views.optima")
-    starts, shortest = late("softstart.views.starts"), late("softstart.optimal.shortest")
+    starts, views = late("softstart.views.starts"), late("softstart.views.optima")
+    shortest = late("softstart.optimal.shortest")
 
 STATE = "pareto.jsonl"
 
@@ -57,9 +56,8 @@ STATE = "pareto.jsonl"
 def _check(given: Mapping[str, Any]) -> None:
     """What the front of this drive or chain does not take."""
     if all_read(given):
-        about: Any = chains.ChainProblem if isinstance(given["drive"], Chain) else Problem
         with named_as_options():
-            about(given["drive"], 1.0, given["terminal"], torque_speed=given["torque_speed"] or ())
+            problem_of(given["drive"], 1.0, given["terminal"], torque_speed=given["torque_speed"] or ())
 
 
 @click.command(cls=Command, checks=[_check])

@@ -29,6 +29,7 @@ from softstart.errors import InputError
 from softstart.late import late
 from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
 from softstart.views.drawing import save_figure
+from softstart.views.drives import drive_lines
 from softstart.views.markdown import (
     markdown,
     output_folder,
@@ -151,13 +152,13 @@ def reduce(
 
 def _show_vibration(to: Console, vibration: Vibration) -> None:
     """The chain and its frequencies, where it is not reduced."""
-    print_lines(to, views.chain_lines(vibration.chain))
+    print_lines(to, drive_lines(vibration.chain))
     print_tables(to, [views.frequencies_table(vibration)])
 
 
 def _show(to: Console, found: Reduction, off: TwoMassError | None) -> None:
     """The chain, its frequencies and what came out."""
-    print_lines(to, views.chain_lines(found.chain))
+    print_lines(to, drive_lines(found.chain))
     print_tables(to, views.tables(found, off))
     if off is not None:
         sentence(to, views.enough(off), "bold")
@@ -178,7 +179,7 @@ def _write(found: Reduction, off: TwoMassError | None, folder: Path, command: st
 
     parts = [
         f"# {markdown(found.chain.name)}: natural frequencies and reduction",
-        "\n".join(f"- {markdown(line.strip())}" for line in views.chain_lines(found.chain)[1:]),
+        "\n".join(f"- {markdown(line.strip())}" for line in drive_lines(found.chain)[1:]),
         markdown(views.conclusion(found)),
         "![scheme](scheme.svg)",
     ]

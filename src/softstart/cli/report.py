@@ -100,7 +100,8 @@ def _check_files(given: Mapping[str, Any]) -> None:
     "--budget",
     metavar="TIME",
     type=quantity("s", 'give a time, as 20 or "60 s", or 0 for no search', least=0.0),
-    help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s; 0 disables it.",
+    help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0 "
+    "disables it.",
 )
 @click.option(
     "--project",
@@ -125,8 +126,8 @@ def report(
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
     drive of the literature. The file opens offline and prints to A4. The report recommends a strategy and
-    states its parameters, rounded to the resolution of the inverter and simulated again after rounding. The
-    report of a chain has no maps.
+    states its parameters, rounded to the resolution of the inverter and simulated again after rounding. Of a
+    chain it gives the figures of each shaft, and no maps.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     browser = None if pdf is None else _browser()
@@ -147,7 +148,7 @@ def _made(
     given: dict[str, dict[str, str]],
     asked: dict[str, Any],
     drawn: bool,
-) -> tuple[reporting.Report | reporting.ChainReport, str]:
+) -> tuple[reporting.Report, str]:
     """The report and, if it is `drawn`, its page."""
     with working("starting the drive ...") as show:
         controllers = make_controllers(names, given, prefix=True)
@@ -156,12 +157,8 @@ def _made(
             show(f"{100.0 * share:.0f} %: {what}")
 
         asked |= {"controllers": controllers, "progress": progress, "command": command_line()}
-        made: reporting.Report | reporting.ChainReport
         with Attributed():
-            if isinstance(drive, Chain):
-                made = reporting.report_chain(drive, **asked)
-            else:
-                made = reporting.report(drive, draw=drawn, **asked)
+            made = reporting.report(drive, draw=drawn, **asked)
         show("drawing the figures")
         return made, made.to_html() if drawn else ""
 
@@ -226,16 +223,11 @@ def _printed(page: str, browser: str) -> bytes:
         return target.read_bytes()
 
 
-def _show(to: Console, made: reporting.Report | reporting.ChainReport) -> None:
+def _show(to: Console, made: reporting.Report) -> None:
     print_lines(to, starts.machine_lines(made.drive))
     to.print()
-    if isinstance(made, reporting.ChainReport):
-        sentence(to, made.headline, "bold")
-        sheets: Sequence[Any] = ()
-    else:
-        sentence(to, document.answer(made), "bold")
-        sheets = made.sheets
-    for sheet in sheets:
+    sentence(to, document.answer(made), "bold")
+    for sheet in made.sheets:
         if sheet.rounded is None:
             sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")
             continue

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +47,6 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.chain import fatigue as shaft_lives
     from softstart.identification.result import Identification
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
@@ -56,7 +54,6 @@ if TYPE_CHECKING:
     from softstart.views import starts
 else:
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
-    shaft_lives = late("softstart.chain.fatigue")
     recommendation = late("softstart.start.recommendation")
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
@@ -152,7 +149,7 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool, details
     if rows[0].intervals:
         more.append(("Intervals of 95 %", starts.INTERVALS))
     if details:
-        events = "Events in the backlash" if isinstance(comparison.drive, Drive) else "Shafts"
+        events = "Events in the backlash" if len(comparison.drive.shaft_names) == 1 else "Shafts"
         more += [("Times", starts.TIMES), (events, starts.details(comparison.drive))]
     for title, figures in more:
         to.print()
@@ -268,17 +265,7 @@ def _gears_and_couplings(text: str, option: str) -> dict[str, int]:
     return {name.strip(): whole_number(number.strip(), option, 0) for name, _, number in pairs}
 
 
-def _check_chain(given: Mapping[str, Any]) -> None:
-    for name in ("worn_gap", "estimate_damping"):
-        if isinstance(given["drive"], Chain) and given[name]:
-            raise InputError(
-                f'--{name.replace("_", "-")}: "{typed("drive")}" is a chain, whose shafts have gaps and '
-                "dampings of their own; leave it out, and give them with --set, as "
-                "shaft[1].damping_ratio=0.02."
-            )
-
-
-@click.command(cls=Command, checks=[_check_chain])
+@click.command(cls=Command)
 @drive_argument(read_machine)
 @strategies_option
 @set_option
@@ -295,13 +282,13 @@ def _check_chain(given: Mapping[str, Any]) -> None:
     "--worn-gap",
     metavar="GAP",
     help="Gap at the end of limits.life, for example '2 rad'; it grows in proportion to time, and damage "
-    "accumulates.",
+    "accumulates. Of a chain: all gaps together at the motor shaft.",
 )
 @click.option(
     "--estimate-damping",
     metavar="gears=N,couplings=N",
     type=Reading(_gears_and_couplings),
-    help="For a drive without damping: a damping ratio of 1 % per pair of gears and 0.5 % per coupling, at "
+    help="For shafts without damping: a damping ratio of 1 % per pair of gears and 0.5 % per coupling, at "
     "most 6 %.",
 )
 @json_option
@@ -323,44 +310,24 @@ def fatigue(
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
     drive of the literature. Cycles are counted by the rainflow method. The tables [limits] and
     [limits.fatigue] of the file give the S-N curve, the starts per hour and the required life; without them
-    lives are relative to that of direct. A drive needs damping; a chain needs it in every shaft, and each
-    shaft is evaluated separately.
+    lives are relative to that of direct. Every shaft needs damping; those of a chain are evaluated
+    separately.
     """
-    chain = drive if isinstance(drive, Chain) else None
     with output_folder(out) as folder:
         with working("starting the machine ..."):
             made = make_controllers(controllers, params, prefix=True)
             with Attributed():
-                runs: Any = [
-                    softstart.simulate(drive, controller, fitted_to=fitted_to) for controller in made
-                ]
-                found: Any = (
-                    shaft_lives.chain_fatigue(runs, slope=slope)
-                    if chain
-                    else softstart.fatigue(
-                        runs, slope=slope, worn_gap=worn_gap, estimate_damping=estimate_damping,
-                        fitted_to=fitted_to,
-                    )
-                )  # fmt: skip
+                runs = [softstart.simulate(drive, controller, fitted_to=fitted_to) for controller in made]
+                found = softstart.fatigue(
+                    runs, slope=slope, worn_gap=worn_gap, estimate_damping=estimate_damping
+                )
         if folder is not None:
             with working("drawing the figure ..."):
-                if chain:
-                    lives.write_chain_fatigue(found, folder, command_line())
-                else:
-                    lives.write_fatigue(found, folder, command_line(), fitted_to)
+                lives.write_fatigue(found, folder, command_line(), fitted_to)
 
     def show(to: Console) -> None:
-        print_lines(to, starts.machine_lines(chain or found.drive, fitted_to))
-        if chain:
-            tables, conclusion = lives.chain_tables(found), lives.chain_conclusion(found)
-            notes = [*lives.chain_notes(found), *chain.warnings]
-        else:
-            rows = list(found.rows)
-            if controllers is None:
-                rows.sort(key=lambda row: -row.relative)
-            tables, conclusion = [lives.fatigue_table(found, rows)], lives.conclusion(found)
-            notes = lives.notes(found)
-        print_tables(to, tables)
-        print_conclusion(to, [conclusion], notes)
+        print_lines(to, starts.machine_lines(found.drive, fitted_to))
+        print_tables(to, lives.fatigue_tables(found, found.ranked if controllers is None else found.rows))
+        print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
 
-    present(found.summary, show, as_json, out and f"{out}: report.md, tables, cycles and turning points")
+    present(found.summary, show, as_json, out and f"{out}: report.md, figure, cycles and turning points")

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from softstart.drive.checks import elastic_frequency
-from softstart.drive.model import Drive
-from softstart.errors import InputError
 
 __all__ = ["TwoMasses", "doubts"]
 
@@ -32,41 +30,22 @@ class TwoMasses(NamedTuple):
     ratio: float  # turns of the motor for one of the output
 
 
-class Lumped(Protocol):
-    """A machine of more masses that says what it is as two: `Chain`."""
-
-    @property
-    def lumped(self) -> TwoMasses: ...
-
-
-def doubts(machine: Drive | Lumped) -> list[str]:
+def doubts(machine: Any) -> list[str]:
     """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed
     at most 10,000 rpm; start under the starting torque, (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of
     direct at the first contact, [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
-    below 1 before the larger inertia. A chain counts by the lever rule. Raises `InputError` for a batch.
+    below 1 before the larger inertia. A chain counts by the lever rule.
 
+    >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> doubts(crane)
     []
     >>> doubts(crane.replace(target_speed=1460))[0][:25]
     'speed 13,942 rpm, where m'
     """
-    if not isinstance(machine, Drive):
-        return [*_doubts(machine.lumped), *_not_the_rated_torque(getattr(machine, "motor", None))]
-    if machine.shape != ():
-        raise InputError(f"{machine.name}: doubts are those of one drive; give its elements().")
-    return [*_doubts(_of_drive(machine)), *_not_the_rated_torque(machine), *_nothing_holds(machine)]
-
-
-def _of_drive(drive: Any) -> TwoMasses:
-    return TwoMasses(
-        J1=drive.J1, J2=drive.J2, c=drive.c, d=drive.d, gap=drive.gap, Ms=drive.Ms - drive.motor_friction,
-        travel=max(0.0, *(0.5 * drive.gap - one.theta0 for one in drive.positions.values())),
-        Mc=drive.Mc, active=drive.load_kind == "active", speed=drive.target_speed,
-        ratio=math.nan if drive.gear_ratio is None else drive.gear_ratio,
-    )  # fmt: skip
+    return [*_doubts(machine.lumped), *_not_the_rated_torque(machine.motor), *_nothing_holds(machine)]
 
 
 def _doubts(of: TwoMasses) -> Iterator[str]:
@@ -144,11 +123,12 @@ def _not_the_rated_torque(motor: Any) -> Iterator[str]:
         )
 
 
-def _nothing_holds(drive: Drive) -> Iterator[str]:
+def _nothing_holds(machine: Any) -> Iterator[str]:
     """The start begins in a state that cannot last, and nobody said that it does."""
-    falls = drive.load_kind == "active" and drive.Mc != 0.0 and drive.brake == "none"
-    at_rest = drive.initial_load_speed == drive.initial_motor_speed == 0.0
-    if falls and at_rest and "start_position" not in drive.given():
+    two = machine.lumped
+    falls = two.active and two.Mc != 0.0 and machine.brake == "none"
+    at_rest = machine.initial_load_speed == machine.initial_motor_speed == 0.0
+    if falls and at_rest and not machine.position_given:
         yield (
             "start.position is not given: the start begins in mid-gap, where nothing holds this active load; "
             'write "hanging" (and start.brake "motor" if a brake holds the motor), or "mid-gap" if it is so.'

@@ -12,6 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
+from softstart.drive.doubts import TwoMasses
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -536,6 +537,55 @@ class Drive(ParameterSet):
         130.0
         """
         return limits_of(vars(self))
+
+    @property
+    def stiffnesses(self) -> Vector:
+        """The stiffness of the shaft, N m/rad, as an array."""
+        return np.array([self.stiffness])
+
+    @property
+    def dampings(self) -> Vector:
+        """The damping of the shaft, N m s/rad, as an array."""
+        return np.array([self.damping])
+
+    @property
+    def damping_ratio(self) -> float:
+        """Share of the critical damping: d/(2 J Omega) with J = J1 J2/(J1 + J2).
+
+        >>> round(Drive.load("hoist-15kw").damping_ratio, 4)
+        0.0602
+        """
+        return float(0.5 * self.d * (1.0 / self.J1 + 1.0 / self.J2) / self.Omega)
+
+    @property
+    def contact_laws(self) -> tuple[str, ...]:
+        """The contact law of the shaft, as of one shaft of several."""
+        return (self.contact_law,)
+
+    @property
+    def position_given(self) -> bool:
+        """Whether the file says where the start begins; else that follows from brake, load and reversal."""
+        return "start_position" in self.given()
+
+    @property
+    def two_masses(self) -> Self:
+        """The drive of two masses that stands for the machine: the drive itself."""
+        return self
+
+    @property
+    def lumped(self) -> TwoMasses:
+        """The drive as two masses, for checks of their size."""
+        ahead = (0.5 * self.gap - one.theta0 for one in self.positions.values())
+        return TwoMasses(
+            J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *ahead),
+            Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
+            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
+        )  # fmt: skip
+
+    def with_damping_ratio(self, ratio: float) -> Self:
+        """The drive with this damping ratio, if it has no damping."""
+        d = 2.0 * ratio * self.Omega / (1.0 / self.J1 + 1.0 / self.J2)
+        return self if self.damping > 0.0 else self.replace(damping=float(d))
 
     # ---- where the start begins --------------------------------------------------------------------------
 

@@ -23,22 +23,23 @@ DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
 WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it
 
 
-def reduced_drive(chain: Chain) -> Drive:
-    """The drive of two masses that stands for a chain; refused where no gap is the larger part of all.
+def reduced_drive(machine: Any) -> Drive:
+    """The drive of two masses that stands for a machine; refused where no gap is the larger part of all.
 
     >>> reduced_drive(Chain.load("crane-4-mass"))
     Traceback (most recent call last):
     softstart.errors.InputError: drive = Crane travel drive as a chain of four masses: its widest gap is 40 %
     of all; ...
     """
-    gaps = chain.at_motor_shaft().gap
+    gaps = machine.gaps
     whole = float(gaps.sum())
     if whole > 0.0 and float(gaps.max()) <= DOMINANT * whole:
         raise InputError(
-            f"drive = {chain.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
+            f"drive = {machine.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
             "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
         )
-    return reduce_chain(chain, force=True).to_drive()
+    drive: Drive = machine.two_masses
+    return drive
 
 
 def chain_log(chain: Chain, log: Log, lines: float) -> Log:

@@ -249,9 +249,7 @@ def plan_experiments(
     ----------
     A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992; docs/identification.md.
     """
-    drive = drive if isinstance(drive, Drive) else Drive.load(drive)
-    if drive.shape:
-        raise InputError("drive: a batch of drives has no plan; give one drive.")
+    drive = Drive.load(drive) if isinstance(drive, str) else drive
     period = float(to_si(log_period, "s", name="log_period"))
     if not 0.0 < period < math.inf:
         raise InputError(f"log_period = {show(log_period)}: the sample period of the log is above 0.")

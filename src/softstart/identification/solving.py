@@ -138,10 +138,7 @@ def identify(
     """
     began = time.perf_counter()
     drive = load_machine(drive) if isinstance(drive, str) else drive
-    chain = drive if isinstance(drive, Chain) else None
-    drive = reduced_drive(drive) if isinstance(drive, Chain) else drive
-    if drive.shape:
-        raise InputError("drive: a batch of drives is no guess; give one drive.")
+    machine, drive = drive, reduced_drive(drive)
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
     if not given:
         raise InputError("logs: there is none; give a log, or the path of its CSV file.")
@@ -190,7 +187,7 @@ def identify(
     best = found[0][1]
     notes = [
         *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
-        *([] if chain is None else _reduction(chain, drive, read[0], free, progress)),
+        *_reduction(machine, drive, read[0], free, progress),
         *doubts,
         *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
         *_other_scale(drive, drive.replace(**changes)),
@@ -213,15 +210,15 @@ def identify(
 
 
 def _reduction(
-    chain: Chain, drive: Drive, log: Log, free: Iterable[str] | None, progress: Progress | None
+    machine: Any, drive: Drive, log: Log, free: Iterable[str] | None, progress: Progress | None
 ) -> list[str]:
-    """What the reduction of a chain leaves out, and how far that moves what is found."""
-    if len(chain.masses) == 2:
+    """What the reduction of more masses leaves out, and how far that moves what is found."""
+    if len(machine.mass_names) == 2:
         return []
     asked = None if free is None else list(free)
     return [
         reduction_note(
-            chain,
+            machine,
             drive,
             log,
             lambda one: identify(one, drive, free=asked, searches=1, progress=progress).shared,

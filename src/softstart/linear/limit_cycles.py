@@ -344,8 +344,7 @@ def _on_the_cycle(
     start: SampledStart, point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle, factor: float
 ) -> Sample:
     """A sample with the gap open, in the middle of the part of it that the twist crosses, going up."""
-    assert isinstance(start.drive, Drive)
-    half = 0.5 * float(start.drive.gap)
+    half = 0.5 * float(outside.drive.gap)
     amplitude, bias = factor * cycle.amplitude, cycle.bias
     low, high = max(-half, bias - amplitude), min(half, bias + amplitude)
     if low >= high:  # this vibration does not leave the flank: start just off it
@@ -358,7 +357,7 @@ def _on_the_cycle(
     torque = -turn / complex(outside.twist(w)[0])
     demand = torque * complex(outside.demand_per_torque(w)[0])
     u = demand * complex(outside.motor_torque_per_demand(w)[0])
-    J1, J2 = float(start.drive.J1), float(start.drive.J2)
+    J1, J2 = float(outside.drive.J1), float(outside.drive.J2)
     b1, b2 = outside.decays
     phi1, w2 = (u - torque) / (J1 * (s * (s + b1))), torque / (J2 * (s + b2))
     plant = base.plant

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.chain.machines import Machine, knob, with_values
-from softstart.chain.model import Chain, load_machine
+from softstart.chain.model import load_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
 from softstart.late import late
@@ -29,6 +28,7 @@ from softstart.linear.operating_point import (
 from softstart.linear.sampled_plant import single, sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
+from softstart.start.simulation import is_machine
 
 if TYPE_CHECKING:
     import control
@@ -294,7 +294,7 @@ def linear_view(
         Factors on J2 and c with which the margins of the same controller are computed too; of a chain on the
         inertia of its load mass and on all stiffnesses.
     limit_cycles : bool, optional
-        Whether limit cycles through the gap of a drive are predicted and tried on the exact plant.
+        Whether limit cycles through the gap of a single shaft are predicted and tried on the exact plant.
 
     Returns
     -------
@@ -304,7 +304,7 @@ def linear_view(
     Raises
     ------
     InputError
-        If the input is wrong (a batch of drives, an unknown controller).
+        If the input is wrong, as an unknown controller.
     SimulationError
         If the start cannot be simulated.
 
@@ -353,10 +353,12 @@ def linear_view(
                   for name, change in varied]  # fmt: skip
     outside: Outside | None = None
     cycled: tuple[PredictedCycle, ...] = ()
-    if isinstance(drive, Chain):
+    if len(drive.shaft_names) > 1:
         variations.append(_varied("all gaps open", Loop(start.drive, point, start.differencing, open=True)))
     else:
-        outside = Outside(drive, point.law, point.derivative.inputs, point.plant, start.differencing)
+        outside = Outside(
+            drive.design_drive, point.law, point.derivative.inputs, point.plant, start.differencing
+        )
         cycled = _cycles(start, run, point, outside) if limit_cycles else ()
     return LinearView(
         drive, start.controller, "loop", _notes(name, run, point, own), point, own, outside, own.margins(),
@@ -385,18 +387,13 @@ def _timed_by(point: OperatingPoint) -> bool:
     return bool(np.any(point.derivative.rates[:, point.derivative.A.shape[0] :]))
 
 
-def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[float]]) -> None:
+def _check(drive: Any, fitted_to: Any, factors: Mapping[str, Sequence[float]]) -> None:
     wrong = []
     for name, one in (("drive", drive), ("fitted_to", fitted_to)):
         if one is None:
             continue
-        if not isinstance(one, Drive | Chain):
+        if not is_machine(one):
             wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
-        elif isinstance(one, Drive) and one.shape != ():
-            wrong.append(
-                f"{name}: {one.name} is a batch of shape {one.shape}, and a linear view is that of one "
-                "drive; take one of its elements()."
-            )
         elif one.motor is None or one.target_speed is None:
             wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
     for name, values in factors.items():

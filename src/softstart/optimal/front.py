@@ -19,10 +19,10 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.problem import Problem, Terminal, problem_of
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
 from softstart.optimal.shortest import shortest_start_time
-from softstart.optimal.solving import optimize, refuse_for_chain
+from softstart.optimal.solving import optimize
 from softstart.processes import Pool, checked_workers
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -344,11 +344,8 @@ def pareto(
     ----------
     docs/optimal-starts.md; each point: `optimize`.
     """
-    about: Any = Problem
-    if isinstance(drive, Chain):
-        refuse_for_chain(method, False)
-        about = chains.ChainProblem
-    about(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
+    asked_for: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    problem_of(drive, 1.0, terminal, method=method, **asked_for)
     times = None if start_times is None else _checked(start_times)
     made = [
         make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
@@ -361,7 +358,7 @@ def pareto(
     if times is None:
         _tell(progress, "looking for the shortest start time")
         times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
-    options = {"method": method, "torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    options = {"method": method, **asked_for}
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
     with (
@@ -387,10 +384,9 @@ def default_start_times(
     curve is steep. `options` go to `Problem`.
     """
     direct = simulate(drive, "direct").start_time
-    if isinstance(drive, Chain) or len(drive.positions) > 1:
-        shortest, count = direct * QUICKEST / SHORT, count if isinstance(drive, Chain) else count // 2
-    else:
-        shortest = shortest_start_time(Problem(drive, 1.0, terminal, **options))
+    shortest = shortest_known(drive, terminal, **options)
+    if math.isnan(shortest):
+        shortest, count = direct * QUICKEST / SHORT, count // 2 if len(drive.positions) > 1 else count
     if not math.isfinite(shortest):
         shortest = direct
     if not math.isfinite(shortest):
@@ -399,6 +395,13 @@ def default_start_times(
     share = np.linspace(0.0, 1.0, count) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
     return times
+
+
+def shortest_known(drive: Drive | Chain, terminal: Terminal, **options: Any) -> float:
+    """The shortest feasible start time, s; NaN of a chain and over several positions: nobody knows it."""
+    if isinstance(drive, Chain) or len(drive.positions) > 1:
+        return math.nan
+    return shortest_start_time(Problem(drive, 1.0, terminal, **options))
 
 
 class PointAsked(NamedTuple):

@@ -242,6 +242,12 @@ class Problem:
         """M12avg_base in N m, the torque to which K_dyn refers."""
         return float((self.base or self.drive).mean_torque)
 
+    def lower_bound(self) -> Any:
+        """The momentum bound on K_dyn of every start; see `softstart.optimal.momentum.momentum_bound`."""
+        from softstart.optimal.momentum import momentum_bound
+
+        return momentum_bound(self)
+
     def casadi(self) -> Any:
         """The problem as one nonlinear program of CasADi, for your own solver, options or sensitivities.
 
@@ -271,6 +277,41 @@ class Problem:
             and not self.torque_speed
             and self.smoothness == 0.0
         )
+
+
+def problem_of(
+    machine: Any, start_time: float | None, terminal: Terminal | None = None, *, method: str = "auto",
+    limits: bool = False, **asked: Any,
+) -> Problem:  # fmt: skip
+    """The problem of a drive or a chain, its terminal condition the usual one if none is given.
+
+    InputError for what cannot be asked of it, by which method and whether for the least time within limits.
+
+    >>> problem_of(Drive.load("crane-4amtkf"), 0.5).terminal
+    'synchronous'
+    """
+    from softstart.start.simulation import is_machine
+
+    if isinstance(machine, Drive) or not is_machine(machine):
+        return Problem(machine, start_time, terminal or usual_terminal(machine), **asked)
+    from softstart.optimal.chains.problem import ChainProblem
+
+    refuse_for_chain(method, limits)
+    return ChainProblem(machine, start_time, terminal or "reached", **asked)
+
+
+def refuse_for_chain(method: str, limits: bool) -> None:
+    """What cannot be asked of an optimum of a chain."""
+    wrong = []
+    if method != "auto":
+        wrong.append(
+            f"method = {method}: on a chain the optimum is found by successive linear programs on its exact "
+            "start; use method = auto."
+        )
+    if limits:
+        wrong.append("limits: this is for drives; leave it out, or reduce the chain to a drive.")
+    if wrong:
+        raise InputError(wrong)
 
 
 def _number(value: Any) -> bool:

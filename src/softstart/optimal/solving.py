@@ -19,7 +19,15 @@ from softstart.optimal.certificate import certified_bound, not_certified
 from softstart.optimal.exact import Hold, check, demand_of, hold_of, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import least_heat, momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal, usual_terminal
+from softstart.optimal.problem import (
+    USUAL,
+    Objective,
+    Problem,
+    StartTime,
+    Terminal,
+    refuse_for_chain,
+    usual_terminal,
+)
 from softstart.optimal.result import (
     Candidate,
     InfeasibleError,
@@ -213,20 +221,6 @@ def optimize(
         best = solve(replace(asked, terminal="reached"), method, warm, tolerance, time_limit, confirm)
         why += ", in which only the load can have the target speed"
     return replace(best, why=best.why + why)
-
-
-def refuse_for_chain(method: str, limits: bool) -> None:
-    """What cannot be asked of an optimum of a chain."""
-    wrong = []
-    if method != "auto":
-        wrong.append(
-            f"method = {method}: on a chain the optimum is found by successive linear programs on its exact "
-            "start; use method = auto."
-        )
-    if limits:
-        wrong.append("limits: this is for drives; leave it out, or reduce the chain to a drive.")
-    if wrong:
-        raise InputError(wrong)
 
 
 def solve(

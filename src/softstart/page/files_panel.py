@@ -9,7 +9,6 @@ from weakref import WeakMethod
 from nicegui import ui
 
 from softstart.chain.machines import Machine
-from softstart.chain.model import Chain
 from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
@@ -83,9 +82,9 @@ class DriveFiles:
         self._begin(machine_of(content, name))
 
     def _begin(self, machine: Machine) -> None:
-        """Take a drive at once, and a chain as soon as the engine is ready for it."""
+        """Take two masses at once, and more as soon as all strategies have started them."""
         self._troubles.set_visibility(False)
-        if not isinstance(machine, Chain):
+        if len(machine.mass_names) == 2:
             self._take_over(machine)
         elif self._view.busy:
             raise InputError("A chain is being started; wait for it, or cancel it.")

@@ -17,14 +17,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.machines import Machine
 from softstart.chain.model import Chain
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import Problem, best_start
+from softstart.optimal.problem import best_start
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
@@ -143,10 +142,8 @@ def curve(
 
     with no_solution_as_sentence():
         through(long)
-        least = math.inf  # of a chain, or over positions, nobody knows it
-        if isinstance(drive, Drive) and not several:
-            progress(done / total, "the shortest start time")
-            least = shortest.shortest_start_time(Problem(drive, 1.0, terminal))
+        progress(done / total, "the shortest start time")
+        least = front.shortest_known(drive, terminal)
         done += 1
         if math.isfinite(least):
             first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
@@ -345,7 +342,7 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress
         _life(machine, rows, progress),
     ]
     quickest = None
-    if isinstance(machine, Drive) and machine.limits:
+    if machine.limits and machine.limits.used_torque is None:  # those of single shafts bound no optimum
         progress(0.8, "the quickest start that keeps the limits")
         name, title = "quickest", "The quickest start within limits"
         try:
@@ -386,10 +383,8 @@ def _margins(machine: Machine, rows: Mapping[str, Row]) -> Part:
     """Which strategies keep the limits, with what margin."""
     name, title = "limits", "Limits"
     if not machine.limits:
-        lacking = "permissible_torque of its shafts" if isinstance(machine, Chain) else "[limits]"
-        return Part(
-            name, title, [], [], [f"{clipped(machine.name)} has no {lacking}: nothing can be exceeded."]
-        )
+        lacking = "neither [limits] nor a permissible_torque of its shafts"
+        return Part(name, title, [], [], [f"{clipped(machine.name)} has {lacking}: nothing can be exceeded."])
     cells = [[label, row.against_limits] for label, row in rows.items()]
     return Part(name, title, ["strategy", "limits"], cells, [recommend(machine, rows.values()).text])
 
@@ -400,14 +395,9 @@ def _life(machine: Machine, rows: Mapping[str, Row], progress: Progress) -> Part
     progress(0.65, "life of the shaft line")
     runs: Any = [row.run for row in rows.values()]
     try:
-        if isinstance(machine, Chain):
-            shafts = chain_fatigue(runs)
-            shown = lives.chain_tables(shafts)[1]
-            said = [lives.chain_conclusion(shafts), *lives.chain_notes(shafts)]
-        else:
-            found = fatigue(runs)
-            shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
-            said = [lives.conclusion(found), *lives.notes(found)]
+        found = fatigue(runs)
+        shown = lives.fatigue_tables(found, found.ranked)[0]
+        said = [lives.conclusion(found), *lives.notes(found)]
     except InputError as error:
         return Part(name, title, [], [], list(error.sentences))
     headings = [column.heading.replace("\n", " ") for column in shown.columns]
@@ -430,6 +420,5 @@ def report(
     """The report for a customer, as one HTML text; SOFTSTART_BUDGET, in s, is its `budget`."""
     progress(0.0, "starting the drive")
     budget = os.environ.get("SOFTSTART_BUDGET")
-    options = {"command": command} | ({"budget": float(budget)} if budget else {})
-    made: Any = reporting.report_chain if isinstance(drive, Chain) else reporting.report
-    return str(made(drive, controllers=controllers, progress=progress, **options).to_html())
+    options: dict[str, Any] = {"command": command} | ({"budget": float(budget)} if budget else {})
+    return str(reporting.report(drive, controllers=controllers, progress=progress, **options).to_html())

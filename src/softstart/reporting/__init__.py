@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from softstart.reporting.chain_report import ChainReport, report_chain
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.result import Report, report
 
 __all__ = [
-    "ChainReport",
     "Project",
     "Report",
     "Resolution",
     "report",
-    "report_chain",
 ]

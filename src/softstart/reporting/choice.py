@@ -24,7 +24,7 @@ class Candidate:
     """One strategy: its start, its map, whether drives can do it, and the verdict of the rule on it."""
 
     row: Row
-    map: RobustnessMap
+    map: RobustnessMap | None  # none of a machine with several gaps
     realisable: bool
     verdict: str
 
@@ -40,8 +40,8 @@ class Candidate:
 
     @property
     def worst(self) -> float:
-        """Largest K_dyn over the map."""
-        return self.map.worst
+        """Largest K_dyn over the map; without one that of the start."""
+        return self.row.run.k_dyn if self.map is None else self.map.worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +81,15 @@ class Choice:
         return next((one for one in self.candidates if one.name == name), None)
 
     @property
-    def mapped(self) -> list[Candidate]:
+    def mapped(self) -> list[Any]:
         """Those whose maps are shown: the two chosen, direct, and others with the least worst case."""
         others = sorted(
             (one for one in self.candidates if one.realisable),
             key=lambda one: math.inf if math.isnan(one.worst) else one.worst,
         )
         first = [self.chosen, self.ordinary, self.of(REFERENCE)]
-        return list(dict.fromkeys([one for one in first if one is not None] + others))[:MOST_MAPS]
+        shown = dict.fromkeys([one for one in first if one is not None] + others)
+        return [one for one in shown if one.map is not None][:MOST_MAPS]
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""
@@ -110,7 +111,9 @@ class Choice:
         }
 
 
-def choose(maps: Sequence[RobustnessMap], rows: Sequence[Row], recommendation: Recommendation) -> Choice:
+def choose(
+    maps: Sequence[RobustnessMap | None], rows: Sequence[Row], recommendation: Recommendation
+) -> Choice:
     """The verdict on each strategy; nothing is decided here."""
     found = [
         Candidate(row, one, realisable(row.run.controller), recommendation.verdict(row))
@@ -160,7 +163,8 @@ def choice_section(choice: Choice, answer: str) -> Html:
         for one in order
     ]
     strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
-    heads = ["strategy", "what it does", "takes", "worst K_dyn on the map", "verdict"]
+    worst_of = "K_dyn" if choice.candidates[0].map is None else "worst K_dyn on the map"
+    heads = ["strategy", "what it does", "takes", worst_of, "verdict"]
     return html(
         tag("p", answer),
         tag("p", rule, " ", never),

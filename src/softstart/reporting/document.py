@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from softstart.drive import Drive
 from softstart.errors import listed
 from softstart.reporting.choice import Candidate, Choice, choice_section
 from softstart.reporting.drive_section import drive_section
-from softstart.reporting.first_page import before_after_picture, before_and_after, first_page, for_customer
+from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
 from softstart.reporting.limit import limit_section
 from softstart.reporting.markup import (
     Figures,
@@ -29,8 +29,16 @@ from softstart.reporting.markup import (
 from softstart.reporting.project import Project
 from softstart.reporting.result import Provenance, Report
 from softstart.reporting.robustness import GAPS, INERTIAS, life_chapter, maps_picture, robustness_section
+from softstart.reporting.shafts import chain_section, sentences, shafts_section
 from softstart.reporting.sheet import sheet_section
-from softstart.reporting.strategies import strategies_section, trace_groups, traces_picture, traces_section
+from softstart.reporting.strategies import (
+    for_customer,
+    ordered,
+    strategies_section,
+    trace_groups,
+    traces_picture,
+    traces_section,
+)
 from softstart.start.comparison import Comparison
 from softstart.views.drives import POSITIONS
 from softstart.views.printed import digits, fixed, short, units_of
@@ -48,7 +56,8 @@ def pictures(choice: Choice, comparison: Comparison) -> dict[str, Html]:
             key: traces_picture(key, comparison.rows, some) for key, some, _ in trace_groups(comparison.rows)
         }
         made["before-after"] = before_after_picture(before_and_after(choice, comparison))
-        made["maps"] = maps_picture(comparison.drive, choice.mapped)
+        if choice.mapped:
+            made["maps"] = maps_picture(comparison.drive, choice.mapped)
         return made
 
 
@@ -62,22 +71,19 @@ def _any_script() -> Iterator[None]:
 
 def document(report: Report) -> str:
     """The whole file."""
-    return whole(report.project, lambda: _document(report))
-
-
-def whole(project: Project, made: Callable[[], str]) -> str:
-    """The page that is `made`, its figures drawn with any letters, with the project's decimal sign."""
     with _any_script():
-        text = typeset(made())
-    return with_comma(text) if project.decimal == "comma" else text
+        text = typeset(_document(report))
+    return with_comma(text) if report.project.decimal == "comma" else text
 
 
 def _document(report: Report) -> str:
     drive, choice, rows, project = report.drive, report.choice, report.comparison.rows, report.project
     figures = Figures(report.pictures)
     chosen = [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
-    best = choice.chosen.name if choice.chosen else ""
+    best, what = choice.chosen.name if choice.chosen else "", drive.WHAT.removeprefix("a ")
     first = first_page(report, figures)
+    several = len(drive.shaft_names) > 1
+    shown = list(dict.fromkeys(reversed(before_and_after(choice, report.comparison))))
     sections: list[tuple[str, str, Html]] = [
         ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
         (
@@ -86,21 +92,36 @@ def _document(report: Report) -> str:
             strategies_section(drive, rows, chosen, report.failed),
         ),
         ("traces", "Torques of each start", traces_section(rows, figures)),
-        ("drive", "The drive", drive_section(drive, project, figures)),
-        ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
+        *(
+            [("shafts", "What each shaft carries", shafts_section(ordered(rows), shown, figures))]
+            if several
+            else []
+        ),
         (
-            "robustness",
-            "When the gap wears and the load changes",
-            robustness_section(drive, choice.mapped, figures),
+            "drive",
+            f"The {what}",
+            chain_section(drive, figures) if several else drive_section(drive, project, figures),
+        ),
+        ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
+        *(
+            [
+                (
+                    "robustness",
+                    "When the gap wears and the load changes",
+                    robustness_section(drive, choice.mapped, figures),
+                )
+            ]
+            if choice.mapped
+            else []
         ),
         (
             "sheets",
             "Parameter sheets for the inverter",
-            sheet_section(drive, report.sheets, report.resolution, best, choice.role),
+            sheet_section(drive.design_drive, report.sheets, report.resolution, best, choice.role),
         ),
         *life_chapter(report.lives),
-        ("validity", "What this report assumes, and where it holds", validity_section(drive, project)),
-        ("provenance", "About this document", provenance_section(report.provenance, project)),
+        ("validity", "What this report assumes, and where it holds", validity_section(report)),
+        ("provenance", "About this document", provenance_section(report.provenance, project, what)),
     ]
     return page(str(drive.name), project, report.provenance.made, first, sections)
 
@@ -161,45 +182,26 @@ def page(
     )
 
 
-def validity_section(drive: Drive, project: Project) -> Html:
+def validity_section(report: Report) -> Html:
     """The assumptions behind all figures, and where their data are from."""
-    units = units_of(drive)
-    damping = (
-        f"damping of the shaft: {short(float(drive.d))} N m s/rad, proportional to the speed of its twist"
-        if drive.d
-        else "no damping: oscillations do not die out, as those of a real shaft do"
+    drive, project, motor = report.drive, report.project, report.drive.motor
+    motor_is = _motor_sentence(
+        float(motor.minimum_torque), float(motor.maximum_torque), float(motor.torque_lag)
     )
-    load = (
-        (
-            "Load: the load torque acts always, also at rest (a hanging load); its torque and inertia are "
-            "constant during the start."
-        )
-        if drive.load_kind == "active"
-        else (
-            "Load: the load torque is friction: it holds the load at rest and opposes its motion; its "
-            "torque and inertia are constant during the start."
-        )
-    )
-    notes = [
-        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model.",
-        motor_sentence(float(drive.minimum_torque), float(drive.maximum_torque), float(drive.torque_lag)),
-        f"Contact law: {drive.contact_law}; {damping}.",
-        load,
-        f"The start begins {POSITIONS[drive.start_position]}."
-        if isinstance(drive.start_position, str)
-        else (
-            f"The start begins at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}."
-        ),
-        (
-            f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and "
-            f"from {short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values "
-            "computed. Other stiffness, damping or load torque was not examined."
-        ),
-        (
+    if len(drive.shaft_names) > 1:
+        notes = [
+            *sentences(drive),
+            motor_is,
+            "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
+            "The equations are solved as Taylor series from event to event; peaks are located, not read off "
+            "a grid.",
+        ]
+    else:
+        notes = [*_of_two_masses(drive, motor_is), *_on_maps(report.choice)]
+        notes.append(
             "The equations are solved in closed form from event to event; peaks are located, not read off a "
             "grid. The figures are as good as the data, above all gap, stiffness and inertias."
-        ),
-    ]
+        )
     guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
     if guessed:
         notes.append(
@@ -210,7 +212,47 @@ def validity_section(drive: Drive, project: Project) -> Html:
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
 
 
-def motor_sentence(least: float, most: float, lag: float) -> str:
+def _of_two_masses(drive: Any, motor_is: str) -> list[str]:
+    units, two, where = units_of(drive), drive.lumped, list(drive.positions)
+    damping = (
+        f"damping of the shaft: {short(float(two.d))} N m s/rad, proportional to the speed of its twist"
+        if two.d
+        else "no damping: oscillations do not die out, as those of a real shaft do"
+    )
+    load = (
+        "Load: the load torque acts always, also at rest (a hanging load); its torque and inertia are "
+        "constant during the start."
+        if two.active
+        else "Load: the load torque is friction: it holds the load at rest and opposes its motion; its "
+        "torque and inertia are constant during the start."
+    )
+    begins = (
+        f"The start begins {POSITIONS[where[0] if len(where) == 1 else 'unknown']}."
+        if where[0]
+        else (
+            f"The start begins at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}."
+        )
+    )
+    return [
+        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model.",
+        motor_is,
+        f"Contact law: {drive.contact_laws[0]}; {damping}.",
+        load,
+        begins,
+    ]
+
+
+def _on_maps(choice: Choice) -> list[str]:
+    if not choice.mapped:
+        return []
+    return [
+        f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and "
+        f"from {short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values "
+        "computed. Other stiffness, damping or load torque was not examined."
+    ]
+
+
+def _motor_sentence(least: float, most: float, lag: float) -> str:
     """What stands for the motor: its torques (N m) and the lag of its torque (s)."""
     follows = f"with a lag of {short(1e3 * lag)} ms" if lag else "without lag"
     return (
@@ -219,7 +261,7 @@ def motor_sentence(least: float, most: float, lag: float) -> str:
     )
 
 
-def provenance_section(about: Provenance, project: Project, chain: bool = False) -> Html:
+def provenance_section(about: Provenance, project: Project, what: str) -> Html:
     """Revisions, approval, versions, date, command, and the drive's file with all changes."""
     signed = [
         ["made by", project.author, ""],
@@ -251,9 +293,7 @@ def provenance_section(about: Provenance, project: Project, chain: bool = False)
         tag("p", "Command: ", tag("code", about.command)) if about.command else None,
         tag(
             "p",
-            "The chain as a file for softstart, with all changes, SI units unless stated:"
-            if chain
-            else "The drive as a file for softstart, with all changes, SI units unless stated:",
+            f"The {what} as a file for softstart, with all changes, SI units unless stated:",
             class_="lead",
         ),
         tag("pre", re.sub(r" *#[^\"\n]*$", "", about.drive_toml, flags=re.MULTILINE), class_="file"),
@@ -299,10 +339,10 @@ def _compared(report: Report, best: Candidate) -> str:
     bound, known = report.lower_bound(best.row), report.gentlest_known(best.row)
     if bound is None:
         return ""
-    drive = report.drive
+    motor = report.drive.motor
     figures = {
-        "least": short(float(drive.minimum_torque)),
-        "most": short(float(min(drive.Ms, drive.maximum_torque))),
+        "least": short(float(motor.minimum_torque)),
+        "most": short(float(min(motor.starting_torque, motor.maximum_torque))),
         "bound": fixed(math.floor(bound * 1000.0) / 1000.0, 3),
     }
     if known is None or known >= best.row.run.k_dyn * (1.0 - SAME):

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
-from softstart.drive import PARAMETERS, Drive
+from softstart.chain.machines import values_of
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
-from softstart.start import metrics
 from softstart.start.fatigue import HOURS_PER_YEAR
 from softstart.views import chain_schemes
 from softstart.views.printed import RPM, at_output, digits, short, unit, units_of
@@ -32,7 +32,7 @@ _line = partial(chain_schemes.line, colour=_INK, width=2)
 _polyline = partial(chain_schemes.polyline, colour=_INK, width=2)
 
 
-def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
+def drive_section(drive: Any, project: Project, figures: Figures) -> Html:
     """Scheme, data, and what follows from them."""
     caption = (
         "The drive, everything brought to the motor shaft. The height of a disc goes with the "
@@ -48,15 +48,14 @@ def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
     )
 
 
-def _data(drive: Drive, project: Project) -> Html:
+def _data(drive: Any, project: Project) -> Html:
     """What is known of the drive and from where; in a sentence what is absent."""
     rows, absent = [], list[str]()
     sourced, units, ratio = bool(project.sources), units_of(drive), drive.gear_ratio
-    for parameter in PARAMETERS.values():
-        value = getattr(drive, parameter.name)
+    for path, (parameter, value) in values_of(drive).items():
         if value is None or value == "" or parameter.name in HIDDEN:
             continue
-        source = project.source_of(parameter.path)
+        source = project.source_of(path)
         if value == parameter.default and not source:
             absent += [parameter.meaning] if value == 0.0 else []
             continue
@@ -66,7 +65,7 @@ def _data(drive: Drive, project: Project) -> Html:
         of, other = unit(units.of(parameter.unit)), ""
         if isinstance(value, str):
             of = ""
-        elif parameter.path == "limits.life":
+        elif path == "limits.life":
             hours = value / 3600.0
             text, of, other = digits(hours / HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
         elif of != unit(parameter.unit):
@@ -97,12 +96,13 @@ def _data(drive: Drive, project: Project) -> Html:
     )
 
 
-def _derived(drive: Drive) -> Html:
-    (rated, basis), units = rated_torque(drive), units_of(drive)
-    mean, twist = float(metrics.base_torque(drive)), units.shown(float(drive.Ms / drive.c), "rad")
+def _derived(drive: Any) -> Html:
+    (rated, basis), units = rated_torque(drive.design_drive), units_of(drive)
+    mean, two = float(drive.mean_torque), drive.lumped
+    twist = units.shown(float(drive.motor.starting_torque / two.c), "rad")
     found = [
         f"mean shaft torque under the starting torque (K_dyn = 1) {digits(mean)} N m",
-        f"elastic frequency with the gap closed {digits(float(drive.Omega) / (2.0 * math.pi))} Hz",
+        f"elastic frequency with the gap closed {digits(1.0 / float(drive.elastic_period))} Hz",
         f"elastic period {digits(1e3 * float(drive.elastic_period))} ms",
         f"twist of the shaft under the starting torque {digits(twist)} {units.angle}",
         f"100 % of torque in the parameter sheets: the {basis}, {digits(rated)} N m",
@@ -110,27 +110,25 @@ def _derived(drive: Drive) -> Html:
     return tag("p", f"What follows from them: {'; '.join(found)}.")
 
 
-def scheme(drive: Drive, prefix: str) -> Html:
+def scheme(drive: Any, prefix: str) -> Html:
     """The scheme as an <svg> element."""
-    J1, J2, gap, c, d = (float(v) for v in (drive.J1, drive.J2, drive.gap, drive.c, drive.d))
+    two, motor = drive.lumped, drive.motor
+    J1, J2, gap, c, d, Mc = map(float, (two.J1, two.J2, two.gap, two.c, two.d, two.Mc))
     units = units_of(drive)
     tallest = max(J1, J2)
     high1, high2 = (max(_LEAST, _TALLEST * (J / tallest) ** 0.25) for J in (J1, J2))
-    windup = float(drive.Ms) / c
+    windup = float(motor.starting_torque) / c
     coil = max(_LEAST_COIL, _ANGLES * windup / (windup + gap))
-    kind = "active" if drive.load_kind == "active" else "reactive"
+    kind = "active" if two.active else "reactive"
     damper = f"d = {short(d)} N m s/rad" if d > 0.0 else ""
     inertia = f"{short(J1)} kg m²"  # is wider than its disc, and beside the damper's label
     spring = max(_SHORTEST_SHAFT, coil + 24.0, _width(damper) + max(_width(inertia) - 64.0, 2.0 * _APART))
     opening = max(_LEAST_GAP, _ANGLES * gap / (windup + gap)) if gap > 0.0 else 0.0
     parts: list[str] = []
-    motor, load = (
-        f"up to {short(float(drive.maximum_torque))} N m",
-        f"{short(float(drive.Mc))} N m, {kind}",
-    )
-    x = max(120.0, 40.0 + _width(motor, 12))
+    most, load = f"up to {short(float(motor.maximum_torque))} N m", f"{short(Mc)} N m, {kind}"
+    x = max(120.0, 40.0 + _width(most, 12))
     parts += _disc(x, high1, "#D6E6F2", "J1", "motor", inertia)
-    parts += _torque(x - 34.0, "u", motor, _ORANGE, left=True)
+    parts += _torque(x - 34.0, "u", most, _ORANGE, left=True)
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high1 - 12.0, "phi1, w1"))
     x += 64.0
     parts += _shaft(x, spring, coil, c, damper)
@@ -152,7 +150,7 @@ def scheme(drive: Drive, prefix: str) -> Html:
     title = (
         f"Two masses and a gap: motor J1 = {short(J1)} kg m², shaft c = {short(c)} N m/rad, gap "
         f"{digits(units.shown(gap, 'rad'))} {units.angle}, load J2 = {short(J2)} kg m², load torque "
-        f"Mc = {short(float(drive.Mc))} N m"
+        f"Mc = {short(Mc)} N m"
     )
     head = tag("title", title, id=f"{prefix}-title")
     return Html(

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from softstart.chain.model import Chain
-from softstart.drive import Drive
 from softstart.drive.doubts import doubts
 from softstart.drive.limits import Limits
 from softstart.errors import listed
 from softstart.reporting.choice import Choice
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
-from softstart.reporting.strategies import OUTPUT, before_after_figure, outputs
+from softstart.reporting.strategies import OUTPUT, before_after_figure, for_customer, outputs
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row
 from softstart.views.fatigue import factor
@@ -34,14 +32,16 @@ def headline(report: Report) -> str:
     'Gentlest start: shaped. The shaft torque peaks at 53.06 N m instead of 164.8 N m '
     """
     best = report.choice.chosen
-    return answer(report.choice.recommendation, best.row if best else None, report.row(REFERENCE))
+    several = len(report.drive.shaft_names) > 1
+    what = "The largest shaft torque, brought to the motor shaft," if several else "The shaft torque"
+    return answer(report.choice.recommendation, best.row if best else None, report.row(REFERENCE), what)
 
 
 def answer(
     recommendation: Recommendation,
     best: Row | None,
     direct: Row | None,
-    torque: str = "",
+    torque: str,
 ) -> str:
     """What the chosen strategy does to a `torque`, and what it costs; why there is none, else."""
     if best is None or direct is None:
@@ -52,24 +52,15 @@ def answer(
     if best is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
         return f"{what} No strategy that was examined is noticeably gentler than direct start."
     return (
-        f"{what} {torque or 'The shaft torque'} peaks at {digits(run.peak_torque)} N m instead of "
+        f"{what} {torque} peaks at {digits(run.peak_torque)} N m instead of "
         f"{digits(hard.peak_torque)} N m under direct start, {share_saved(best, direct)} less; the "
         f"start takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
     )
 
 
-def for_customer(text: str) -> str:
-    """A text without what it tells the author to give.
-
-    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
-    'It depends. Nothing damps.'
-    """
-    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
-
-
-def to_check(machine: Drive | Chain) -> Html | None:
+def to_check(machine: Any) -> Html | None:
     """What is assumed of the machine, and what is doubtful in its data; None where nothing is."""
-    assumed = [one for one in getattr(machine, "assumed", "").split("; ") if one]
+    assumed = [one for one in machine.assumed.split("; ") if one]
     lists = [("Assumed, to be confirmed:", assumed), ("To be checked in the data:", doubts(machine))]
     parts = [
         part
@@ -90,15 +81,20 @@ def share_saved(row: Row, direct: Row | None) -> str:
 
 def first_page(report: Report, figures: Figures) -> Html:
     """Answer, picture, tiles and the table of limits."""
-    rows = before_and_after(report.choice, report.comparison)
+    rows, what = before_and_after(report.choice, report.comparison), report.drive.WHAT.removeprefix("a ")
+    several = len(report.drive.shaft_names) > 1
+    torque = "torque of the shaft loaded most, brought to the motor shaft," if several else "shaft torque"
+    peak, third = (
+        ("largest shaft torque", _where(rows)) if several else ("peak shaft torque", _gained(report))
+    )
     caption = (
-        f"{listed([row.name for row in rows])}: shaft torque and load speed, computed for the drive "
-        "as it is. Dots: the peaks. Dotted: the target speed."
+        f"{listed([row.name for row in rows])}: {torque} and load speed, computed for the "
+        f"{what} as it is. Dots: the peaks. Dotted: the target speed."
     )
     return html(
         tag("section", tag("p", headline(report)), class_="answer", aria_label="The answer"),
         figures.shown("before-after", lambda: before_after_picture(rows), caption),
-        tiles(rows[-1], rows[0], "peak shaft torque", _gained(report)) if report.choice.chosen else None,
+        tiles(rows[-1], rows[0], peak, third) if report.choice.chosen else None,
         verdicts(limits, rows)
         if (limits := report.choice.recommendation.limits)
         else tag(
@@ -127,6 +123,12 @@ def before_after_picture(rows: list[Row]) -> Html:
     """The two starts, as an <svg> element."""
     title = "; ".join(f"{row.name}: peak {digits(row.run.peak_torque)} N m" for row in rows)
     return inlined(before_after_figure(rows), "before-after", f"Before and after. {title}.")
+
+
+def _where(rows: Sequence[Row]) -> tuple[str, str, str]:
+    """In which shaft the largest torque is, and in which under direct."""
+    direct, best = (row.run.drive.shaft_names[row.run.worst_shaft] for row in (rows[0], rows[-1]))
+    return "is largest in", best, f"direct: {direct}"
 
 
 def _gained(report: Report) -> tuple[str, str, str]:

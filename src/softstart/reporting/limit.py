@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.model import Chain
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, listed
 from softstart.late import late
-from softstart.optimal.chains import problem
+from softstart.optimal.chains.problem import ChainProblem
 from softstart.optimal.front import FrontPoint, PointAsked, computed
 from softstart.optimal.lp import ideal, whole_search
-from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
+from softstart.optimal.momentum import momentum_shortest_time
+from softstart.optimal.problem import REACTS, Terminal, best_start, problem_of
 from softstart.optimal.pulse_coast_hold import applies
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.optimal.solving import optimize
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
 else:
     ticker = late("matplotlib.ticker")
 
+DESCENT = "slp"  # the method of an optimum on a chain
 TIGHT = 1.0  # per cent between an optimum and its bound that counts as certified
 TERMINAL: Terminal = "reached"
 SHARES = (1.02, 1.05, 1.1, 1.2, 1.35, 1.6)  # of the start time of direct, where optima are looked for
@@ -111,7 +111,7 @@ class Limit:
         }
 
 
-def bound_at(drive: Drive | Chain, start_time: float) -> float | None:
+def bound_at(drive: Any, start_time: float) -> float | None:
     """The K_dyn that no start within `start_time` s can go below; None where there is no bound.
 
     >>> round(bound_at(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042), 4)
@@ -120,69 +120,35 @@ def bound_at(drive: Drive | Chain, start_time: float) -> float | None:
     if not start_time > 0.0:
         return None
     try:
-        bound = (
-            problem.momentum_bound(problem.ChainProblem(drive, start_time))
-            if isinstance(drive, Chain)
-            else momentum_bound(Problem(drive, start_time, TERMINAL))
-        )
+        bound = problem_of(drive, start_time, TERMINAL).lower_bound()
     except InputError:
         return None
     return bound.k_dyn if math.isfinite(bound.k_dyn) and bound.kind != "none" else None
 
 
-def chain_limit(
-    chain: Chain,
-    own: Sequence[float],
-    asked: Sequence[float],
-    budget: float,
-    progress: Progress,
-    meanwhile: Callable[[], object] = lambda: None,
-    seeds: Sequence[str] | None = None,
-) -> Limit:
-    """The bound over the start times of a chain's strategies, and the optima found for those asked for.
-
-    All times in s. Of a chain an optimum is the best of what linear programs on its exact start find from
-    the demands of `seeds`, names of strategies, in the time given: not proved the gentlest.
-    """
-    known = [one for one in own if math.isfinite(one)]
-    if not known:
-        return Limit(refusal="No strategy reaches the target speed.")
-    times = np.linspace(EARLIER * min(known), max(known), INSTANTS).tolist()
-    curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
-    points: list[FrontPoint] = []
-    if asked and budget > 0.0:
-        points = _in_own_process(chain, asked, budget, progress, meanwhile, SEARCHED * budget, seeds)
-    else:
-        meanwhile()
-    found = {p.start_time_bound for p in points if p.found}
-    return Limit(
-        times=tuple(t for t, _ in curve),
-        bounds=tuple(b for _, b in curve),
-        points=tuple(points),
-        missing=tuple(t for t in asked if t not in found),
-        budget=budget,
-    )
-
-
 def limit(
-    drive: Drive,
+    drive: Any,
     own: Sequence[float],
     reference: float,
     budget: float,
     progress: Progress,
     meanwhile: Callable[[], object] = lambda: None,
+    seeds: Sequence[str] | None = None,
 ) -> Limit:
     """The limit for start times around those of the strategies, `own`, of which the first matter most.
 
     Where there is a formula the optima are computed at once; the others, by linear program or collocation,
     in a process of their own that is ended after `budget` s. `reference` is the start time of direct, s.
-    `meanwhile` is called once while that process computes.
+    `meanwhile` is called once while that process computes. Of a chain the optimum is looked for in the first
+    start time alone, by linear programs on its exact start from the demands of `seeds`, names of strategies.
     """
     try:
-        Problem(drive, 1.0, TERMINAL)
+        problem = problem_of(drive, 1.0, TERMINAL)
     except InputError as error:
         return Limit(refusal=error.sentences[0])
-    shortest = momentum_shortest_time(Problem(drive, 1.0, TERMINAL))
+    if isinstance(problem, ChainProblem):
+        return _by_descent(drive, own, budget, progress, meanwhile, seeds)
+    shortest = momentum_shortest_time(problem)
     least = reference if math.isfinite(reference) else min(own, default=math.nan)
     if not (math.isfinite(least) and math.isfinite(shortest)):
         return Limit(refusal="No strategy reaches the target speed, so there is no start time to judge by.")
@@ -214,6 +180,36 @@ def limit(
     )
 
 
+def _by_descent(
+    chain: Any,
+    own: Sequence[float],
+    budget: float,
+    progress: Progress,
+    meanwhile: Callable[[], object],
+    seeds: Sequence[str] | None,
+) -> Limit:
+    """The limit of a chain: what is found in the time given is not proved the gentlest."""
+    known = [one for one in own if math.isfinite(one)]
+    if not known:
+        return Limit(refusal="No strategy reaches the target speed.")
+    asked = known[:1]
+    times = np.linspace(EARLIER * min(known), max(known), INSTANTS).tolist()
+    curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
+    points: list[FrontPoint] = []
+    if asked and budget > 0.0:
+        points = _in_own_process(chain, asked, budget, progress, meanwhile, SEARCHED * budget, seeds)
+    else:
+        meanwhile()
+    found = {p.start_time_bound for p in points if p.found}
+    return Limit(
+        times=tuple(t for t, _ in curve),
+        bounds=tuple(b for _, b in curve),
+        points=tuple(points),
+        missing=tuple(t for t in asked if t not in found),
+        budget=budget,
+    )
+
+
 def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint], list[float]]:
     """Optima of the closed form, and the start times for which there is none."""
     points, left = [], []
@@ -227,7 +223,7 @@ def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint],
 
 
 def _in_own_process(
-    drive: Drive | Chain,
+    drive: Any,
     asked: Sequence[float],
     budget: float,
     progress: Progress,
@@ -260,7 +256,7 @@ def _in_own_process(
 
 
 def optima(
-    drive: Drive | Chain,
+    drive: Any,
     start_times: Sequence[float],
     time_limit: float = 0.0,
     seeds: Sequence[str] | None = None,
@@ -274,7 +270,7 @@ def optima(
     known: dict[float, Any] = {}
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
         nearest = min(known, key=lambda one: abs(one - start_time), default=None)
-        warm = None if nearest is None or isinstance(drive, Chain) else known[nearest]
+        warm = None if nearest is None or time_limit else known[nearest]  # a search with time has its seeds
         try:
             point, left = computed(
                 PointAsked(drive, {"seeds": seeds}, TERMINAL, start_time, warm, time_limit)
@@ -285,10 +281,13 @@ def optima(
         progress.part(point)
 
 
-def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:
+def limit_section(drive: Any, choice: Choice, limit: Limit, figures: Figures) -> Html:
     """Figure, table and what can and cannot be said."""
     if limit.refusal:
-        return tag("p", f"For this drive there is no limit to compare with. {limit.refusal}")
+        return tag(
+            "p",
+            f"For this {drive.WHAT.removeprefix('a ')} there is no limit to compare with. {limit.refusal}",
+        )
     caption = [
         (
             f"Every strategy (filled: {choice.role}, and best of an ordinary inverter) by its start time and "
@@ -333,7 +332,7 @@ def filled(choice: Choice) -> list[Row]:
     return [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
 
 
-def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
+def how_near(drive: Any, found: Sequence[Row], limit: Limit) -> Html:
     """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
     rows, bounded = [], bool(limit.bounds)
     for row in ordered(found):
@@ -353,13 +352,17 @@ def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
     return table(heads, rows, caption=caption, class_="names near")
 
 
-def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
+def _notes(drive: Any, choice: Choice, limit: Limit) -> list[str]:
+    motor = drive.motor
+    least, most = motor.minimum_torque, min(motor.starting_torque, motor.maximum_torque)
+    bound = (
+        "Lower bound: proved from the momentum of the load, for every torque from "
+        f"{short(float(least))} to {short(float(most))} N m over time and any number of contacts. A dash: no "
+        "bound at that start time."
+    )
+    none = "There is no bound for this machine: gears with losses, or a motor on the load mass."
     return [
-        (
-            "Lower bound: proved from the momentum of the load, for every torque from "
-            f"{short(float(drive.minimum_torque))} to {short(float(min(drive.Ms, drive.maximum_torque)))} N "
-            "m over time and any number of contacts. A dash: no bound at that start time."
-        ),
+        bound if limit.bounds else none,
         *_on_optima(drive, limit),
         *_on_the_shortest(choice, limit),
         *_on_missing(drive, limit),
@@ -367,10 +370,19 @@ def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
     ]
 
 
-def _on_optima(drive: Drive, limit: Limit) -> list[str]:
+def _on_optima(drive: Any, limit: Limit) -> list[str]:
     """Of how many optima it is proved that nothing is gentler, and among which starts."""
     every, single, loose = [], [], []
-    for p in limit.found if len(drive.positions) == 1 else ():
+    notes = [
+        (
+            f"In {digits(p.start_time_bound)} s, the start time of the chosen strategy, the gentlest start "
+            f"found has K_dyn {fixed(p.k_dyn, 3)}: by linear programs on the exact start of the chain, from "
+            "the torque of that strategy. It is simulated exactly, and not proved the gentlest."
+        )
+        for p in limit.found
+        if p.method == DESCENT
+    ]
+    for p in limit.found if len(drive.positions) == 1 and not notes else ():
         bound, above = bound_at(drive, p.start_time_bound), p.gap_percent
         if bound and p.k_dyn is not None and 100.0 * (p.k_dyn / bound - 1.0) <= TIGHT:
             every.append(100.0 * (p.k_dyn / bound - 1.0))
@@ -378,7 +390,6 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
             single.append(p)
         else:
             loose.append(math.inf if above is None else above)
-    notes = []
     if limit.found and len(drive.positions) > 1:
         notes.append(f"The best fixed profiles are those found, not proved best. {REACTS}")
     if every:
@@ -442,7 +453,7 @@ def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
     return notes
 
 
-def _on_missing(drive: Drive, limit: Limit) -> list[str]:
+def _on_missing(drive: Any, limit: Limit) -> list[str]:
     """Where there is no optimum, why, and what is shown instead."""
     notes = []
     if limit.missing:
@@ -468,7 +479,7 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
     return notes
 
 
-def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
+def _on_the_recommended(drive: Any, choice: Choice, limit: Limit) -> list[str]:
     """Between which figures the least K_dyn lies in the start time of the recommended strategy."""
     best = choice.chosen
     if best is None:
@@ -504,10 +515,12 @@ def _times(times: Sequence[float]) -> str:
     return f"{len(times)} start times" if len(words) > 4 else listed(words)
 
 
-def _why_hard(drive: Drive) -> str:
+def _why_hard(drive: Any) -> str:
     if len(drive.positions) > 1:
         return "the start position is unknown, and one torque for every position has a search of its own"
-    problem = Problem(drive, 1.0, "reached")
+    problem = problem_of(drive, 1.0, "reached")
+    if isinstance(problem, ChainProblem):
+        return "there is no formula for a chain, only a search by linear programs on its exact start"
     if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
         return f"they need a numerical search (direct collocation), because {reason}"
     if reason := applies(problem):

@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from softstart import __version__
-from softstart.chain.model import Chain
+from softstart.chain.machines import values_of
+from softstart.chain.model import Chain, load_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
+from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
@@ -27,16 +29,16 @@ from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.markup import Html
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
-from softstart.reporting.robustness import robustness
+from softstart.reporting.robustness import RobustnessMap, robustness
 from softstart.reporting.sheet import Sheet, make_sheet
 from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compared, make_controllers
-from softstart.start.fatigue import DEFAULT_SLOPE, Fatigue, fatigue
+from softstart.start.fatigue import DEFAULT_SLOPE, Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
-from softstart.start.simulation import simulate
+from softstart.start.simulation import is_machine, simulate
 
 document = late("softstart.reporting.document")  # renders a Report, so it stands above this module
 
-BUDGET = 20.0  # s for optima that take a search
+BUDGET, SHAFTS_BUDGET = 20.0, 60.0  # s for optima that take a search, on one shaft and on several
 Progress = Callable[[float, str], object]
 
 
@@ -69,8 +71,8 @@ class Report:
 
     Attributes
     ----------
-    drive : Drive
-        The drive that is started.
+    drive : Drive or Chain
+        The machine that is started.
     comparison : Comparison
         The strategies that could be started, one row each.
     failed : tuple of (str, str)
@@ -105,7 +107,7 @@ class Report:
     docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
 
-    drive: Drive
+    drive: Any
     comparison: Comparison
     failed: tuple[tuple[str, str], ...]
     limit: Limit
@@ -147,13 +149,15 @@ class Report:
         Without `[limits.fatigue]` the slope of the S-N curve is that of `softstart fatigue`.
         """
         best, direct = self.choice.chosen, self.row(REFERENCE)
-        if best is None or direct is None or not self.drive.d:
+        if best is None or direct is None or undamped(self.drive):
             return None
         if isinstance(self.lives, Fatigue):
-            lives = {one.run.controller_name: one.relative for one in self.lives.rows}
+            lives = {
+                rows[0].run.controller_name: min(one.relative for one in rows) for rows in self.lives.by_run
+            }
             return lives.get(best.row.run.controller_name)
         try:
-            return fatigue(best.row.run).rows[0].relative
+            return min(one.relative for one in fatigue(best.row.run).rows)
         except (InputError, SimulationError):
             return None
 
@@ -191,7 +195,7 @@ class Report:
             ],
             "failed": dict(self.failed),
             "choice": self.choice.summary(),
-            "maps": {one.name: one.map.summary() for one in self.choice.candidates},
+            "maps": {one.name: one.map.summary() for one in self.choice.candidates if one.map is not None},
             "limit": self.limit.summary(),
             "life": self.lives.summary() if isinstance(self.lives, Fatigue) else self.lives,
             "life_gain": self.life_gain,
@@ -211,23 +215,24 @@ class Report:
 
 
 def report(
-    drive: Drive | Uncertain | str,
+    drive: Drive | Chain | Uncertain | str,
     *,
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     resolution: Resolution | Mapping[str, object] | str | None = None,
-    budget: float = BUDGET,
+    budget: float | None = None,
     progress: Progress | None = None,
     command: str = "",
     project: Project | str | Path | None = None,
     draw: bool = False,
 ) -> Report:
-    """Compute everything that a customer asks about the start of a drive.
+    """Compute everything that a customer asks about the start of a drive or a chain.
 
     Parameters
     ----------
-    drive : Drive, Identification or str
-        One drive, or the name or file of one, or an identification, whose figures have intervals.
+    drive : Drive, Chain, Identification or str
+        A drive or chain, or the name or file of one, or an identification, whose figures have intervals. With
+        several gaps there are no maps, and each shaft has its figures.
     controllers : sequence of str or Controller, optional
         Names, files of tuned gains, or Controller objects. By default all installed controllers that need
         no parameter. `direct` is added as the reference if it is not among them.
@@ -236,7 +241,8 @@ def report(
     resolution : Resolution, mapping or str, optional
         The steps in which the inverter can be set, as "torque=0.5%,time=10ms".
     budget : float, optional
-        Time to search for optima where there is no formula, s; 0 for no search.
+        Time to search for optima where there is no formula, s; 0 for no search. By default 20 s, 60 s for
+        several shafts.
     progress : callable, optional
         Called with the share that is done (0 to 1) and what is being computed.
     command : str, optional
@@ -275,8 +281,20 @@ def report(
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    drive = Drive.load(drive) if isinstance(drive, str) else drive
-    steps = checked_steps(drive, resolution, budget)
+    machine: Any = load_machine(drive) if isinstance(drive, str | Path) else drive
+    if not is_machine(machine):
+        raise InputError(
+            f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or a shipped name."
+        )
+    several = len(machine.shaft_names) > 1
+    budget = (SHAFTS_BUDGET if several else BUDGET) if budget is None else budget
+    steps = checked_steps(resolution, budget)
+    known = values_of(machine)
+    if wrong := [one.parameter for one in about.sources if one.parameter not in known]:
+        raise InputError(
+            f'project: [[source]] "{wrong[0]}" is a parameter of a drive, and "{machine.name}" has none of '
+            "this name; leave these tables out, and name assumed values in its file."
+        )
     made = controllers_of(controllers, parameters or {})
 
     def show(share: float, what: str) -> None:
@@ -285,20 +303,23 @@ def report(
 
     rows: list[Row] = []
     failed: list[tuple[str, str]] = []
-    maps = []
-    reference = simulate(drive, REFERENCE)
+    maps: list[RobustnessMap | None] = []
+    reference = simulate(machine, REFERENCE)
+    mapped = "load.inertia" in known  # what a map varies is a parameter of the file
     for number, one in enumerate(made):
-        show(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
+        show(
+            0.4 * number / len(made), f"starting the {machine.WHAT.removeprefix('a ')} under {label_of(one)}"
+        )
         try:
-            row = compared(drive, one, reference, drawn=drawn)
-            maps.append(robustness(drive, one))
+            row = compared(machine, one, reference, drawn=drawn)
+            maps.append(robustness(machine, one) if mapped else None)
             rows.append(row)
         except SimulationError as error:
             if label_of(one) == REFERENCE:
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     used = [one for one in made if label_of(one) not in dict(failed)]
-    comparison = Comparison(drive, tuple(rows), worst_case=rows[0].worst_case)
+    comparison = Comparison(machine, tuple(rows), worst_case=rows[0].worst_case)
     choice = choose(maps, rows, comparison.recommendation)
     sheets = []
     chosen = [one for one in (choice.chosen, choice.ordinary) if one is not None]
@@ -306,7 +327,7 @@ def report(
         show(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
         controller = used[rows.index(candidate.row)]
         row = candidate.row
-        sheets.append(make_sheet(drive, controller, row.run, steps, row, drawn))
+        sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn))
     times = [one.row.run.start_time for one in chosen]
     direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
     reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
@@ -318,29 +339,24 @@ def report(
             pictures.update(document.pictures(choice, comparison))
 
     found = limit(
-        drive,
+        machine,
         [*times, *reached],
         direct,
         budget,
         lambda share, what: show(0.5 + 0.5 * share, what),
         meanwhile,
+        [chosen[0].name] if chosen and chosen[0].name in ready_controller_names() else None,
     )
     show(1.0, "done")
     return Report(
-        drive, comparison, tuple(failed), found, choice, tuple(sheets), steps,
-        provenance(drive, command), about, pictures,
+        machine, comparison, tuple(failed), found, choice, tuple(sheets), steps,
+        provenance(machine, command), about, pictures,
     )  # fmt: skip
 
 
-def checked_steps(
-    drive: object, resolution: Resolution | Mapping[str, object] | str | None, budget: object
-) -> Resolution:
+def checked_steps(resolution: Resolution | Mapping[str, object] | str | None, budget: object) -> Resolution:
     """The resolution; all mistakes of the input at once."""
     wrong: list[str] = []
-    if not isinstance(drive, Drive | Chain):
-        wrong.append(f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one.")
-    elif isinstance(drive, Drive) and drive.shape != ():
-        wrong.append("drive: a report is about one drive; give one value for each parameter.")
     if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < float("inf"):
         wrong.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")
     steps = Resolution()
@@ -374,7 +390,7 @@ def controllers_of(
     return made
 
 
-def provenance(drive: Drive | Chain, command: str) -> Provenance:
+def provenance(drive: Any, command: str) -> Provenance:
     """That of a report made now.
 
     >>> made = provenance(Drive.load("crane-4amtkf"), "softstart report")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,13 @@ import numpy as np
 
 from softstart.controller import Controller
 from softstart.controller.base import Effort, effort_of, label_of
-from softstart.drive import Drive
 from softstart.errors import listed
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
-from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
+from softstart.views.drawing import COLOURS, DASHES, SHAFTS, drawing, new_figure, shade_open_gap
 from softstart.views.printed import at_output, digits, fixed, short, units_of
 from softstart.views.starts import INTERVALS_NOTE, row_remarks
 
@@ -56,6 +55,15 @@ def ordered(rows: Sequence[Row]) -> list[Row]:
     return sorted(rows, key=lambda row: (math.isnan(row.run.start_time), float(f"{row.run.k_dyn:.9g}")))
 
 
+def for_customer(text: str) -> str:
+    """A text without what it tells the author to give.
+
+    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
+    'It depends. Nothing damps.'
+    """
+    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
+
+
 OUTPUT = ("at the output, N m",)  # heading of the peak torque there
 LIMITS, FLAG = "limits, least margin", "flag"
 
@@ -66,7 +74,7 @@ def outputs(row: Row) -> list[str]:
 
 
 def strategies_section(
-    drive: Drive, compared: Sequence[Row], chosen: Sequence[Row], failed: Sequence[tuple[str, str]]
+    drive: Any, compared: Sequence[Row], chosen: Sequence[Row], failed: Sequence[tuple[str, str]]
 ) -> Html:
     """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
     rows = ordered(compared)
@@ -86,10 +94,11 @@ def strategies_section(
     }
     columns = {heading: cells for heading, cells in columns.items() if any(cells)}
     strong = [rows.index(row) for row in chosen]
-    base = float(metrics.base_torque(drive))
+    base, several = float(drive.mean_torque), len(drive.shaft_names) > 1
+    largest = "torque of all shafts, brought to the motor shaft," if several else "shaft torque"
     notes = [
         (
-            f"K_dyn is the largest shaft torque of the whole start, divided by {digits(base)} N m, the mean "
+            f"K_dyn is the largest {largest} of the whole start, divided by {digits(base)} N m, the mean "
             "shaft torque under the full starting torque. It is located in the exact solution, not read off "
             "a grid."
         ),
@@ -112,6 +121,7 @@ def strategies_section(
         ),
         *([_limits_note(rows[0])] if LIMITS in columns else []),
         *([INTERVALS_NOTE] if rows[0].intervals else []),
+        *map(for_customer, drive.warnings),
         *row_remarks(rows),
         *(f"{name} could not be examined: {reason}" for name, reason in failed),
     ]
@@ -148,13 +158,13 @@ def _decimals(start_time: float) -> int:
 
 def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
     """Torques of all strategies."""
-    parts = []
+    parts, several = [], len(rows[0].run.drive.shaft_names) > 1
     for key, some, note in trace_groups(rows):
         names = ", ".join(row.marked for row in some)
         caption = (
-            f"Shaft torque (solid) and motor torque (dashed), with the K_dyn, under {names}. Grey: "
-            "the gap is open; dot: peak; dotted: start time, and the permissible torque where one "
-            "is given. All panels share both scales."
+            f"{'Torque of each shaft' if several else 'Shaft torque'} (solid) and motor torque (dashed), "
+            f"with the K_dyn, under {names}. {'Dot' if several else 'Grey: the gap is open; dot'}: peak; "
+            "dotted: start time, and the permissible torque where one is given. All panels share both scales."
         )
         parts.append(
             figures.shown(key, partial(traces_picture, key, rows, some), f"{caption} {note}".strip())
@@ -206,7 +216,8 @@ def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: f
         figure, axes = new_figure(down, ACROSS, size, sharex=True, sharey=True, squeeze=False)
         for row, panel in zip(rows, axes.flat, strict=False):
             run = row.run
-            shade_open_gap(panel, run, longest)
+            if len(run.drive.shaft_names) == 1:
+                shade_open_gap(panel, run, longest)
             _torques(panel, run, ("motor torque u", "shaft torque T"))
             title = f"{name_in_figure(row.marked)}: {run.k_dyn:.3f}"
             panel.set_title(title, loc="left", fontsize=SMALL, pad=3)
@@ -229,7 +240,10 @@ def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: f
 
 
 def before_after_figure(rows: Sequence[Row]) -> Any:
-    """Shaft torque and load speed of `direct` and of another start, with the permissible torque as a line."""
+    """Shaft torque and load speed of `direct` and of another start, with the permissible torque as a line.
+
+    Of several shafts the torque of the one that is loaded most.
+    """
     with drawing():
         figure, (torque, speed) = new_figure(1, 2, (WIDE, 2.9), width_ratios=(1.7, 1.0))
         longest = max(
@@ -239,7 +253,8 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
         styles = ((COLOURS[1], DASHES[0], 1.1), (COLOURS[0], DASHES[0], 2.0))[-len(rows) :]
         for row, (colour, dash, width) in zip(rows, styles, strict=True):
             run, name = row.run, name_in_figure(row.name)
-            torque.plot(run.t, run.T, color=colour, ls=dash, lw=width, label=name)
+            worst = run.T.reshape(run.t.size, -1)[:, run.worst_shaft]
+            torque.plot(run.t, worst, color=colour, ls=dash, lw=width, label=name)
             torque.plot([run.peak_time], [_peak(run)], "o", ms=4, color=colour)
             speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, ls=dash, lw=width)
         permissible = rows[0].run.drive.limits.shaft_torque
@@ -263,8 +278,10 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
 def _torques(panel: Axes, run: Run, labels: tuple[str, str]) -> None:
     """Motor and shaft torque of a start with its peak, and the permissible torque."""
     panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=0.9, label=labels[0])
-    panel.plot(run.t, run.T, color=COLOURS[0], lw=1.1, label=labels[1])
-    panel.plot([run.peak_time], [_peak(run)], "o", ms=3.0, color=COLOURS[0])
+    names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else labels[1:]
+    for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
+        panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], lw=1.1, label=name)
+    panel.plot([run.peak_time], [_peak(run)], "o", ms=3.0, color=SHAFTS[run.worst_shaft % len(SHAFTS)])
     permissible = run.drive.limits.shaft_torque
     if permissible is not None:
         panel.axhline(permissible, color="#B00020", lw=0.9, ls=":", label="permissible torque")

@@ -1,16 +1,16 @@
-"""How long a shaft line lasts that is started so: cycles of the shaft torque, their damage, and impacts."""
+"""How long the shafts of a machine last that is started so: cycles of their torque, damage, and impacts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.drive import Drive, SNCurve
+from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.late import late
@@ -40,50 +40,61 @@ RATIO_OF_A_GEAR, RATIO_OF_A_COUPLING, LARGEST_RATIO = 0.01, 0.005, 0.06
 
 @dataclass(frozen=True, eq=False)
 class Life:
-    """What one start does to the shaft line, and how often it can be repeated.
+    """What one start does to one shaft, and how often it can be repeated. Torques are at the motor shaft.
 
     Attributes
     ----------
     run : Run
-        The start; of an unknown position the one that does most damage.
+        The start; of an unknown position the one that does most damage to this shaft.
+    shaft : int
+        The index of the shaft; 0 of a drive.
     turning_points : array of shape (n, 2)
-        Time, s, and shaft torque, N m, at the reversals of the shaft torque and at both ends, located.
+        Time, s, and torque, N m, at the reversals of its torque and at both ends, located.
     spectrum : array of shape (k, 3)
         Range and mean, N m, and number of the rainflow cycles of one start, the largest first.
     equivalent_torque : float
         Damage-equivalent torque, N m: one cycle of it from 0 and back in each start does the same damage.
     relative : float
-        Life over that of `direct`.
+        Life over that of this shaft under `direct`.
     relative_range : tuple of float
         The same with half and with twice the damping ratio, where that is estimated; else empty.
     starts : float
         Starts to failure; NaN without points of the S-N curve.
     hours : float
         Time of operation to failure at the starts per hour, h; NaN where one of the two is missing.
+    utilisation : float
+        Largest torque over the permissible one of the shaft; NaN where none is given.
     impacts : int
         How often the flanks met at a speed.
     impact_energy : float
-        Kinetic energy of the relative motion at all impacts together, J, 1/2 J1 J2/(J1 + J2) v^2 each: what a
-        rigid contact without rebound would lose.
+        Kinetic energy of the relative motion at all impacts together, J, 1/2 J1 J2/(J1 + J2) v^2 each, of the
+        two masses that the shaft joins: what a rigid contact without rebound would lose.
     worn_relative, worn_hours : float
-        Life over that of `direct`, and hours to failure, while the gap grows; NaN where no wear is asked for.
+        Life over that of `direct`, and hours to failure, while the gaps grow; NaN where no wear is asked for.
     wear_error : float
         How much the damage over wear, a share of it, changes with half the number of gaps.
     """
 
     run: Run
+    shaft: int
     turning_points: Matrix
     spectrum: Matrix
     equivalent_torque: float
     relative: float
     starts: float
     hours: float
+    utilisation: float
     impacts: int
     impact_energy: float
     relative_range: tuple[float, ...] = ()
     worn_relative: float = math.nan
     worn_hours: float = math.nan
     wear_error: float = math.nan
+
+    @property
+    def shaft_name(self) -> str:
+        """The shaft by the masses that it joins."""
+        return str(self.run.drive.shaft_names[self.shaft])
 
     @property
     def years(self) -> float:
@@ -100,8 +111,10 @@ class Life:
         wear = {"worn_relative": self.worn_relative, "worn_hours": self.worn_hours}
         return {
             "controller": self.run.controller_name,
+            "shaft": self.shaft_name,
             "position": self.run.position,
-            "k_dyn": self.run.k_dyn,
+            "k_dyn": float(self.run.k_dyns[self.shaft]),
+            "peak_torque": float(self.run.peak_torques[self.shaft]),
             "start_time": self.run.start_time,
             "equivalent_torque": self.equivalent_torque,
             "relative_life": self.relative,
@@ -109,6 +122,7 @@ class Life:
             "starts_to_failure": self.starts,
             "hours": self.hours,
             "years": self.years,
+            "utilisation": self.utilisation,
             "cycles": float(self.spectrum[:, 2].sum()),
             "impacts": self.impacts,
             "impact_energy": self.impact_energy,
@@ -121,20 +135,18 @@ class Life:
 
 @dataclass(frozen=True, eq=False)
 class Fatigue:
-    """Lives of a shaft line under several strategies. It is returned by `fatigue`.
+    """Lives of the shafts of a machine under several strategies. It is returned by `fatigue`.
 
     Attributes
     ----------
-    drive : Drive
-        The drive that is started, with the damping that was estimated if so.
+    drive : Drive or Chain
+        The machine that is started, with the damping that was estimated if so.
     curve : SNCurve
-        The S-N curve: slope m, and points if there are any.
+        The S-N curve of all shafts: slope m, and points if there are any.
     rows : tuple of Life
-        One for each run, in the order given.
+        For each run, in the order given, one for each shaft: a single one of a drive.
     slope_given : bool
         Whether the S-N curve is the user's; else the slope is that of case-hardened gears.
-    damping_ratio : float
-        d/(2 J Omega) with J = J1 J2/(J1 + J2).
     estimate : mapping of str to int
         Numbers of gears and couplings from which the damping ratio is estimated; empty if it is given.
     worn_gap : float
@@ -153,27 +165,39 @@ class Fatigue:
     Rainflow counting: ASTM E1049; docs/fatigue.md.
     """
 
-    drive: Drive
+    drive: Any
     curve: SNCurve
     rows: tuple[Life, ...]
     slope_given: bool
-    damping_ratio: float
     estimate: Mapping[str, int]
     worn_gap: float
 
+    @property
+    def by_run(self) -> list[tuple[Life, ...]]:
+        """The rows of each run, that is of all shafts under one strategy."""
+        shafts = len(self.drive.shaft_names)
+        return [self.rows[i : i + shafts] for i in range(0, len(self.rows), shafts)]
+
+    @property
+    def ranked(self) -> tuple[Life, ...]:
+        """The rows, those of the strategy first under which the shaft that gains least lasts longest."""
+        runs = sorted(self.by_run, key=lambda lives: -min(life.relative for life in lives))
+        return tuple(life for lives in runs for life in lives)
+
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
+        machine = self.drive
         return {
-            "drive": self.drive.name,
+            **machine.identity,
             "slope": self.curve.slope,
             "points": [list(point) for point in self.curve.points],
             "slope_given": self.slope_given,
-            "damping": self.drive.damping,
-            "damping_ratio": self.damping_ratio,
+            "dampings": machine.dampings.tolist(),
+            "damping_ratio": machine.damping_ratio,
             "damping_estimated_from": dict(self.estimate) or None,
-            "starts_per_hour": self.drive.limits.starts_per_hour,
-            "starts_asked_for": self.drive.limits.starts,
-            "gap": self.drive.gap,
+            "starts_per_hour": machine.limits.starts_per_hour,
+            "starts_asked_for": machine.limits.starts,
+            "gap": float(machine.gaps.sum()),
             "worn_gap": self.worn_gap,
             "strategies": [row.summary() for row in self.rows],
         }
@@ -183,7 +207,7 @@ class Fatigue:
         return notebook.of_fatigue(self)
 
     def plot(self) -> Any:
-        """Ranges of the cycles over how many there are, for each strategy."""
+        """Ranges of the cycles over how many there are, for each strategy, and lives beside `direct`."""
         return views.fatigue_figure(self)
 
 
@@ -193,40 +217,39 @@ def fatigue(
     slope: float | None = None,
     worn_gap: float | str | None = None,
     estimate_damping: Mapping[str, int] | None = None,
-    fitted_to: Drive | None = None,
 ) -> Fatigue:
-    """How long the shaft line lasts under these starts, beside `direct`.
+    """How long each shaft lasts under these starts, beside `direct`.
 
-    The turning points of the shaft torque are located in the closed forms, without samples. A start is
-    repeated: behind its end the torque goes back to that of its beginning, so that rainflow counting leaves
-    whole cycles only. Miner's rule adds their damage. S-N curve, starts per hour and the life asked for are
-    `drive.limits`, the tables `[limits]` and `[limits.fatigue]` of the drive file.
+    The turning points of the shaft torque are located, not sampled. A start is repeated: behind its end the
+    torque goes back to that of its beginning, so that rainflow counting leaves whole cycles only. Miner's
+    rule adds their damage. S-N curve, starts per hour and the life asked for are `limits` of the machine: the
+    tables `[limits]` and `[limits.fatigue]` of a drive file.
 
     Parameters
     ----------
     runs : Run or sequence of Run
-        Starts of one drive.
+        Starts of one drive or chain.
     slope : float, optional
-        Slope m of the S-N curve instead of that of `drive.limits.fatigue`. Without either it is 6.6, pitting
-        of case-hardened gears after ISO 6336-2.
+        Slope m of the S-N curve instead of that of `limits.fatigue`. Without either it is 6.6, pitting of
+        case-hardened gears after ISO 6336-2.
     worn_gap : float or str, optional
         Gap at the end of the life asked for, rad or with a unit: it grows in proportion to time from that
-        of the drive, and stays from then on. The controllers stay as they were set up.
+        of the machine, and stays from then on. Of a chain it is that of all gaps together at the motor shaft,
+        which grow alike. The controllers stay as they were set up.
     estimate_damping : mapping, optional
-        `{"gears": 3, "couplings": 2}`: for a drive without damping, a ratio of 1 % for each pair of gears and
+        `{"gears": 3, "couplings": 2}`: for shafts without damping, a ratio of 1 % for each pair of gears and
         0.5 % for each coupling, at most 6 %. The starts are simulated again with it.
-    fitted_to : Drive, optional
-        The drive for which the controllers are set up, if not the one that is started.
 
     Returns
     -------
     Fatigue
-        A `Life` for each run, in the order given.
+        A `Life` for each shaft of each run, in the order given.
 
     Raises
     ------
     InputError
-        For bad input, and for a drive without damping: its rattling never ends.
+        For bad input, for a shaft without damping, whose rattling never ends, and for a rigid gap, whose
+        impacts have no finite torque.
     SimulationError
         If a start with another gap or damping cannot be finished.
 
@@ -239,7 +262,10 @@ def fatigue(
     (1.0, True, 0)
     >>> fatigue(simulate(Drive.load("crane-4amtkf"), "direct"))
     Traceback (most recent call last):
-    softstart.errors.InputError: damping = 0: an undamped shaft line rattles without end, ...
+    softstart.errors.InputError: damping is missing in motor - load: an undamped shaft rattles ...
+    >>> crane = fatigue(simulate("crane-4-mass", "ramp"), estimate_damping={"gears": 2})
+    >>> [life.shaft_name for life in crane.rows]
+    ['rotor - pinion', 'pinion - wheel shaft', 'wheel shaft - crane']
 
     References
     ----------
@@ -247,55 +273,45 @@ def fatigue(
     trains, J. Eng. Gas Turbines Power 106 (1984) 946; docs/fatigue.md.
     """
     asked = _runs(runs)
-    estimate = _read_estimate(estimate_damping)
-    told, drive = fitted_to or asked[0].drive.design_drive, asked[0].drive
-    curve, given = _curve(drive, slope)
-    gap = _read_gap(worn_gap, drive)
-    if not estimate and not drive.damping > 0.0:
-        raise InputError(
-            "damping = 0: an undamped shaft line rattles without end, and its cycles make lives out of "
-            "nothing; give shaft.damping, or have its ratio estimated from numbers of gears and couplings "
-            '(estimate_damping={"gears": 3, "couplings": 2}; --estimate-damping gears=3,couplings=2).'
-        )
-    near = [damped(drive, estimate, factor) for factor in (0.5, 2.0)] if estimate else []
+    machine, estimate = asked[0].drive, _read_estimate(estimate_damping)
+    curve, given = _curve(machine, slope)
+    gap = _read_gap(worn_gap, machine)
+    near = [damped(machine, estimate, factor) for factor in (0.5, 2.0)] if estimate else []
+    machine = damped(machine, estimate) if estimate else machine
+    _check_shafts(machine)
     if estimate:
-        drive = damped(drive, estimate)
-        asked = [_again(run, drive, told) for run in asked]
+        asked = [_again(run, machine) for run in asked]
     found = next((run for run in asked if run.controller_name == REFERENCE), None)
-    direct = found or simulate(drive, REFERENCE)
-
-    def life_of(run: Run) -> Life:
-        counted = worst_damage(run, curve)
-        life = _life(counted, curve, reference)
-        if near:
-            both = [worst_damage(_again(run, one, told), curve).damage for one in near]
-            life = replace(life, relative_range=tuple(map(life_ratio, references, both)))
-        if worn is not None:
-            over = _over_wear(run, told, curve, gap)
-            life = replace(
-                life,
-                worn_relative=life_ratio(worn.mean, over.mean),
-                worn_hours=over.hours,
-                wear_error=over.error,
-            )
-        return life
-
-    reference = worst_damage(direct, curve).damage
-    references = [worst_damage(simulate(one, REFERENCE), curve).damage for one in near]
-    worn = None if math.isnan(gap) else _over_wear(direct, told, curve, gap)
-    rows = tuple(map(life_of, asked))
-    return Fatigue(drive, curve, rows, given, damping_ratio(drive), estimate, gap)
+    direct = found or simulate(machine, REFERENCE, fitted_to=asked[0].told)
+    reference = damages(direct, curve)
+    others = [[damages(_again(run, one), curve) for one in near] for run in (direct, *asked)]
+    worn = [_over_wear(run, curve, gap) for run in (direct, *asked)] if not math.isnan(gap) else []
+    rows = []
+    for i, run in enumerate(asked, 1):
+        for k, counted in enumerate(damages(run, curve)):
+            life = _life(counted, curve, reference[k].damage)
+            pairs = zip(others[0], others[i], strict=True)
+            both = tuple(life_ratio(first[k].damage, own[k].damage) for first, own in pairs)
+            life = replace(life, relative_range=both)
+            if worn:
+                (mean, hours, error), first_mean = worn[i][k], worn[0][k].mean
+                ratio = life_ratio(first_mean, mean)
+                life = replace(life, worn_relative=ratio, worn_hours=hours, wear_error=error)
+            rows.append(life)
+    return Fatigue(machine, curve, tuple(rows), given, estimate, gap)
 
 
-def turning_points(run: Run) -> Matrix:
-    """Times, s, and values, N m, of the shaft torque at its reversals and both ends; located, not sampled.
+def turning_points(run: Run, shaft: int = 0) -> Matrix:
+    """Times, s, and values, N m, of a shaft's torque at its reversals and both ends; located, not sampled.
+
+    Where damping makes the torque jump at a contact, both sides count.
 
     >>> from softstart import simulate
     >>> points = turning_points(simulate("hoist-15kw", "direct"))
     >>> [round(float(torque), 1) for torque in points[:2, 1]]
     [120.0, 180.8]
     """
-    return run.recorded.turning_points(run.worst_shaft, STILL * run.peak_torque)
+    return run.recorded.turning_points(shaft, STILL * float(run.peak_torques[shaft]))
 
 
 def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matrix:
@@ -321,32 +337,27 @@ def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matr
     return np.array(cycles, dtype=np.float64).reshape(-1, 3)
 
 
-def impacts(run: Run) -> Vector:
-    """Kinetic energy of the relative motion, J, at each instant at which the flanks meet at a speed.
+def impacts(run: Run, shaft: int = 0) -> Vector:
+    """Kinetic energy of the relative motion, J, at each instant at which a shaft's flanks meet at a speed.
 
     >>> from softstart import simulate
     >>> impacts(simulate("hoist-15kw", "direct")).size
     0
     """
-    side, w = run.recorded.of_shafts(2)[:, 0], run.recorded.of_masses(0)
-    mode, drive = run.recorded.of_shafts(1)[:, 0], run.drive
-    closed = np.isin(mode, [at.CONTACT, at.DOUBLED])
+    recorded, rows = run.recorded, run.recorded.rows
+    side, w = recorded.of_shafts(2)[:, shaft], recorded.of_masses(0)
+    closed = np.isin(recorded.of_shafts(1)[:, shaft], [at.CONTACT, at.DOUBLED])
     meets = (closed[1:] > closed[:-1]).nonzero()[0] + 1
     # not above 0 where flanks that overlap still take hold again
-    speed = side[meets] * (w[meets, 0] - w[meets, 1])
-    held = run.recorded.states[meets, at.S_BRAKED] == 1.0
-    energy: Vector = 0.5 * np.where(held, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2)) * speed**2
+    speed = side[meets] * (w[meets, shaft] - w[meets, shaft + 1])
+    # rigid joints without a gap make one body of their masses; the motor's is fixed while its brake holds
+    joints = rows.shafts[0].view(at.SHAFT)[:, 0]
+    body = np.append(0, np.cumsum((joints["rigid"] == 0.0) | (joints["half"] > 0.0)))
+    light = 1.0 / np.bincount(body, rows.masses[0].view(at.MASS)[:, 0]["J"])
+    inverse = np.tile(light, (meets.size, 1))
+    inverse[recorded.states[meets, at.S_BRAKED] == 1.0, body[int(rows.machine.motor)]] = 0.0
+    energy: Vector = 0.5 * speed**2 / (inverse[:, body[shaft]] + inverse[:, body[shaft + 1]])
     return energy[speed > 0.0]
-
-
-def damping_ratio(drive: Drive) -> float:
-    """Share of the critical damping: d/(2 J Omega) with J = J1 J2/(J1 + J2).
-
-    >>> from softstart import Drive
-    >>> round(damping_ratio(Drive.load("hoist-15kw")), 4)
-    0.0602
-    """
-    return float(0.5 * drive.d * (1.0 / drive.J1 + 1.0 / drive.J2) / drive.Omega)
 
 
 def estimated_ratio(gears: int, couplings: int) -> float:
@@ -360,35 +371,50 @@ def estimated_ratio(gears: int, couplings: int) -> float:
     return min(RATIO_OF_A_GEAR * gears + RATIO_OF_A_COUPLING * couplings, LARGEST_RATIO)
 
 
-def damped(drive: Drive, estimate: Mapping[str, int], factor: float = 1.0) -> Drive:
-    """The drive with `factor` times the damping that is estimated; InputError if it has one of its own."""
-    if drive.damping > 0.0:
+def damped(machine: Any, estimate: Mapping[str, int], factor: float = 1.0) -> Any:
+    """The machine with `factor` times the damping ratio that is estimated, in its shafts without damping.
+
+    Raises `InputError` if each has one of its own.
+    """
+    if not undamped(machine):
+        values = ", ".join(f"{d:.6g}" for d in machine.dampings.tolist())
         raise InputError(
-            f"estimate_damping: the drive has a damping of its own, {drive.damping:.6g} N m s/rad; leave the "
-            "estimate out, or set shaft.damping to 0."
+            f"estimate_damping: each shaft has a damping of its own, {values} N m s/rad; leave the estimate "
+            "out, or set shaft.damping to 0."
         )
     ratio = factor * estimated_ratio(estimate.get("gears", 0), estimate.get("couplings", 0))
-    return drive.replace(damping=2.0 * ratio * float(drive.Omega) / float(1.0 / drive.J1 + 1.0 / drive.J2))
+    return machine.with_damping_ratio(ratio)
+
+
+def undamped(machine: Any) -> list[str]:
+    """The elastic shafts without damping, by their names.
+
+    >>> from softstart import Drive
+    >>> undamped(Drive.load("crane-4amtkf")), undamped(Drive.load("hoist-15kw"))
+    (['motor - load'], [])
+    """
+    columns = zip(machine.shaft_names, machine.stiffnesses, machine.dampings, strict=True)
+    return [name for name, c, d in columns if math.isfinite(c) and d == 0.0]
 
 
 # what one start does -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Damage:
-    """One start counted: its turning points, its cycles, and the share of the life that it takes."""
+class Damage(NamedTuple):
+    """One shaft in one start: its turning points, its cycles, and the share of the life that they take."""
 
     run: Run
+    shaft: int
     points: Matrix
     spectrum: Matrix
     damage: float  # without points of the S-N curve: cycles of 1 N m beside which it counts as much
 
 
-def damage_of(run: Run, curve: SNCurve) -> Damage:
-    """The damage of one start, by Miner's rule."""
-    points = turning_points(run)
+def damage_of(run: Run, curve: SNCurve, shaft: int = 0) -> Damage:
+    """The damage of one start to a shaft, by Miner's rule."""
+    points = turning_points(run, shaft)
     spectrum = rainflow_cycles(points[:, 1].tolist(), repeated=True)
-    return Damage(run, points, spectrum, miner(spectrum, curve))
+    return Damage(run, shaft, points, spectrum, miner(spectrum, curve))
 
 
 def miner(spectrum: Matrix, curve: SNCurve) -> float:
@@ -400,46 +426,47 @@ def miner(spectrum: Matrix, curve: SNCurve) -> float:
     return float(np.sum(spectrum[:, 2] / curve.cycles(spectrum[:, 0]))) if spectrum.size else 0.0
 
 
+def damages(run: Run, curve: SNCurve) -> list[Damage]:
+    """The damage to each shaft, where the start position is unknown from the one that does most to it."""
+    each = list(run.positions.values()) or [run]
+    shafts = range(len(run.drive.shaft_names))
+    return [max((damage_of(one, curve, k) for one in each), key=lambda found: found.damage) for k in shafts]
+
+
 def worst_damage(run: Run, curve: SNCurve) -> Damage:
-    """The same of the position that does most damage, where the start position is unknown."""
-    each = run.positions.values() or (run,)
-    return max((damage_of(one, curve) for one in each), key=lambda found: found.damage)
+    """The damage to the shaft that takes most."""
+    return max(damages(run, curve), key=lambda found: found.damage)
 
 
 def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
-    """The figures of a start that is counted, beside the damage of `direct`."""
-    damage, run = found.damage, found.run
-    energies = impacts(run)
+    """The figures of a shaft that is counted, beside the damage of `direct`."""
+    damage, run, shaft = found.damage, found.run, found.shaft
+    energies = impacts(run, shaft)
     torque = float(curve.torque(1.0 / damage)) if damage > 0.0 else 0.0
     starts = (1.0 / damage if damage > 0.0 else math.inf) if curve.points else math.nan
     rate = run.drive.limits.starts_per_hour
     hours = starts / rate if rate is not None else math.nan
     return Life(
-        run, found.points, found.spectrum, torque, life_ratio(reference, damage), starts, hours,
-        energies.size, float(energies.sum()),
+        run, shaft, found.points, found.spectrum, torque, life_ratio(reference, damage), starts, hours,
+        float(run.utilisation[shaft]), energies.size, float(energies.sum()),
     )  # fmt: skip
 
 
 def life_ratio(reference: float, damage: float) -> float:
-    """Life over that of `direct`, from the damage of both.
-
-    >>> life_ratio(2.0, 1.0), life_ratio(2.0, 0.0)
-    (2.0, inf)
-    """
+    """Life over that of `direct`, from the damage of both."""
     return reference / damage if damage > 0.0 else math.inf
 
 
-def _again(run: Run, drive: Drive, told: Drive) -> Run:
-    """The same start of a changed drive, its controller as it was set up."""
+def _again(run: Run, machine: Any) -> Run:
+    """The same start of a changed machine, its controller as it was set up."""
     until = run.end_time if math.isnan(run.start_time) else None
-    return simulate(drive, run.controller, until, fitted_to=told, base=run.base)
+    return simulate(machine, run.controller, until, fitted_to=run.told, base=run.base)
 
 
 # over wear -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Worn:
+class _Worn(NamedTuple):
     """Damage while the gap grows: its mean in a start, hours to failure, and the error of the mean."""
 
     mean: float
@@ -447,17 +474,20 @@ class _Worn:
     error: float
 
 
-def _over_wear(run: Run, told: Drive, curve: SNCurve, worn_gap: float) -> _Worn:
-    """The damage while the gap grows in proportion to time, to `worn_gap` over the life asked for."""
-    drive = run.drive
-    gaps = np.linspace(float(drive.gap), worn_gap, GAPS).tolist()
-    damages = np.array([worst_damage(_again(run, drive.with_gap(one), told), curve).damage for one in gaps])
-    mean, coarse = (float(np.mean(0.5 * (d[1:] + d[:-1]))) for d in (damages, damages[::2]))
-    error = abs(coarse - mean) / mean if mean > 0.0 else 0.0
-    limits = drive.limits
-    if not curve.points or limits.starts_per_hour is None or limits.life is None:
-        return _Worn(mean, math.nan, error)
-    return _Worn(mean, _hours_to_failure(damages * limits.starts_per_hour, limits.life / 3600.0), error)
+def _over_wear(run: Run, curve: SNCurve, worn_gap: float) -> list[_Worn]:
+    """The damage to each shaft while the gap grows in proportion to time, to `worn_gap` over the life."""
+    machine, found = run.drive, []
+    gaps = np.linspace(float(machine.gaps.sum()), worn_gap, GAPS).tolist()
+    each = [[one.damage for one in damages(_again(run, machine.with_gap(gap)), curve)] for gap in gaps]
+    limits = machine.limits
+    for damage in np.array(each).T:
+        mean, coarse = (float(np.mean(0.5 * (d[1:] + d[:-1]))) for d in (damage, damage[::2]))
+        error = abs(coarse - mean) / mean if mean > 0.0 else 0.0
+        known = curve.points and limits.starts_per_hour is not None and limits.life is not None
+        rates = damage * limits.starts_per_hour if known else damage
+        hours = _hours_to_failure(rates, limits.life / 3600.0) if known else math.nan
+        found.append(_Worn(mean, hours, error))
+    return found
 
 
 def _hours_to_failure(rates: Vector, hours: float) -> float:
@@ -481,44 +511,48 @@ def _hours_to_failure(rates: Vector, hours: float) -> float:
 def _runs(runs: object) -> list[Run]:
     found = [runs] if isinstance(runs, Run) else list(runs) if isinstance(runs, list | tuple) else []
     if not found or not all(isinstance(one, Run) for one in found):
-        raise InputError("runs: give one Run or several, as softstart.simulate returns them for one drive.")
-    if any(one.drive != found[0].drive for one in found):
-        raise InputError("runs: these are starts of different drives; give those of one drive.")
+        raise InputError("runs: give one Run or several, as softstart.simulate returns them for one machine.")
+    if any(one.drive is not found[0].drive and one.drive != found[0].drive for one in found):
+        raise InputError("runs: these are starts of different drives; give those of one drive or chain.")
     return found
 
 
-def _curve(drive: Drive, slope: float | None) -> tuple[SNCurve, bool]:
+def _check_shafts(machine: Any) -> None:
+    columns = zip(machine.shaft_names, machine.stiffnesses, machine.gaps, strict=True)
+    if rigid := [name for name, c, gap in columns if math.isinf(c) and gap > 0.0]:
+        raise InputError(
+            f"stiffness is infinite in {', '.join(rigid)}: the impacts of a rigid gap have no finite torque, "
+            "so that their damage cannot be counted; give these shafts a stiffness."
+        )
+    if lacking := undamped(machine):
+        raise InputError(
+            f"damping is missing in {', '.join(lacking)}: an undamped shaft rattles without end, and its "
+            "cycles make lives out of nothing; give each shaft a damping, or have its ratio estimated from "
+            'numbers of gears and couplings (estimate_damping={"gears": 3, "couplings": 2}, or '
+            "--estimate-damping gears=3,couplings=2)."
+        )
+
+
+def _curve(machine: Any, slope: float | None) -> tuple[SNCurve, bool]:
     """The S-N curve asked for, and whether it was."""
-    own = drive.limits.fatigue
+    own = machine.limits.fatigue
     if slope is None:
         return (own, True) if own is not None else (SNCurve(DEFAULT_SLOPE), False)
-    m = read_slope(slope)
+    m = float(to_si(slope, "1", name="slope"))
+    if not 0.0 < m < 100.0:
+        raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
     if own is not None and own.slope is None:
         raise InputError("slope: the points of limits.fatigue give the slopes; leave out one of the two.")
     return SNCurve(m, own.points if own is not None else ()), True
 
 
-def read_slope(slope: float) -> float:
-    """A slope m of an S-N curve, checked.
-
-    >>> read_slope(-1.0)
-    Traceback (most recent call last):
-    softstart.errors.InputError: slope = -1.0: the slope m of an S-N curve is above 0 and below 100, as 6.6.
-    """
-    m = float(to_si(slope, "1", name="slope"))
-    if not 0.0 < m < 100.0:
-        raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
-    return m
-
-
-def _read_gap(worn_gap: float | str | None, drive: Drive) -> float:
+def _read_gap(worn_gap: float | str | None, machine: Any) -> float:
     if worn_gap is None:
         return math.nan
-    gap = float(to_si(worn_gap, "rad", name="worn_gap"))
-    if not gap > drive.gap:
+    gap, own = float(to_si(worn_gap, "rad", name="worn_gap")), float(machine.gaps.sum())
+    if not gap > own:
         raise InputError(
-            f"worn_gap = {worn_gap}: wear widens the gap; give one above that of the drive, "
-            f"{drive.gap:.6g} rad."
+            f"worn_gap = {worn_gap}: wear widens the gap; give one above that of the machine, {own:.6g} rad."
         )
     return gap
 

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.views.drawing import COLOURS, drawing, new_figure
-from softstart.views.drives import POSITIONS
-from softstart.views.numbers import Table, column_of, number, printable, short
+from softstart.views.numbers import Table, column_of, number, short
 
 if TYPE_CHECKING:
-    from softstart.chain.model import Chain
     from softstart.chain.two_masses import TwoMassError, Verification
     from softstart.vibration import Reduction, Vibration
 
@@ -22,24 +20,6 @@ ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy coun
 
 
 # words -----------------------------------------------------------------------------------------------------
-
-
-def chain_lines(chain: Chain) -> list[str]:
-    """The chain in a few lines."""
-    arrays = chain.at_motor_shaft()
-    gaps = int((arrays.gap > 0.0).sum())
-    J, play, torque = (short(float(one.sum())) for one in (arrays.J, arrays.gap, arrays.Mc))
-    lines = [
-        printable(chain.name),
-        f"  {len(chain.masses)} masses, {gaps} gap{'' if gaps == 1 else 's'}; at the motor shaft J = {J} kg "
-        f"m2, gaps {play} rad, load torque {torque} N m",
-        f"  motor on {chain.masses[arrays.motor].name}, load {chain.load_mass}",
-    ]
-    if chain.position != "mid-gap":
-        lines.append(f"  starts {POSITIONS[chain.position]}, of all gaps alike")
-    if chain.assumed:
-        lines.append(f"  assumed: {printable(chain.assumed)}")
-    return lines
 
 
 def conclusion(found: Reduction) -> str:

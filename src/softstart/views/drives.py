@@ -1,11 +1,12 @@
-"""The drive of a result in a few lines, and for which drive the controllers are set up."""
+"""The machine of a result in a few lines, and for which machine the controllers are set up."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
-from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, Drive
+from softstart.drive import INFORMATIVE_TABLES
 from softstart.views.numbers import printable, short
 
 POSITIONS = {
@@ -17,68 +18,89 @@ POSITIONS = {
 }
 
 
-def drive_lines(drive: Drive) -> list[str]:
-    """The drive in a few lines: its name, the parameters that matter, and under which laws it starts."""
-    extra = []
-    if drive.d:
-        extra.append(f"d = {short(float(drive.d))} N m s/rad")
-    if isinstance(drive.start_position, str):
-        if drive.start_position != "mid-gap":
-            extra.append(f"starts {POSITIONS[drive.start_position]}")
-    elif drive.theta0:
-        extra.append(f"starts at twist {short(float(drive.theta0))} rad")
-    if drive.brake == "motor":
-        proving = isinstance(drive.release, str)
-        until = (
-            "its torque has reached the shaft torque" if proving else f"{short(float(drive.release_time))} s"
-        )
-        extra.append(f"the brake holds the motor until {until}")
-    friction, b1, b2 = map(float, drive.frictions)
-    if friction:
-        extra.append(f"friction of the motor {short(friction)} N m")
-    if b1 or b2:
-        extra.append(f"viscous friction b1 = {short(b1)}, b2 = {short(b2)} N m s/rad")
-    if drive.torque_lag:
-        extra.append(f"torque lag {short(float(drive.torque_lag))} s")
-    if math.isfinite(float(drive.torque_rate)):
-        extra.append(f"torque rate {short(float(drive.torque_rate))} N m/s")
-    if drive.computing_delay:
-        extra.append(f"computing delay {short(float(drive.computing_delay))} s")
-    if drive.torque_noise:
-        extra.append(f"noise of the measured torque {short(float(drive.torque_noise))} N m")
-    if drive.initial_load_speed or drive.initial_motor_speed:
-        w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
-        extra.append(f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s")
-    rpm = float(drive.target_speed) * 30.0 / math.pi
-    gap, c = short(float(drive.gap)), short(float(drive.c))
+def drive_lines(machine: Any) -> list[str]:
+    """The machine in a few lines: its name, the parameters that matter, and under which laws it starts."""
+    two, masses, motor = machine.lumped, machine.mass_names, machine.motor
+    J1, J2, c, gap, Mc = (short(float(one)) for one in (two.J1, two.J2, two.c, two.gap, two.Mc))
+    named = f"  motor on {masses[machine.motor_index]}, load {masses[machine.load_index]}"
+    if len(masses) == 2:
+        torque = "" if motor is None else f", starting torque Ms = {short(float(motor.starting_torque))} N m"
+        parts = [
+            f"  motor  J1 = {J1} kg m2{torque}",
+            f"  shaft  c = {c} N m/rad, gap = {gap} rad, contact law {machine.contact_laws[0]}",
+            f"  load   J2 = {J2} kg m2, Mc = {Mc} N m, {'active' if two.active else 'reactive'}",
+            *([named] if masses != ("motor", "load") else []),
+        ]
+    else:
+        count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().J.sum())
+        parts = [
+            f"  {len(masses)} masses, {count} gap{'' if count == 1 else 's'}; at the motor shaft J = "
+            f"{short(inertia)} kg m2, gaps {short(float(machine.gaps.sum()))} rad, load torque {Mc} N m",
+            named,
+        ]
+    also = list(_also(machine))
+    if len(masses) == 2 and two.d:
+        also.insert(0, f"d = {short(float(two.d))} N m s/rad")
     return [
-        printable(drive.name),
-        f"  motor  J1 = {short(float(drive.J1))} kg m2, starting torque Ms = {short(float(drive.Ms))} N m",
-        f"  shaft  c = {c} N m/rad, gap = {gap} rad, contact law {drive.contact_law}",
-        f"  load   J2 = {short(float(drive.J2))} kg m2, Mc = {short(float(drive.Mc))} N m, {drive.load_kind}",
-        f"  start  to {short(float(drive.target_speed))} rad/s ({rpm:.4g} rpm)",
-        *(["  also   " + ", ".join(extra)] if extra else []),
-        *([f"  assumed: {printable(drive.assumed)}"] if drive.assumed else []),
+        printable(machine.name),
+        *parts,
+        *([] if math.isnan(two.speed) else [f"  start  to {short(two.speed)} rad/s ({_rpm(two.speed)} rpm)"]),
+        *(["  also   " + ", ".join(also)] if also else []),
+        *([f"  assumed: {printable(machine.assumed)}"] if machine.assumed else []),
     ]
 
 
-def controllers_set_up(drive: Drive | None, fitted_to: Any) -> str:
-    """For which drive the controllers are set up, and by what that differs from the one that runs.
+def _rpm(speed: float) -> str:
+    return f"{speed * 30.0 / math.pi:.4g}"
+
+
+def _also(machine: Any) -> Iterator[str]:
+    """What else decides the start, where it is not as by default."""
+    motor, where = machine.motor, next(iter(machine.positions)) if len(machine.positions) == 1 else "unknown"
+    if where not in ("mid-gap", ""):
+        yield f"starts {POSITIONS[where]}{', of all gaps alike' if len(machine.gaps) > 1 else ''}"
+    elif where == "" and machine.theta0:
+        yield f"starts at twist {short(float(machine.theta0))} rad"
+    if machine.brake == "motor":
+        proving = math.isinf(machine.release_time)
+        until = "its torque has reached the shaft torque" if proving else f"{short(machine.release_time)} s"
+        yield f"the brake holds the motor until {until}"
+    friction, b1, b2 = map(float, machine.frictions)
+    if friction:
+        yield f"friction of the motor {short(friction)} N m"
+    if b1 or b2:
+        yield f"viscous friction b1 = {short(b1)}, b2 = {short(b2)} N m s/rad"
+    if motor is not None:
+        if motor.torque_lag:
+            yield f"torque lag {short(float(motor.torque_lag))} s"
+        if math.isfinite(float(motor.torque_rate)):
+            yield f"torque rate {short(float(motor.torque_rate))} N m/s"
+        if motor.computing_delay:
+            yield f"computing delay {short(float(motor.computing_delay))} s"
+        if motor.torque_noise:
+            yield f"noise of the measured torque {short(float(motor.torque_noise))} N m"
+    w1, w2 = machine.initial_motor_speed, machine.initial_load_speed
+    if w1 or w2:
+        yield f"initial speeds w1 = {short(float(w1))}, w2 = {short(float(w2))} rad/s"
+
+
+def controllers_set_up(machine: Any, fitted_to: Any) -> str:
+    """For which machine the controllers are set up, and by what that differs from one that is given.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
     'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
+    from softstart.chain.machines import values_of  # compiled code stands behind it
+
     found = []
-    for parameter in PARAMETERS.values() if drive is not None else ():
-        there, here = getattr(fitted_to, parameter.name), getattr(drive, parameter.name)
-        changes = (
-            parameter.name not in ("name", "source", "assumed") and parameter.table not in INFORMATIVE_TABLES
-        )
-        if changes and there != here:
-            shown = [_set(value) for value in (there, here)]
-            found.append(f"{parameter.path} {shown[0]} there, {shown[1]} here")
+    here = {} if machine is None else values_of(machine)
+    there = values_of(fitted_to)
+    for path, (parameter, value) in here.items() if here.keys() == there.keys() else ():
+        informative = parameter.name in ("name", "source", "assumed", "units")
+        if not informative and parameter.table not in INFORMATIVE_TABLES and there[path][1] != value:
+            found.append(f"{path} {_set(there[path][1])} there, {_set(value)} here")
     most = 6
     more = f", and {len(found) - most} more" if len(found) > most else ""
     differs = ": " + "; ".join(found[:most]) + more if found else ""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from softstart.drive import Drive
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import (
@@ -32,9 +31,6 @@ from softstart.views.markdown import (
     write_rows,
 )  # fmt: skip
 from softstart.views.numbers import Table, column_of, number, short
-
-if TYPE_CHECKING:
-    from softstart.chain.fatigue import ChainFatigue, ShaftLife
 
 SPECTRUM = ("range N m", "mean N m", "count")
 EQUIVALENT = (
@@ -61,7 +57,7 @@ def counted(value: float) -> str:
 
 
 def fatigue_table(found: Fatigue, rows: Sequence[Life], title: str = "") -> Table:
-    """The strategies and what they do to the shaft line."""
+    """The strategies and what they do to one shaft."""
     cells = {
         "strategy": [row.run.controller_name for row in rows],
         "K_dyn": [number(row.run.k_dyn, 3) for row in rows],
@@ -85,20 +81,50 @@ def fatigue_table(found: Fatigue, rows: Sequence[Life], title: str = "") -> Tabl
     return Table.of(title, cells, ("strategy",))
 
 
+def fatigue_tables(found: Fatigue, rows: Sequence[Life]) -> list[Table]:
+    """The strategies, with all figures of a single shaft, or with a table a figure of several."""
+    shafts = found.drive.shaft_names
+    if len(shafts) == 1:
+        return [fatigue_table(found, rows)]
+    names = [row.run.controller_name for row in rows[:: len(shafts)]]
+
+    def table(title: str, cell: Callable[[Life], str]) -> Table:
+        columns = {name: [cell(row) for row in rows[k :: len(shafts)]] for k, name in enumerate(shafts)}
+        return Table.of(title, {"strategy": names, **columns}, ("strategy",))
+
+    tables = [
+        table("Life over that under direct", lambda one: factor(one.relative)),
+        table(
+            "Damage-equivalent torque at the motor shaft, N m", lambda one: number(one.equivalent_torque, 1)
+        ),
+    ]
+    if found.estimate:
+        tables.append(table("Life with half the damping", lambda one: factor(one.relative_range[0])))
+        tables.append(table("Life with twice the damping", lambda one: factor(one.relative_range[1])))
+    if not math.isnan(found.worn_gap):
+        tables.append(table("Life over that under direct, worn", lambda one: factor(one.worn_relative)))
+    if any(not math.isnan(life.utilisation) for life in rows):
+        tables.append(
+            table("Largest torque, % of the permissible one", lambda one: number(100.0 * one.utilisation, 1))
+        )
+    return tables
+
+
 def conclusion(found: Fatigue) -> str:
-    """Under which strategy the shaft line lasts longest."""
-    reaching = [row for row in found.rows if not math.isnan(row.run.start_time)] or list(found.rows)
+    """Under which strategy the shaft that gains least lasts longest."""
     worn = not math.isnan(found.worn_gap)
-    best = max(reaching, key=lambda row: row.worn_relative if worn else row.relative)
-    name = best.run.controller_name
+
+    def life(row: Life) -> float:
+        return row.worn_relative if worn else row.relative
+
+    least = [min(rows, key=life) for rows in found.by_run]
+    best = max([row for row in least if not math.isnan(row.run.start_time)] or least, key=life)
+    name, wears = best.run.controller_name, " while the gap wears" if worn else ""
     if name == REFERENCE:
-        return "Longest life: direct while the gap wears." if worn else "Longest life: direct."
-    values = {"name": name, "life": factor(best.worn_relative if worn else best.relative)}
-    text = (
-        "Longest life: {name}, {life} times that of direct while the gap wears".format(**values)
-        if worn
-        else "Longest life: {name}, {life} times that of direct".format(**values)
-    )
+        return f"Longest life: direct{wears}."
+    shafts = len(found.drive.shaft_names)
+    where = f" in the shaft that gains least, {best.shaft_name}" if shafts > 1 else ""
+    text = f"Longest life: {name}, {factor(life(best))} times that of direct{where}{wears}"
     years = best.worn_years if worn else best.years
     return f"{text}." if math.isnan(years) else f"{text}, {counted(years)} years."
 
@@ -116,19 +142,20 @@ def notes(found: Fatigue) -> list[str]:
             "case-hardened gears (ISO 6336-2), as neither --slope nor limits.fatigue is given."
         )
     text = [f"{EQUIVALENT} {curve}"]
-    ratio = f"{100.0 * found.damping_ratio:.2g} %"
+    ratio = f"{100.0 * drive.damping_ratio:.2g} %"
     if found.estimate:
         parts = " and ".join(f"{count} {name}" for name, count in found.estimate.items())
         text.append(
             f"The damping is ESTIMATED: a ratio of {ratio} from {parts} (1 % a pair of gears, 0.5 % a "
-            "coupling, at most 6 %). The columns beside show the life with half and with twice of it."
+            "coupling, at most 6 %). Shown beside: the life with half and with twice of it."
         )
     else:
-        text.append(f"Damping ratio of the shaft: {ratio}.")
+        of = "shaft" if len(drive.shaft_names) == 1 else "first natural vibration"
+        text.append(f"Damping ratio of the {of}: {ratio}.")
     if not math.isnan(found.worn_gap):
         error = max(row.wear_error for row in found.rows)
         values = {
-            "new": short(float(drive.gap)),
+            "new": short(float(drive.gaps.sum())),
             "worn": short(found.worn_gap),
             "error": f"{float(f'{100.0 * error:.1g}'):g}",
         }
@@ -148,107 +175,46 @@ def notes(found: Fatigue) -> list[str]:
     if limits.starts is not None and limits.starts_per_hour is not None and found.curve.points:
         asked, worn = limits.starts / limits.starts_per_hour, not math.isnan(found.worn_gap)
         names: dict[bool, list[str]] = {True: [], False: []}
-        for row in found.rows:
-            names[(row.worn_hours if worn else row.hours) >= asked].append(row.run.controller_name)
+        for rows in found.by_run:
+            hours = min(row.worn_hours if worn else row.hours for row in rows)
+            names[hours >= asked].append(rows[0].run.controller_name)
         kept = (
             f"The life asked for, {limits.starts:.3g} starts, is reached by: "
             f"{', '.join(names[True]) or 'none'}"
         )
         text.append(f"{kept}; not by: {', '.join(names[False])}." if names[False] else f"{kept}.")
     worst = [
-        f"{row.run.controller_name} {row.run.position}" for row in found.rows if len(drive.positions) > 1
+        f"{rows[0].run.controller_name} {'/'.join(sorted({row.run.position for row in rows}))}"
+        for rows in found.by_run
+        if len(drive.positions) > 1
     ]
     if worst:
         text.append(f"The start position is unknown: most damage is done from {', '.join(worst)}.")
     return text
 
 
-def chain_tables(found: ChainFatigue) -> list[Table]:
-    """Each shaft under the strategies: equivalent torque, life, share of its permissible torque."""
-    names = [row[0].run.controller_name for row in found.rows]
-    shafts = found.chain.shaft_names
-
-    def table(title: str, cell: Callable[[ShaftLife], str]) -> Table:
-        columns = {name: [cell(row[k]) for row in found.rows] for k, name in enumerate(shafts)}
-        return Table.of(title, {"strategy": names, **columns}, ("strategy",))
-
-    tables = [
-        table(
-            "Damage-equivalent torque at the motor shaft, N m",
-            lambda one: number(one.equivalent_torque, 1),
-        ),
-        table("Life over that under direct", lambda one: factor(one.relative)),
-    ]
-    if any(not math.isnan(life.used) for row in found.rows for life in row):
-        tables.append(
-            table("Largest torque, % of the permissible one", lambda one: number(100.0 * one.used, 1))
-        )
-    return tables
-
-
-def chain_conclusion(found: ChainFatigue) -> str:
-    """Under which strategy the shaft that gains least lasts longest."""
-    least = [min(row, key=lambda life: life.relative) for row in found.rows]
-    best = max(least, key=lambda life: life.relative)
-    name = best.run.controller_name
-    if name == REFERENCE:
-        return "Longest life of the shaft that gains least: direct."
-    shaft = found.chain.shaft_names[best.shaft]
-    life = factor(best.relative)
-    return f"Longest life: {name}; the shaft that gains least, {shaft}, has {life} times that under direct."
-
-
-def chain_notes(found: ChainFatigue) -> list[str]:
-    """What the figures mean, and what they rest on."""
-    slope = short(found.slope)
-    curve = (
-        f"Slope of the S-N curve: m = {slope}."
-        if found.slope_given
-        else f"Slope of the S-N curve: m = {slope}, that of pitting of case-hardened gears (ISO 6336-2)."
-    )
-    text = [f"{EQUIVALENT} {curve}"]
-    worst = [
-        f"{row[0].run.controller_name} {', '.join(sorted({life.run.position for life in row}))}"
-        for row in found.rows
-        if len(found.chain.positions) > 1
-    ]
-    if worst:
-        text.append(f"The start position is unknown: most damage is done from {'; '.join(worst)}.")
-    return text
-
-
-def write_chain_fatigue(found: ChainFatigue, folder: Path, command: str) -> None:
-    """Table, report, and the turning points of each shaft under each strategy."""
-    write_rows(folder / "fatigue.csv", [life.summary() for row in found.rows for life in row])
-    stems: list[str] = []
-    for row in found.rows:
-        for life in row:
-            stems.append(file_stem(f"{life.run.controller_name} shaft {life.shaft + 1}", stems))
-            times, torques = life.turning_points.T.tolist()
-            write_columns(
-                folder / f"turning-points-{stems[-1]}.csv", {"time s": times, "torque N m": torques}
-            )
-    parts = [
-        f"# {markdown(found.chain.name)}: life of its shafts",
-        chain_conclusion(found),
-        *(part for one in chain_tables(found) for part in (f"**{one.title}**", markdown_table(one))),
-        *map(markdown, chain_notes(found)),
-    ]
-    write_drive_report(folder, parts, found.chain, command)
-
-
 def fatigue_figure(found: Fatigue) -> Any:
-    """Ranges of the cycles of a start over their number, and life beside that of direct."""
-    rows = sorted(found.rows, key=lambda row: -row.relative)
+    """Ranges of the cycles of a start over their number, of the most damaged shaft; lives of all shafts."""
+    runs = sorted(found.by_run, key=lambda rows: -min(row.relative for row in rows))
+    names = [rows[0].run.controller_name for rows in runs]
     with drawing():
-        figure, (left, right) = new_figure(1, 2, (9.0, 1.9 + 0.28 * max(6, len(rows))))
-        for index, row in enumerate(rows):
-            counts = np.concatenate([[0.5], np.cumsum(row.spectrum[:, 2])])
-            ranges = np.concatenate([row.spectrum[:1, 0], row.spectrum[:, 0]])
+        figure, (left, right) = new_figure(1, 2, (9.0, 1.9 + 0.28 * max(6, len(runs))))
+        for index, rows in enumerate(runs):
+            spectrum = max(rows, key=lambda row: row.equivalent_torque).spectrum
+            counts = np.concatenate([[0.5], np.cumsum(spectrum[:, 2])])
+            ranges = np.concatenate([spectrum[:1, 0], spectrum[:, 0]])
             left.step(
-                counts, ranges, where="pre", color=COLOURS[index % 8], ls=DASHES[index % 8],
-                label=row.run.controller_name,
-            )  # fmt: skip
+                counts,
+                ranges,
+                where="pre",
+                color=COLOURS[index % 8],
+                ls=DASHES[index % 8],
+                label=names[index],
+            )
+            lives = [row.relative for row in rows if math.isfinite(row.relative)]
+            right.plot(
+                lives, [index] * len(lives), MARKERS[index % len(MARKERS)], color=COLOURS[index % 8], ms=8
+            )
         left.set_xscale("log")
         left.set_ylim(bottom=0.0)
         left.legend(fontsize=8)
@@ -258,32 +224,26 @@ def fatigue_figure(found: Fatigue) -> Any:
             "range of the shaft torque, N m",
             "cycles of at least this range",
         )
-        for index, row in enumerate(rows):
-            if math.isfinite(row.relative):
-                right.plot(
-                    [row.relative], [index], MARKERS[index % len(MARKERS)], color=COLOURS[index % 8], ms=8
-                )
         right.axvline(1.0, color=GREY, lw=0.8, ls=":")
         right.set_xscale("log")
-        right.set_yticks(range(len(rows)), [row.run.controller_name for row in rows])
+        right.set_yticks(range(len(runs)), names)
         right.invert_yaxis()
         slope = "" if found.curve.slope is None else f", m = {short(found.curve.slope)}"
-        damping = (
-            f"damping ratio {100.0 * found.damping_ratio:.2g} % (estimated)"
-            if found.estimate
-            else f"damping ratio {100.0 * found.damping_ratio:.2g} %"
-        )
+        estimated = " (estimated)" if found.estimate else ""
+        damping = f"damping ratio {100.0 * found.drive.damping_ratio:.2g} %{estimated}"
         head(right, f"{damping}{slope}", "", "life over that of direct")
         entitle(figure, found.drive.name)
     return figure
 
 
-def write_fatigue(found: Fatigue, folder: Path, command: str, fitted_to: Drive | None) -> None:
-    """Everything about these lives: figure, table, and for each strategy its spectrum and turning points."""
+def write_fatigue(found: Fatigue, folder: Path, command: str, fitted_to: Any = None) -> None:
+    """Everything about these lives: figure, tables, spectrum and turning points of each shaft."""
     save_figure(found.plot(), folder, "fatigue")
     stems: list[str] = []
+    several = len(found.drive.shaft_names) > 1
     for row in found.rows:
-        stems.append(file_stem(row.run.controller_name, stems))
+        shaft = f" shaft {row.shaft + 1}" if several else ""
+        stems.append(file_stem(f"{row.run.controller_name}{shaft}", stems))
         columns = dict(zip(SPECTRUM, row.spectrum.T.tolist(), strict=True))
         write_columns(folder / f"spectrum-{stems[-1]}.csv", columns)
         times, torques = row.turning_points.T.tolist()
@@ -300,7 +260,11 @@ def write_fatigue(found: Fatigue, folder: Path, command: str, fitted_to: Drive |
     parts = [
         f"# {markdown(found.drive.name)}: life of the shaft line",
         conclusion(found),
-        markdown_table(fatigue_table(found, found.rows)),
+        *(
+            part
+            for one in fatigue_tables(found, found.rows)
+            for part in ([f"**{one.title}**"] if one.title else []) + [markdown_table(one)]
+        ),
         *map(markdown, notes(found)),
         "![life](fatigue.svg)",
         "Cycles: " + ", ".join(f"[{stem}](spectrum-{stem}.csv)" for stem in stems) + ".",

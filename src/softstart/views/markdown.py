@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import IO, Any
 
 from softstart import __version__
-from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.store import fresh_folder
@@ -199,16 +198,17 @@ def figure_table(rows: Sequence[Sequence[str]]) -> str:
     return markdown_table(Table("", [Column("figure", False), Column("value")], rows))
 
 
-def drive_table(drive: Drive) -> str:
-    """All parameters of a drive that are set."""
+def drive_table(machine: Any) -> str:
+    """All parameters of a machine that are set."""
+    from softstart.chain.machines import values_of  # compiled code stands behind it
+
     rows = []
-    for parameter in PARAMETERS.values():
-        value = getattr(drive, parameter.name)
-        if value is not None and value != "" and parameter.name != "name":
+    for path, (parameter, value) in values_of(machine).items():
+        if value is not None and value != "" and path != "name":
             values = value if isinstance(value, tuple) else (value,)
             shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
             unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
-            rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
+            rows.append([path, parameter.symbol, shown, unit, parameter.meaning])
     return markdown_table(Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows))
 
 
@@ -232,13 +232,11 @@ def write_drive_report(
     behind: Sequence[str] = (),
     one: bool = True,
 ) -> None:
-    """report.md about a drive, whose data stand between `parts` and `behind`, and the files of the drives.
-
-    Of a chain its file is written, and no table of its parameters.
+    """report.md about a machine, whose data stand between `parts` and `behind`, and the machine's files.
 
     `fitted_to` is the drive for which the controllers are set up, if another; `one`: no parameter is varied.
     """
-    what = "drive" if isinstance(drive, Drive) else "chain"
+    what = drive.WHAT.removeprefix("a ")
     write_text(folder / f"{what}.toml", drive.to_toml())
     about = (
         f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n"
@@ -246,10 +244,9 @@ def write_drive_report(
     )
     if fitted_to is not None:
         write_text(folder / FITTED_TO, fitted_to.to_toml())
-        set_up = controllers_set_up(drive if one and what == "drive" else None, fitted_to)
+        set_up = controllers_set_up(drive if one else None, fitted_to)
         about += (
             f"\n\nThe {markdown(set_up)}. That drive is in "
             f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
         )
-    data = ["## The drive", drive_table(drive)] if what == "drive" else []
-    write_report(folder, [*parts, *data, *behind], command, about)
+    write_report(folder, [*parts, f"## The {what}", drive_table(drive), *behind], command, about)

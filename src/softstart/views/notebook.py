@@ -51,10 +51,9 @@ def of_front(front: Any) -> str:
 
 def of_fatigue(found: Any) -> str:
     """Lives of the shaft line, and the spectrum of its cycles."""
-    table = fatigue.fatigue_table(found, found.rows)
     return _cell(
         found.drive.name,
-        [table],
+        fatigue.fatigue_tables(found, found.rows),
         fatigue.fatigue_figure(found),
         [fatigue.conclusion(found), *fatigue.notes(found)],
     )

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
@@ -22,6 +21,7 @@ from softstart.views.drawing import (
     DASHES,
     GREY,
     MARKERS,
+    SHAFTS,
     SMALL,
     drawing,
     entitle,
@@ -41,7 +41,7 @@ from softstart.views.markdown import (
     write_rows,
 )
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
-from softstart.views.starts import run_figure
+from softstart.views.printed import units_of
 
 if TYPE_CHECKING:
     from matplotlib import ticker
@@ -50,7 +50,8 @@ else:
     ticker = late("matplotlib.ticker")
 
 AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
-REPLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"
+REPLAY = "softstart simulate {what}.toml --controller profile --param file=profile.csv"
+FEW = 8  # masses and shafts with a name each in a figure
 TALL = 4.0  # largest over smallest K_dyn from which on the axis is logarithmic
 TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 
@@ -95,11 +96,10 @@ def figure_rows(best: Optimum) -> list[list[str]]:
 
 
 def _of_shafts(best: Optimum) -> list[list[str]]:
-    """K_dyn of each shaft of a chain."""
-    run: Any = best.run
-    if isinstance(best.problem.drive, Drive):
+    """K_dyn of each of several shafts."""
+    run, names = best.run, best.run.drive.shaft_names
+    if len(names) == 1:
         return []
-    names = run.drive.shaft_names
     return [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(names, run.k_dyns, strict=True)]
 
 
@@ -227,19 +227,21 @@ def bound_sentence(best: Optimum) -> str:
 def optimum_figure(best: Optimum) -> Any:
     """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
     run = best.run
-    if not isinstance(run.drive, Drive):
-        return _chain_figure(best)
+    several = len(run.drive.shaft_names) > 1
     with drawing():
         figure, panels = new_figure(4, 1, (8.0, 9.0), sharex=True)
         for axes in panels:
-            shade_open_gap(axes, run)
+            if not several:
+                shade_open_gap(axes, run)
             axes.axvline(best.end_time, color=GREY, lw=0.8, ls=":")
         motor, shaft, speed, twist = panels
         _motor_torque(motor, best)
         _shaft_torque(shaft, best)
         _speeds(speed, best)
         _twist(twist, best)
-        twist.set_xlabel("time, s     (grey: gap open; dotted: end of the start)")
+        for axes in panels if several else ():  # too many names to stand beside the title
+            axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        twist.set_xlabel(f"time, s     ({'' if several else 'grey: gap open; '}dotted: end of the start)")
         twist.set_xlim(0.0, run.end_time)
         aim = (
             best_k_dyn(run.drive)
@@ -249,23 +251,6 @@ def optimum_figure(best: Optimum) -> Any:
         aim = "least start time within limits" if _by_limits(best) else aim
         asked = f"{aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
-    return figure
-
-
-def _chain_figure(best: Optimum) -> Any:
-    """The start of the chain, with peak and bound of its shaft torques and the end of the start."""
-    figure = run_figure(best.run)
-    torque = figure.axes[0]
-    with drawing():
-        for sign in (1.0, -1.0) if float(best.run.T.min()) < -0.5 * best.run.peak_torque else (1.0,):
-            torque.axhline(sign * best.run.peak_torque, color=GREY, lw=0.9, ls=DASHES[1])
-        if best.bound.kind != "none":
-            least = best.bound.k_dyn * best.problem.base_torque
-            torque.axhline(least, color=COLOURS[4], lw=1.4, ls=DASHES[3], label="bound of the peak")
-        for axes in figure.axes:
-            axes.axvline(best.end_time, color=GREY, lw=0.8, ls=":")
-        torque.legend(fontsize=7.5, ncols=2, loc="best")
-        head(torque, f"K_dyn {best.k_dyn:.4f} in {best.end_time:.4f} s", "torque, N m")
     return figure
 
 
@@ -303,9 +288,17 @@ def _steps_until(best: Optimum, end: float) -> tuple[Any, Any]:
     )
 
 
+def _shafts(run: Run) -> list[tuple[str, dict[str, Any]]]:
+    """Name and line of each shaft; more than `FEW` are not named."""
+    names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque",)
+    names = names if len(names) <= FEW else [f"_{name}" for name in names]
+    return [(name, {"color": SHAFTS[k % len(SHAFTS)]}) for k, name in enumerate(names)]
+
+
 def _shaft_torque(axes: Axes, best: Optimum) -> None:
     run, base = best.run, best.problem.base_torque
-    axes.plot(run.t, run.T, color=COLOURS[0], label="shaft torque")
+    for (name, line), torque in zip(_shafts(run), run.T.reshape(run.t.size, -1).T, strict=True):
+        axes.plot(run.t, torque, label=name, **line)
     peak = run.peak_torque
     axes.axhline(peak, color=COLOURS[0], lw=0.9, ls=DASHES[1], label="peak")
     if best.bound.kind != "none":
@@ -327,28 +320,43 @@ def _shaft_torque(axes: Axes, best: Optimum) -> None:
 
 
 def _speeds(axes: Axes, best: Optimum) -> None:
-    run, problem = best.run, best.problem
-    axes.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
-    axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
-    axes.axhline(problem.target, color=GREY, lw=0.8, ls=":", label="target")
+    run, problem, units = best.run, best.problem, units_of(best.run.drive)
+    for i, name in enumerate(run.drive.mass_names):
+        if i not in (run.drive.motor_index, run.drive.load_index):
+            axes.plot(
+                run.t,
+                units.shown(run.w[:, i], "rad/s"),
+                color=GREY,
+                lw=0.7,
+                label=name if run.w.shape[1] <= FEW else None,
+            )
+    axes.plot(run.t, units.shown(run.w1, "rad/s"), color=COLOURS[1], ls=DASHES[1], label="motor w1")
+    axes.plot(run.t, units.shown(run.w2, "rad/s"), color=COLOURS[0], label="load w2")
+    axes.axhline(float(units.shown(problem.target, "rad/s")), color=GREY, lw=0.8, ls=":", label="target")
     title = f"start time {best.end_time:.4f} s"
     if problem.start_time is not None and best.kept is None:
         title += f", {problem.start_time:.4f} s allowed"
         axes.axvline(problem.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="allowed")
-    head(axes, title, "rad/s")
+    head(axes, title, units.of("rad/s"))
     _legend(axes, 4)
 
 
 def _twist(axes: Axes, best: Optimum) -> None:
-    run = best.run
-    half = 0.5 * float(run.drive.gap)
-    axes.plot(run.t, run.theta, color=COLOURS[2], label="twist phi1 - phi2")
+    run, units = best.run, units_of(best.run.drive)
+    half, unit = float(units.shown(0.5 * run.drive.gaps[0], "rad")), units.of("rad")
+    if run.drive.gaps.size == 1:
+        axes.plot(run.t, units.shown(run.theta, "rad"), color=COLOURS[2], label="twist phi1 - phi2")
+    else:
+        half, unit = 1.0, "twist/half gap"
+        for (name, line), gap, twist in zip(_shafts(run), run.drive.gaps, run.twist.T, strict=True):
+            if gap > 0.0:
+                axes.plot(run.t, 2.0 * twist / gap, label=name, **line)
     for flank in (half, -half):
         axes.axhline(flank, color="#444444", lw=0.8, ls=DASHES[1], label="flanks" if flank == half else None)
     contacts = "1 contact" if run.contacts == 1 else f"{run.contacts} contacts"
     at = "" if math.isnan(run.first_contact) else f", first at {run.first_contact:.4f} s"
-    head(axes, contacts + at, "rad")
-    _legend(axes, 2)
+    head(axes, contacts + at, unit)
+    _legend(axes, 4)
 
 
 def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: str) -> None:
@@ -369,7 +377,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "K_dyn": [number(run.k_dyn, 4) for run in others],
         "start time s": [number(run.start_time, 5) for run in others],
     }
-    replay = REPLAY.replace("drive.toml", "chain.toml") if isinstance(drive, Chain) else REPLAY
+    replay = REPLAY.format(what=drive.WHAT.removeprefix("a "))
     parts = [
         f"# {markdown(drive.name)}: {best_start(drive)}",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",

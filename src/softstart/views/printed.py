@@ -88,7 +88,7 @@ def at_output(machine: Drive | Chain, value: float, unit: str = "N*m") -> str:
     >>> at_output(geared, 169.7), at_output(geared, 0.20083, "kg*m^2"), at_output(crane, 169.7)
     ('6449', '290.0', '')
     """
-    ratio, power = getattr(machine, "gear_ratio", None), AT_OUTPUT.get(unit)
+    ratio, power = machine.gear_ratio, AT_OUTPUT.get(unit)
     return "" if ratio is None or power is None else digits(float(ratio) ** power * value)
 
 

@@ -7,14 +7,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.drive.doubts import doubts
 from softstart.start.comparison import Comparison
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import SETTLING_PERIODS, Run
-from softstart.views import chains
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -58,13 +56,12 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 # one start -----------------------------------------------------------------------------------------------
 
 
-def machine_lines(machine: Drive | Chain, fitted_to: Drive | None = None) -> list[str]:
+def machine_lines(machine: Any, fitted_to: Drive | None = None) -> list[str]:
     """The machine in a few lines, what is doubted of it, and for which drive the controllers are set up."""
-    drive = machine if isinstance(machine, Drive) else None
     return [
-        *(drive_lines(machine) if isinstance(machine, Drive) else chains.chain_lines(machine)),
+        *drive_lines(machine),
         *(f"  doubt  {one}" for one in doubts(machine)),
-        *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to else []),
+        *([f"  {controllers_set_up(machine, fitted_to)}"] if fitted_to else []),
     ]
 
 
@@ -105,13 +102,12 @@ def position_notes(runs: Sequence[Run]) -> list[str]:
     if not worst:
         return []
     drive = runs[0].drive
-    unnamed = isinstance(drive, Drive) and "start_position" not in drive.given()
     text = (
         "The start position is unknown: each figure is the worst of both flanks and mid-gap. K_dyn is "
         f"largest from: {', '.join(worst)}."
     )
     known = "Friction holds the load anywhere; give start.position if it is always the same."
-    return [f"{text} {known}" if unnamed else text]
+    return [text if drive.position_given else f"{text} {known}"]
 
 
 def clipped_torque(run: Any) -> str:
@@ -371,19 +367,19 @@ AT_THE_GAP = (
 )
 
 
-def details(machine: Drive | Chain) -> tuple[Figure, ...]:
-    """The figures of what happens at the gap; of a chain each shaft over its own mean torque."""
-    if isinstance(machine, Drive):
-        return AT_THE_GAP
+def details(machine: Any) -> tuple[Figure, ...]:
+    """The figures of what happens at the gap; of several shafts each over its own mean torque."""
 
     def of_shaft(k: int) -> Callable[[Row], float]:
         return lambda row: float(row.run.shaft_factors[k])
 
-    names = machine.shaft_names if len(machine.shaft_names) > 1 else ()
-    headings = ("over mean\n" + name.replace(" - ", " -\n") for name in names)
-    shafts = (Figure(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
     used = Figure("torque\nused %", lambda row: row.run.used_torque, 1)
-    return (*shafts, *([used] if machine.limits else []), AT_THE_GAP[-1])
+    of_limit = [] if machine.limits.used_torque is None else [used]
+    if len(machine.shaft_names) == 1:
+        return (*AT_THE_GAP, *of_limit)
+    headings = ("over mean\n" + name.replace(" - ", " -\n") for name in machine.shaft_names)
+    shafts = (Figure(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
+    return (*shafts, *of_limit, AT_THE_GAP[-1])
 
 
 def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "") -> Table:
@@ -417,10 +413,10 @@ def definitions(comparison: Comparison) -> list[str]:
     """What the columns mean."""
     run = comparison.rows[0].run
     base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
-    chain = isinstance(comparison.drive, Chain)
+    several = len(comparison.drive.shaft_names) > 1
     nominal = f'"{comparison.fitted_to.name}"' if comparison.fitted_to else "this machine"
     found = [
-        f"K_dyn = {'largest torque of all shafts at the motor shaft' if chain else 'peak shaft torque'} / "
+        f"K_dyn = {'largest torque of all shafts at the motor shaft' if several else 'peak shaft torque'} / "
         f"{base:.4g} N m, the mean shaft torque under full starting torque.",
         f"{LEGEND} Strategies are set up for {nominal}.",
         f"settled: from then on the load speed is never more than {100.0 * SETTLED_BAND:g} % below the "
@@ -429,7 +425,7 @@ def definitions(comparison: Comparison) -> list[str]:
     if checked_limits(comparison.drive):
         cases = ", ".join(("the machine as it is", *comparison.worst_case))
         found.append(f"limits: the least margin in the worst of {cases}.")
-    if not chain and comparison.drive.brake == "motor":
+    if comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")
     return found
 
@@ -463,9 +459,9 @@ def row_remarks(rows: Sequence[Row]) -> list[str]:
 def comparison_figure(rows: Sequence[Row], title: str) -> Any:
     """Motor torque and torque of each shaft of several starts, one panel each."""
     runs = [row.run for row in rows]
-    chain = isinstance(runs[0].drive, Chain)
+    several = len(runs[0].drive.shaft_names) > 1
     names = ["shaft torque T"]
-    if chain:  # a few names fit above the first panel; of more shafts none
+    if several:  # a few names fit above the first panel; of more shafts none
         names = list(runs[0].drive.shaft_names)
         names = names if len(names) < 4 else [f"_{name}" for name in names]
     with drawing():
@@ -475,7 +471,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
         longest = max(run.end_time for run in runs)
         for panel, row in zip(axes[:, 0], rows, strict=True):
             run = row.run
-            if not chain:
+            if not several:
                 shade_open_gap(panel, run)
             panel.plot(
                 run.t,
@@ -483,7 +479,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
                 color=COLOURS[1],
                 ls=DASHES[1],
                 lw=1.1,
-                label="motor" if chain else "motor torque u",
+                label="motor" if several else "motor torque u",
             )
             for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
                 panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], label=name)
@@ -500,7 +496,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
             figure.legend(handles, labels, loc="outside lower right", ncols=named)
         else:
             legend_above(axes[0, 0], named)
-        axes[-1, 0].set_xlabel("time, s" if chain else "time, s     (grey: gap open)")
+        axes[-1, 0].set_xlabel("time, s" if several else "time, s     (grey: gap open)")
         axes[-1, 0].set_xlim(0.0, longest)
         entitle(figure, title)
     return figure

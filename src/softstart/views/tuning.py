@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.views.drawing import drawing, entitle, new_figure, save_figure
@@ -372,7 +371,7 @@ def notes(tuning: Tuning) -> list[str]:
             "Optimum: the cell's drive, its motor without lag, dead time and noise; terminal reached."
         )
     drive, q = tuning.drive, tuning.question
-    if isinstance(drive, Drive) and drive.gear_ratio is not None:
+    if drive.gear_ratio is not None:
         gaps, inertias = (
             " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
             for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
@@ -463,7 +462,7 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
 
 
 def _play(tuning: Tuning, file: str, how: str) -> str:
-    what = "drive" if isinstance(tuning.drive, Drive) else "chain"
+    what = tuning.drive.WHAT.removeprefix("a ")
     return (
         f"[{file}]({file}) stands for a controller everywhere, {how}:\n\n```sh\n"
         f"softstart simulate {what}.toml --controller {file}\n```\n\n"

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from tests.twin import chain_of
 
-from softstart import InputError
+from softstart import Drive, InputError
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
 from softstart.chain.elements import LIBRARY
+from softstart.drive import library
+from softstart.views.drives import drive_lines
 
 BASE = """
 [[mass]]
@@ -119,6 +122,15 @@ def test_arrays_are_the_chain_at_the_motor_shaft() -> None:
     assert (arrays.motor, arrays.load) == (0, 3)
     with pytest.raises(ValueError, match="read-only"):
         arrays.J[0] = 1.0
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_a_drive_and_its_chain_are_described_alike(name: str) -> None:
+    drive = Drive.load(name).replace(brake="none", start_position="mid-gap")
+    chain = chain_of(drive)
+    assert drive_lines(chain) == drive_lines(drive)
+    for what in ("damping_ratio", "elastic_period", "stiffnesses", "dampings", "frictions"):
+        assert getattr(chain, what) == pytest.approx(getattr(drive, what), rel=1e-12), what
 
 
 def test_backlash_on_a_diameter_is_the_angle_of_the_paper() -> None:

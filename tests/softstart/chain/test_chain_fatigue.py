@@ -9,8 +9,6 @@ import pytest
 from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, fatigue, simulate
-from softstart.chain import chain_fatigue
-from softstart.chain.fatigue import shaft_turning_points
 from softstart.start.fatigue import rainflow_cycles, turning_points
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
@@ -27,19 +25,21 @@ def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
     """The plant locates its turning points in closed forms, the chain in its series."""
     run = simulate(CRANE, name)
     other = simulate(chain_of(CRANE), name, fitted_to=CRANE)
-    mine, theirs = turning_points(run), shaft_turning_points(other)[0]
+    mine, theirs = turning_points(run), turning_points(other)
     assert mine.shape == theirs.shape
     np.testing.assert_allclose(theirs, mine, rtol=1e-7, atol=1e-7 * run.peak_torque)
-    (life,), ((same,),) = fatigue(run).rows, chain_fatigue(other).rows
+    (life,), (same,) = fatigue(run).rows, fatigue(other).rows
     assert same.equivalent_torque == pytest.approx(life.equivalent_torque, rel=1e-8)
     assert same.relative == pytest.approx(life.relative, rel=1e-7)
+    assert (same.impacts, same.impact_energy) == (life.impacts, pytest.approx(life.impact_energy, rel=1e-8))
 
 
 def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
     run = simulate(chain, "ramp")
     t = np.linspace(0.0, run.end_time, 100_000)
     sampled = run.at(t)["T"]
-    for k, points in enumerate(shaft_turning_points(run)):
+    for k in range(3):
+        points = turning_points(run, k)
         located, dense = (rainflow_cycles(one, repeated=True) for one in (points[:, 1], sampled[:, k]))
         scale = located[0, 0]
         large = [one[one[:, 0] > 1e-2 * scale] for one in (located, dense)]
@@ -53,30 +53,43 @@ def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
 
 def test_each_shaft_beside_direct_and_its_permissible_torque(chain: Chain) -> None:
     strong = Chain.load("crane-4-mass", also={**DAMPED, "shaft[1].permissible_torque": "300 N*m"})
-    found = chain_fatigue([simulate(strong, name) for name in ("direct", "ramp")])
-    direct, ramp = found.rows
+    found = fatigue([simulate(strong, name) for name in ("direct", "ramp")])
+    direct, ramp = found.by_run
     assert [life.relative for life in direct] == [1.0, 1.0, 1.0]
     for hard, gentle in zip(direct, ramp, strict=True):
         assert gentle.relative == pytest.approx((hard.equivalent_torque / gentle.equivalent_torque) ** 6.6)
         assert gentle.relative > 1.0
-    assert ramp[0].used == pytest.approx(ramp[0].run.peak_torques[0] / 300.0)
-    assert np.isnan(ramp[1].used)
-    assert len(found.summary()["lives"]) == 6
+    assert ramp[0].utilisation == pytest.approx(ramp[0].run.peak_torques[0] / 300.0)
+    assert np.isnan(ramp[1].utilisation)
+    assert len(found.summary()["strategies"]) == 6
 
 
 def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(chain: Chain) -> None:
     anywhere = replace(chain, position="unknown")
-    (found,) = chain_fatigue(simulate(anywhere, "ramp")).rows
+    found = fatigue(simulate(anywhere, "ramp")).rows
     runs = [simulate(one, "ramp", fitted_to=found[0].run.told) for one in anywhere.positions.values()]
-    each = [chain_fatigue(run).rows[0] for run in runs]
+    each = [fatigue(run).rows for run in runs]
     for k, life in enumerate(found):
         assert life.equivalent_torque == pytest.approx(max(row[k].equivalent_torque for row in each))
 
 
+def test_estimated_damping_is_the_ratio_of_the_first_natural_vibration() -> None:
+    """And of two masses that of the drive, whose gap wears alike."""
+    parts = {"gears": 3, "couplings": 2}
+    bare = Chain.load("crane-4-mass")
+    assert bare.with_damping_ratio(0.04).damping_ratio == pytest.approx(0.04, rel=1e-12)
+    assert fatigue(simulate(bare, "ramp"), estimate_damping=parts).drive == bare.with_damping_ratio(0.04)
+    drive = Drive.load("crane-4amtkf")
+    runs = [simulate(one, "ramp", fitted_to=drive) for one in (drive, chain_of(drive))]
+    (mine,), (same,) = (fatigue(run, estimate_damping=parts, worn_gap=2.0).rows for run in runs)
+    assert same.relative_range == pytest.approx(mine.relative_range, rel=1e-7)
+    assert same.worn_relative == pytest.approx(mine.worn_relative, rel=1e-7)
+
+
 def test_what_cannot_be_counted_is_refused(chain: Chain) -> None:
     with pytest.raises(InputError, match="damping is missing in rotor - pinion"):
-        chain_fatigue(simulate("crane-4-mass", "ramp"))
+        fatigue(simulate("crane-4-mass", "ramp"))
     with pytest.raises(InputError, match="slope = -1"):
-        chain_fatigue(simulate(chain, "ramp"), slope=-1)
+        fatigue(simulate(chain, "ramp"), slope=-1)
     with pytest.raises(InputError, match="give one Run or several"):
-        chain_fatigue([])  # type: ignore[arg-type]
+        fatigue([])  # type: ignore[arg-type]

@@ -81,4 +81,4 @@ def test_a_chain_has_a_report_of_its_own(place, as_json):
     (sheet,) = made["sheets"]
     times = [one["rounded"] for one in sheet["settings"] if one["name"] == "time"]
     assert [1e3 * one % 5 for one in times] == [0.0]
-    assert "1. The strategies compared" in (place / "r.html").read_text(encoding="utf-8")
+    assert "4. What each shaft carries" in (place / "r.html").read_text(encoding="utf-8")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from tests.softstart.linear.speed_loops import FREE, SpeedPI, loop_of
+from tests.twin import chain_of
 
 from softstart import linear_view
 from softstart.linear.limit_cycles import n_at, share
@@ -32,6 +33,12 @@ def test_a_known_cycle_without_load_torque(unbiased):
     # one harmonic of a twist whose shaft torque is zero for a third of the time: a few per cent
     assert found.verdict.frequency == pytest.approx(found.cycle.frequency, rel=0.04)
     assert found.verdict.amplitude == pytest.approx(found.cycle.amplitude, rel=0.08)
+
+
+def test_a_chain_of_two_masses_has_the_cycles_of_its_drive(unbiased):
+    (mine,), (same,) = unbiased.cycles, linear_view(chain_of(SLOW), SpeedPI(4.0, 20.0)).cycles
+    assert same.cycle.frequency == pytest.approx(mine.cycle.frequency, rel=1e-9)
+    assert same.verdict.amplitude == pytest.approx(mine.verdict.amplitude, rel=1e-6)
 
 
 def test_harmonic_balance_holds_at_the_cycle(unbiased):

@@ -6,9 +6,8 @@ import re
 
 import pytest
 
-from softstart import Chain, InputError, simulate
-from softstart.chain import chain_fatigue
-from softstart.reporting import ChainReport, Project, report_chain
+from softstart import Chain, InputError, fatigue, simulate
+from softstart.reporting import Project, Report, first_page, report
 from softstart.reporting.limit import bound_at
 
 from .conftest import untypeset
@@ -17,32 +16,33 @@ CHAIN = Chain.load("crane-4-mass")
 
 
 @pytest.fixture(scope="module")
-def made() -> ChainReport:
-    return report_chain(CHAIN, controllers=["ramp", "take-up"], budget=0.0)
+def made() -> Report:
+    return report(CHAIN, controllers=["ramp", "take-up"], budget=0.0)
 
 
 def test_the_figures_are_those_of_the_starts_on_the_chain(made):
-    page = untypeset(made.to_html())
+    page, headline = untypeset(made.to_html()), first_page.headline(made)
     ramp, gentle, direct = (simulate(CHAIN, name) for name in ("ramp", "take-up", "direct"))
-    assert made.chosen.name == "take-up"
-    assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in made.headline
-    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in made.headline
-    assert untypeset(made.headline) in page
+    assert made.choice.chosen.name == "take-up"
+    assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in headline
+    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in headline
+    assert untypeset(headline) in page
     for run in (ramp, gentle, direct):
         row = re.findall(rf'<tr[^>]*><th scope="row" class="text">{run.controller_name}</th>(.*?)</tr>', page)
-        assert len(row) == 4  # page 1, times, shafts, beside the bound
-        assert f">{run.k_dyn:.3f}<" in row[0]
-        assert re.findall(r">([\d.]+)<", row[2]) == [f"{k:.3f}" for k in run.shaft_factors]
+        assert len(row) == 5  # page 1, the rule, the strategies, shafts, beside the bound
+        assert all(f">{run.k_dyn:.3f}<" in row[k] for k in (0, 2))
+        assert re.findall(r">([\d.]+)<", row[3]) == [f"{k:.3f}" for k in run.shaft_factors]
     for name in CHAIN.shaft_names:
         assert name in page
-    assert page.count("<figure>") == 6
+    assert page.count("<figure>") == 7
 
 
 def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made):
     """Rounded values give the figures of `simulate`."""
     gentle = simulate(CHAIN, "take-up")
     assert bound_at(CHAIN, gentle.start_time) < gentle.k_dyn
-    (sheet,) = made.sheets
+    sheet, ordinary = made.sheets
+    assert (sheet.name, ordinary.name) == ("take-up", "ramp")
     values = {one.name: one.rounded for one in sheet.settings}
     again = simulate(CHAIN, "take-up", parameters=values)
     assert sheet.rounded.k_dyn == pytest.approx(again.k_dyn, rel=1e-12)
@@ -53,9 +53,9 @@ def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made)
 @pytest.mark.slow
 def test_the_optimum_lies_between_bound_and_strategy():
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.05" for k in (1, 2, 3)})
-    best = report_chain(damped, controllers=["take-up"], budget=15.0)
+    best = report(damped, controllers=["take-up"], budget=15.0)
     (optimum,) = best.limit.found
-    run = best.chosen.run
+    run = best.choice.chosen.row.run
     assert bound_at(damped, run.start_time) < optimum.k_dyn < run.k_dyn
     assert "the gentlest start found has K_dyn" in untypeset(best.to_html())
 
@@ -65,19 +65,19 @@ def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(ma
     assert "Not counted: damping is missing in rotor - pinion" in page
     assert "take up speed 25.83 rpm, " in page  # the chain has its speed in rpm
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
-    page = report_chain(damped, controllers=["take-up"], budget=0.0).to_html()
-    found = chain_fatigue([simulate(damped, name) for name in ("take-up", "direct")])
+    page = report(damped, controllers=["take-up"], budget=0.0).to_html()
+    found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
     last = re.findall(r">take-up</th>(.*?)</tr>", page)[-2]  # the last one is beside the bound
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
-    assert relative == pytest.approx([life.relative for life in found.rows[0]], rel=5e-3)
+    assert relative == pytest.approx([life.relative for life in found.by_run[0]], rel=5e-3)
     assert "Longest life: take-up" in page
 
 
 def test_limits_pass_or_fail_by_the_worst_case(made):
     assert "Neither passed nor failed" in made.to_html()
-    permitted = 1.5 * made.chosen.run.peak_torque
+    permitted = 1.5 * made.choice.chosen.row.run.peak_torque
     limited = Chain.load("crane-4-mass", also={"shaft[1].permissible_torque": permitted})
-    page = report_chain(limited, controllers=["take-up"], budget=0.0).to_html()
+    page = report(limited, controllers=["take-up"], budget=0.0).to_html()
     assert "Pass or fail" in page
     assert "Neither passed" not in page
 
@@ -85,8 +85,8 @@ def test_limits_pass_or_fail_by_the_worst_case(made):
 def test_sources_of_a_drive_and_text_from_outside_stay_out():
     about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
     with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
-        report_chain(CHAIN, controllers=["ramp"], project=about)
+        report(CHAIN, controllers=["ramp"], project=about)
     hostile = Chain.load("crane-4-mass", also={"name": "<script>alert(1)</script>"})
-    page = report_chain(hostile, controllers=["direct"], budget=0.0).to_html()
+    page = report(hostile, controllers=["direct"], budget=0.0).to_html()
     assert "<script" not in page
     assert "default-src 'none'" in page or "default-src &#x27;none&#x27;" in page

@@ -140,6 +140,10 @@ class ChainProblem(Problem):
         assert self.drive.target_speed is not None
         return float(self.drive.target_speed)
 
+    def lower_bound(self) -> LowerBound:
+        """The momentum bound on K_dyn of every start of the chain."""
+        return momentum_bound(self)
+
     def casadi(self, run: Run | None = None) -> Any:
         """The problem in one order of contacts as a nonlinear program of CasADi: `Problem.casadi` of a chain.
 

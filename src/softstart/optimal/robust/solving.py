@@ -53,7 +53,10 @@ def scenarios_of(
     5
     """
     if not isinstance(drive, Drive) or drive.shape != ():
-        raise InputError(f"drive = {drive!r}: give a single Drive; its values are varied here.")
+        raise InputError(
+            "drive: one profile for several gaps, load inertias or load torques is found for a Drive, not "
+            "for a chain; leave these out, or reduce the chain to a drive."
+        )
     own = (("gaps", "gap"), ("inertias", "load_inertia"), ("load_torques", "load_torque"))
     lists = [
         _values(name, given) for (name, _), given in zip(own, (gaps, inertias, load_torques), strict=True)
