@@ -1,4 +1,4 @@
-"""Drives and chains alike: what tuning, sweeps and the page ask of a machine, and many starts of either.
+"""Drives and chains alike: what tuning, sweeps and the page ask of a machine, and records of either.
 
 A chain answers to the words of a drive: its gap is the sum of all its gaps at the motor shaft, its stiffness
 that of all shafts in series, its load the load mass. Each mass and shaft has its own words besides.
@@ -9,25 +9,23 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softstart.arrays import Vector
 from softstart.chain.elements import START, TOP, Shaft
 from softstart.chain.model import Chain, load_machine
-from softstart.controller.base import SetUp
 from softstart.drive import PARAMETERS, Drive
+from softstart.drive.checks import BROADCAST
+from softstart.drive.records import Columns, Records, is_machine
 from softstart.errors import InputError
-from softstart.input.parameters import Parameter
-from softstart.start.batch import Figures, array_starts, figures, prepared
+from softstart.input.parameters import Parameter, Wording, read_value
+from softstart.quantities import RefusedError, nearest, show
 
 Machine = Drive | Chain
 Values = dict[str, tuple[Parameter, Any]]  # by path
-Which = NDArray[np.int64]
 
 BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
 PART = re.compile(r"(mass|shaft)(?:\[(.+)\]\.|_(\d+)_)(\w+)")
@@ -36,13 +34,13 @@ SAME = 1e-12  # within this share two gaps are one, whatever binary makes of the
 
 
 def one_machine(given: Machine | str | os.PathLike[str]) -> Machine:
-    """The drive or chain, or that of a name or file; InputError for a batch.
+    """The drive or chain, or that of a name or file; InputError for anything else.
 
     >>> one_machine("crane-4-mass").name == Chain.load("crane-4-mass").name
     True
     """
     machine = load_machine(given) if isinstance(given, str | os.PathLike) else given
-    if isinstance(machine, Chain) or (isinstance(machine, Drive) and machine.shape == ()):
+    if is_machine(machine):
         return machine
     raise InputError("drive: give one Drive or Chain, the path of its file, or the name of a shipped one.")
 
@@ -233,59 +231,98 @@ SHARED: Mapping[str, tuple[Callable[[Chain], Any], Callable[[Chain, Any], Any]]]
 }
 
 
-# many starts ---------------------------------------------------------------------------------------------
+# many machines -------------------------------------------------------------------------------------------
 
 
-class Starts(Protocol):
-    """Machines that are started again and again.
+def records(machine: Machine | Records, **fields: Any) -> Records:
+    """Many machines that differ in some values, for one call of `simulate`.
 
-    The set-ups of the controller serve all starts, one each, or as many in a row. The figures are those of
-    `simulate`, to the bit.
+    Parameters
+    ----------
+    machine : Drive, Chain or Records
+        The machine that they are variants of, or records of it that differ in further values.
+    **fields : numbers, texts with a unit, or lists and arrays of such
+        Parameters of a drive by their names in Python, as `gap` and `load_inertia`; of a chain the same words
+        (its gap is the sum of all its gaps at the motor shaft) and those of one mass or shaft, as
+        `shaft_2_gap`. Arrays broadcast together; at least one is needed. Angles and torques in SI as in
+        `Drive`. An angle `start_position` stays where it is when the gap changes.
+
+    Returns
+    -------
+    Records
+        Of the shape to which the fields broadcast.
+
+    Raises
+    ------
+    InputError
+        For every field that is unknown and every value that no machine can have, with its place.
+
+    Examples
+    --------
+    >>> from softstart import Drive, records, simulate
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> simulate(records(crane, gap=[0.5, 2.0]), "direct").k_dyn.round(3).values.tolist()
+    [3.118, 4.865]
+    >>> records(crane, gap=[[0.5], [2.0]], load_inertia=["0.1 kg*m^2", 0.175]).shape
+    (2, 2)
+
+    References
+    ----------
+    docs/howto/python-in-a-notebook.md.
     """
-
-    def figures(
-        self,
-        which: Which,
-        set_ups: Iterable[SetUp],
-        base: Any,
-        time_limit: float | None = None,
-    ) -> Figures:
-        """Figures by name, of machine `which[i]` in place i; `base` is M12avg in N m, one or one a start."""
+    return _records(machine, fields, Columns.replace)
 
 
-@dataclass(frozen=True, eq=False)
-class StartsOfDrives:
-    """Drives that differ in `fields`, one value a drive."""
+def varied(machine: Machine | Records, values: Mapping[str, Any]) -> Records:
+    """As `records`, but the start of a drive stays where it was in its gap, see `Drive.with_gap`.
 
-    drive: Drive
-    fields: Mapping[str, Vector]
-
-    def figures(
-        self,
-        which: Which,
-        set_ups: Iterable[SetUp],
-        base: Any,
-        time_limit: float | None = None,
-    ) -> Figures:
-        drives: Any = with_values(self.drive, {name: values[which] for name, values in self.fields.items()})
-        notes = array_starts(drives, set_ups, time_limit=time_limit)
-        return figures(notes, base, limits=self.drive.limits)
-
-
-def starts_of(machine: Machine, fields: Mapping[str, Vector]) -> Starts:
-    """The machines that differ from one in these values; InputError for values that cannot be.
-
-    >>> crane = Chain.load("crane-4-mass")
-    >>> starts = starts_of(crane, {"gap": np.array([0.5, 2.0])})
-    >>> from softstart.controller import make_controller
-    >>> found = starts.figures(np.array([1, 0]), [make_controller("direct").set_up(crane.design_drive)], 1.0)
-    >>> found["peak_torque"][0].round(1).tolist()
-    [583.2, 332.9]
+    >>> flank = Drive.load("crane-4amtkf").replace(start_position=0.25)
+    >>> varied(flank, {"gap": [1.0]}).fields["start_position"]
+    array([0.5])
     """
-    if not isinstance(machine, Chain):
-        with_values(machine, fields)  # each of them is a drive
-        return StartsOfDrives(machine, fields)
-    names = list(fields)
-    rows = zip(*(fields[name].tolist() for name in names), strict=True)
-    chains: list[Any] = [with_values(machine, dict(zip(names, row, strict=True))) for row in rows]
-    return prepared(chains)
+    return _records(machine, values, Columns.with_gap if "gap" in values else Columns.replace)
+
+
+def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Columns]) -> Records:
+    if not isinstance(machine, Records):
+        machine = Records(machine, {}, (machine,))
+    whole = machine.machine
+    if isinstance(whole, Chain):
+        found = _chains(machine, values)
+    else:
+        (part,) = machine.parts
+        found = Records.of(whole, change(Columns.of(part), **values))
+    if not found.fields:
+        raise InputError("records: all fields are single values; give a list for one, as gap=[0.5, 2.0].")
+    return found
+
+
+def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
+    """Chains that differ in these values, by the words of their parameters."""
+    chain: Chain = chains.machine
+    wrong, read = list[str](), dict[str, Any](chains.fields)
+    for key, value in values.items():
+        found = knob(chain, key)
+        if found is None:
+            words = [named.name for path in knobs(chain) if (named := knob(chain, path)) is not None]
+            near = nearest(key, words)
+            hint = f"did you mean {near}?" if near else f"its words are {', '.join(words)}."
+            wrong.append(f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}")
+            continue
+        try:
+            read[found.name] = read_value(found.parameter, value, batch=True)
+        except RefusedError as refusal:
+            wording = Wording(written={found.parameter.name: key})
+            wrong.append(wording.refused(found.parameter, value, refusal))
+    arrays = {name: value for name, value in read.items() if isinstance(value, np.ndarray)}
+    shapes = ", ".join(f"{name} has shape {value.shape}" for name, value in arrays.items())
+    try:
+        shape = np.broadcast_shapes(*(value.shape for value in arrays.values()))
+    except ValueError:
+        wrong.append(f"{shapes}: {BROADCAST}.")
+    if wrong:
+        raise InputError(wrong)
+    fields = {name: np.broadcast_to(value, shape) for name, value in arrays.items()}
+    rows = zip(*(values.ravel().tolist() for values in fields.values()), strict=True)
+    each = (read | dict(zip(fields, row, strict=True)) for row in rows)
+    return Records(chain, fields, tuple(with_values(chain, one) for one in each))

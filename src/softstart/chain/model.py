@@ -203,8 +203,6 @@ class Chain:
         >>> Chain.from_drive(drive).at_motor_shaft().c
         array([368.465])
         """
-        if drive.shape != ():
-            raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
         if wrong := list(drive.without_friction("a chain has no such friction")):
             raise InputError(wrong)
         of: Any = drive  # one number for each parameter

@@ -104,7 +104,7 @@ def verify_on_chain(
     Raises
     ------
     InputError
-        For bad input, as a batch of drives or a chain without a motor.
+        For bad input, as a chain without a motor.
     SimulationError
         If one of the two starts cannot be finished.
 
@@ -120,8 +120,6 @@ def verify_on_chain(
     ----------
     What a reduction keeps: [R], docs/theory/reduction.md; how to use it: docs/howto/reduce-a-driveline.md.
     """
-    if drive.shape != ():
-        raise InputError(f"{drive.name}: a batch of shape {drive.shape}; give a single drive.")
     made = make_controller(controller, parameters)
     whole = simulate(chain, made, until, fitted_to=drive, base=drive)
     return Verification(simulate(drive, made, until), whole)

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, Protocol
 
 from softstart.drive.checks import elastic_frequency
 from softstart.drive.model import Drive
-from softstart.errors import InputError
 
 __all__ = ["TwoMasses", "doubts"]
 
@@ -45,7 +44,7 @@ def doubts(machine: Drive | Lumped) -> list[str]:
     Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed
     at most 10,000 rpm; start under the starting torque, (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of
     direct at the first contact, [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
-    below 1 before the larger inertia. A chain counts by the lever rule. Raises `InputError` for a batch.
+    below 1 before the larger inertia. A chain counts by the lever rule.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> doubts(crane)
@@ -55,8 +54,6 @@ def doubts(machine: Drive | Lumped) -> list[str]:
     """
     if not isinstance(machine, Drive):
         return [*_doubts(machine.lumped), *_not_the_rated_torque(getattr(machine, "motor", None))]
-    if machine.shape != ():
-        raise InputError(f"{machine.name}: doubts are those of one drive; give its elements().")
     return [*_doubts(_of_drive(machine)), *_not_the_rated_torque(machine), *_nothing_holds(machine)]
 
 

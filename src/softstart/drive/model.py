@@ -50,9 +50,8 @@ library = Library("softstart.drive", "a drive", "drives")
 class Drive(ParameterSet):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
-    Each quantity is a number in SI, a string with a unit, or an array of such (a batch: arrays broadcast
-    together to `shape`). Angles are in rad at the motor shaft. A drive is frozen and its arrays are
-    read-only; equal drives hash alike.
+    Each quantity is a number in SI or a string with a unit; many drives are `softstart.records`. Angles are
+    in rad at the motor shaft. A drive is frozen; equal drives hash alike.
 
     Without `start_position`, an active load behind a brake hangs, a reversal begins on the opposite flank,
     and a reactive load at rest with a gap is at an unknown position: friction holds it wherever the last stop
@@ -88,7 +87,10 @@ class Drive(ParameterSet):
     """
 
     WHAT: ClassVar[str] = "a drive"
-    BATCH: ClassVar[bool] = True
+    SEVERAL: ClassVar[Mapping[str, str]] = {
+        "": "a drive has one value; for several starts use sweep",
+        "python": "a drive has one value; for several starts write records(drive, {name}={value})",
+    }
     SHEET: ClassVar[Any]  # `DataSheet`, which knows drives
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
@@ -347,38 +349,6 @@ class Drive(ParameterSet):
         given = self.given()
         return document_text((table, given) for table in self.TABLES)
 
-    # ---- batches -----------------------------------------------------------------------------------------
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape that the arrays among the parameters broadcast to; () for a single drive.
-
-        >>> Drive.load("crane-4amtkf").replace(gap=[0.5, 1, 2]).shape
-        (3,)
-        """
-        return np.broadcast_shapes(*(v.shape for v in vars(self).values() if isinstance(v, np.ndarray)))
-
-    def elements(self) -> Iterator[Self]:
-        """The single drives of a batch, last index fastest; a single drive is its own only element.
-
-        >>> [drive.gap for drive in Drive.load("crane-4amtkf").replace(gap=[0.5, 1, 2]).elements()]
-        [0.5, 1.0, 2.0]
-        """
-        shape = self.shape
-        if shape == ():
-            yield self
-            return
-        varied = {
-            name: np.broadcast_to(value, shape).ravel().tolist()
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
-        for row in zip(*varied.values(), strict=True):
-            # each element was checked with the batch
-            one = type(self).__new__(type(self))
-            vars(one).update(vars(self) | dict(zip(varied, row, strict=True)))
-            yield one
-
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
     @property
@@ -629,7 +599,6 @@ class Drive(ParameterSet):
         beyond the gap and the speeds `w1` and `w2`, and the output `shaft_torque`. The nonlinear one has the
         input `demand` and the outputs `phi1, w1, phi2, w2, u, T`; start it from
         `control_systems.initial_state(drive)`. Both are described in `softstart.drive.control_systems`.
-        Raises `InputError` for a batch.
 
         >>> sorted(round(float(abs(pole)), 3) for pole in Drive.load("crane-4amtkf").to_control().poles())
         [0.0, 112.397, 112.397]

@@ -13,8 +13,10 @@ import numpy as np
 from scipy.stats import norm
 
 from softstart.arrays import Vector
+from softstart.chain.machines import records
 from softstart.controller import Controller, make_controller
 from softstart.drive import FRICTIONS, Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.fitting import POWERS, Fitter, Space, chosen, covariance_of, root_of, usual
 from softstart.identification.logs import Log, TorqueIs
@@ -250,8 +252,6 @@ def plan_experiments(
     A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992; docs/identification.md.
     """
     drive = drive if isinstance(drive, Drive) else Drive.load(drive)
-    if drive.shape:
-        raise InputError("drive: a batch of drives has no plan; give one drive.")
     period = float(to_si(log_period, "s", name="log_period"))
     if not 0.0 < period < math.inf:
         raise InputError(f"log_period = {show(log_period)}: the sample period of the log is above 0.")
@@ -505,8 +505,8 @@ class _Bench:
         found = model.travels([{POSITION: share} if self.moving else {} for share in shares.tolist()])
         return found[:, 0], found[:, 1]
 
-    def _starts(self, places: Vector) -> Drive:
-        return self.wide.replace(start_position=places) if self.moving else self.wide
+    def _starts(self, places: Vector) -> Records | list[Drive]:
+        return records(self.wide, start_position=places) if self.moving else [self.wide]
 
     def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> Vector:
         """By which share each of some positions exceeds the limits, below 0 where it keeps them."""

@@ -140,8 +140,6 @@ def identify(
     drive = load_machine(drive) if isinstance(drive, str) else drive
     chain = drive if isinstance(drive, Chain) else None
     drive = reduced_drive(drive) if isinstance(drive, Chain) else drive
-    if drive.shape:
-        raise InputError("drive: a batch of drives is no guess; give one drive.")
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
     if not given:
         raise InputError("logs: there is none; give a log, or the path of its CSV file.")

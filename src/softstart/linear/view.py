@@ -392,11 +392,6 @@ def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[floa
             continue
         if not isinstance(one, Drive | Chain):
             wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
-        elif isinstance(one, Drive) and one.shape != ():
-            wrong.append(
-                f"{name}: {one.name} is a batch of shape {one.shape}, and a linear view is that of one "
-                "drive; take one of its elements()."
-            )
         elif one.motor is None or one.target_speed is None:
             wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
     for name, values in factors.items():

@@ -162,10 +162,6 @@ class Problem:
         drive = self.drive
         if not isinstance(drive, Drive):
             raise InputError(f"drive = {drive!r}: give a Drive; Drive.load reads one from a file or by name.")
-        if drive.shape != ():
-            raise InputError(
-                "drive: an optimum is for one drive; for several under one profile, optimize_robust."
-            )
         if drive.computing_delay != 0.0:
             object.__setattr__(self, "drive", drive := drive.replace(computing_delay=0.0))
         wrong += drive.without_friction("optimal starts and bounds are known without this friction only")

@@ -12,13 +12,12 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.elements import Shaft
-from softstart.chain.machines import Machine, here, moved, values_of
+from softstart.chain.machines import Machine, here, moved, values_of, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
-from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.simulation import simulate
 from softstart.tuning.ranges import ranges_of, tunable
@@ -203,7 +202,7 @@ def machine_from(text: str, where: str = "") -> Machine:
 
 
 def single(machine: Machine) -> Machine:
-    """The machine if the page can start it; InputError if it is several, or nothing moves it."""
+    """The machine if the page can start it; InputError if nothing moves it."""
     if isinstance(machine, Chain):
         if machine.motor is None:
             raise InputError(
@@ -213,11 +212,6 @@ def single(machine: Machine) -> Machine:
             raise InputError(
                 "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
             )
-    elif machine.shape != ():
-        raise InputError(
-            f"{machine.name}: lists of values make {math.prod(machine.shape)} drives, and the page starts "
-            "one; give one value a key."
-        )
     return machine
 
 
@@ -427,10 +421,9 @@ def k_dyn_row(
     if isinstance(machine, Chain):
         return np.array([_k_dyn(moved(machine, gap, inertia, origin), controller, nominal) for gap in gaps])
     of: Any = nominal
-    drives = machine.with_gap(list(gaps), load_inertia=inertia)
+    drives = varied(machine, {"gap": list(gaps), "load_inertia": inertia})
     notes = array_starts(drives, controller, fitted_to=of, max_events=MAP_EVENTS)
-    base = np.broadcast_to(metrics.base_torque(of or drives), (len(gaps),))
-    k: Vector = figures(notes, base)["k_dyn"][0]
+    k: Vector = figures(notes, (of or drives).mean_torque)["k_dyn"][0]
     return k
 
 

@@ -339,8 +339,6 @@ def checked_steps(
     wrong: list[str] = []
     if not isinstance(drive, Drive | Chain):
         wrong.append(f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one.")
-    elif isinstance(drive, Drive) and drive.shape != ():
-        wrong.append("drive: a report is about one drive; give one value for each parameter.")
     if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < float("inf"):
         wrong.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")
     steps = Resolution()

@@ -18,12 +18,12 @@ from softstart.chain.model import Chain
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError, listed
 from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
@@ -191,7 +191,7 @@ def make_sheet(
     exact: AnyRun,
     resolution: Resolution,
     row: Row | None = None,
-    drawn: Drive | None = None,
+    drawn: Records | None = None,
 ) -> Sheet:
     """The sheet of a strategy on a drive or chain; `exact` is its start there.
 
@@ -256,7 +256,7 @@ def _within_the_rule(
     own: Drive,
     settings: Sequence[Setting],
     row: Row | None,
-    drawn: Drive | None,
+    drawn: Records | None,
 ) -> tuple[tuple[Setting, ...], tuple[str, ...]]:
     """The settings at the steps nearest to them that keep what the row keeps, and which were moved for that.
 
@@ -290,7 +290,9 @@ def _steps_beside(count: int) -> list[tuple[int, ...]]:
     return [(0,) * count, *alone]
 
 
-def _broken(machine: Drive | Chain, controller: Controller, own: Drive, row: Row, drawn: Drive | None) -> str:
+def _broken(
+    machine: Drive | Chain, controller: Controller, own: Drive, row: Row, drawn: Records | None
+) -> str:
     """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
     cases = tuple(case for case in row.worst_case if case in CASES)
     found = compared(machine, controller, row.direct, fitted_to=own, worst_case=cases, drawn=drawn)
@@ -365,13 +367,8 @@ def _starts(
 ) -> tuple[Any, Any]:
     """K_dyn and start times of the drive or chain with the values off by these half steps."""
     each = [{one.name: one.off(side) for one, side in zip(varied, row, strict=True)} for row in sides]
-    if not isinstance(drive, Drive):
-        runs = [_start(drive, replace(ready, **values), own) for values in each]
-        times = np.array([run.start_time for run in runs])
-        return np.where(np.isnan(times), np.nan, [run.k_dyn for run in runs]), times
     set_ups = [(replace(ready, **values), own) for values in each]
-    notes = array_starts(drive.replace(gap=np.full(len(sides), float(drive.gap))), set_ups)
-    found = figures(notes, metrics.base_torque(drive))
+    found = prepared([drive]).figures(set_ups, drive.mean_torque, np.zeros(len(sides), dtype=np.int64))
     time = np.asarray(found["start_time"][0], dtype=np.float64)
     return np.where(np.isnan(time), np.nan, found["k_dyn"][0]), time
 

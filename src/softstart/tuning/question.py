@@ -27,6 +27,7 @@ from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.controller.tuned import Tuned
 from softstart.drive import PARAMETERS, Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.plugins import CONTROLLERS, registered
@@ -346,26 +347,20 @@ def scenarios_of(
     return ({}, *combined)
 
 
-def scenarios_drawn(drive: Drive, drawn: Drive, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
+def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
     """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> scenarios_drawn(crane, crane.replace(gap=[0.4, 0.6]), ({},))
+    >>> scenarios_drawn(crane, records(crane, gap=[0.4, 0.6]), ({},))
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """
-    moved = {
-        name: np.asarray(value)
-        for name, value in vars(drawn).items()
-        if name in PARAMETERS and np.ndim(value)
-    }
-    moved = {name: values for name, values in moved.items() if np.any(values != vars(drive)[name])}
+    own = drive.values()
+    moved = {name: values for name, values in drawn.fields.items() if np.any(values != own[name])}
     if both := sorted(set(moved) & {name for one in scenarios for name in one}):
         raise InputError(f"tolerances: {both[0]} was identified, with an interval of its own; leave it out.")
     found: list[Scenario] = [{}]
-    for k in range(math.prod(drawn.shape)):
-        levels = {
-            name: Level(float(values[k]) / float(vars(drive)[name]), 0.0) for name, values in moved.items()
-        }
+    for k in range(len(drawn)):
+        levels = {name: Level(float(values[k]) / float(own[name]), 0.0) for name, values in moved.items()}
         found.append({**scenarios[k % len(scenarios)], **levels})
     return tuple(found)
 
