@@ -11,7 +11,7 @@ import pytest
 from tests import twin
 from tests.controllers.starts import CRANE, random_drive, traced
 
-from softstart import Drive, InputError, simulate
+from softstart import Drive, InputError, records, simulate
 from softstart.controller import CompiledController, controller_class, make_controller
 from softstart.drive import library
 from softstart.kernel.records import NOTES
@@ -88,7 +88,7 @@ def test_batch_equals_single_starts(name: str, kind: Any) -> None:
     rng = np.random.default_rng(5)
     fields = [random_drive(rng, load_kind=kind).values() for _ in range(40)]
     varied = [key for key, value in fields[0].items() if isinstance(value, float)]
-    batch = Drive(load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
+    batch = records(CRANE, load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
     together = simulate(batch, name)
     for i, one in enumerate(batch.elements()):
         run = simulate(one, name)
@@ -99,7 +99,7 @@ def test_batch_equals_single_starts(name: str, kind: Any) -> None:
 
 @pytest.mark.parametrize("name", SAMPLED)
 def test_batch_of_two_dimensions(name: str) -> None:
-    batch = CRANE.replace(gap=np.array([[0.5], [2.0]]), load_inertia=np.array([0.07, 0.175, 0.3]))
+    batch = records(CRANE, gap=np.array([[0.5], [2.0]]), load_inertia=np.array([0.07, 0.175, 0.3]))
     result = simulate(batch, name)
     assert result.k_dyn.shape == (2, 3)
     assert result.k_dyn.values[1, 0] == simulate(CRANE.replace(gap=2.0, load_inertia=0.07), name).k_dyn

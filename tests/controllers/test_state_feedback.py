@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import expm
 from tests.controllers.starts import CRANE, index, traced
 
-from softstart import Drive, InputError, simulate
+from softstart import Drive, InputError, records, simulate
 from softstart.controller.base import numbers_of
 from softstart.drive import library
 from softstart.start.metrics import base_torque
@@ -116,9 +116,8 @@ def test_thousands_of_weights_need_few_designs(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_batch_has_the_numbers_of_its_drives() -> None:
-    batch = CRANE.replace(
-        load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096], torque_lag=[0, 1e-3, 0.01]
-    )
+    lags = [0, 1e-3, 0.01]
+    batch = records(CRANE, load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096], torque_lag=lags)
     weights = {"torque_weight": np.array([1.0, 3.0, 10.0]), "rate_weight": np.array([0.5, 4.0, 2.0])}
     _, together = numbers_of(StateFeedback(**weights).set_ups(batch))  # type: ignore[arg-type, misc]
     for i, one in enumerate(batch.elements()):

@@ -234,13 +234,14 @@ SHARED: Mapping[str, tuple[Callable[[Chain], Any], Callable[[Chain, Any], Any]]]
 # many machines -------------------------------------------------------------------------------------------
 
 
-def records(machine: Machine | Records, **fields: Any) -> Records:
+def records(machine: Machine | Records | str, **fields: Any) -> Records:
     """Many machines that differ in some values, for one call of `simulate`.
 
     Parameters
     ----------
-    machine : Drive, Chain or Records
-        The machine that they are variants of, or records of it that differ in further values.
+    machine : Drive, Chain, Records or str
+        The machine that they are variants of, or its name or file; or records that are to differ in further
+        values.
     **fields : numbers, texts with a unit, or lists and arrays of such
         Parameters of a drive by their names in Python, as `gap` and `load_inertia`; of a chain the same words
         (its gap is the sum of all its gaps at the motor shaft) and those of one mass or shaft, as
@@ -285,6 +286,7 @@ def varied(machine: Machine | Records, values: Mapping[str, Any]) -> Records:
 
 def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Columns]) -> Records:
     if not isinstance(machine, Records):
+        machine = one_machine(machine)
         machine = Records(machine, {}, (machine,))
     whole = machine.machine
     if isinstance(whole, Chain):

@@ -351,6 +351,7 @@ def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario])
     """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
 
     >>> crane = Drive.load("crane-4amtkf")
+    >>> from softstart import records
     >>> scenarios_drawn(crane, records(crane, gap=[0.4, 0.6]), ({},))
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """

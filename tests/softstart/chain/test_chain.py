@@ -127,8 +127,6 @@ def test_a_drive_as_a_chain_has_its_numbers() -> None:
     assert [arrays.J[0], arrays.J[1], arrays.c[0], arrays.d[0], arrays.gap[0], arrays.Mc[1]] == [
         drive.J1, drive.J2, drive.c, drive.d, drive.gap, drive.Mc,
     ]  # fmt: skip
-    with pytest.raises(InputError, match="batch"):
-        Chain.from_drive(drive.replace(gap=[0.1, 0.2]))
 
 
 def _drives() -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces, TwoSteps
 from tests.softstart.kernel.test_against_oracle import case_with_friction, in_other_units, run_of
 
-from softstart import Chain, Drive, InputError, Run, optimize, simulate
+from softstart import Chain, Drive, InputError, Run, optimize, records, simulate
 from softstart.start.metrics import base_torque
 
 CRANE = Drive.load("crane-4amtkf")
@@ -168,8 +168,8 @@ def test_viscous_friction_that_vanishes_leaves_the_closed_form() -> None:
 
 
 def test_a_batch_has_the_bits_of_single_starts() -> None:
-    batch = CRANE.replace(
-        motor_friction=[0.0, 3.0, 3.0, 0.0], motor_viscous_friction=[0.0, 0.0, 0.02, 0.0],
+    batch = records(
+        CRANE, motor_friction=[0.0, 3.0, 3.0, 0.0], motor_viscous_friction=[0.0, 0.0, 0.02, 0.0],
         load_viscous_friction=[0.0, 0.0, 0.01, 0.03],
     )  # fmt: skip
     player = TwoSteps(first=15.0, switch=0.06, second=62.0)

@@ -94,7 +94,7 @@ def test_what_is_no_axis_of_a_chain(grid, said):
 
 
 def test_figures_of_a_chain_are_named():
-    known = known_figures(CHAIN)
+    known = known_figures(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)
     results = sweep(CHAIN, "direct", {"gap": ["1x"]}, figures=["peak_torque_2", "used_torque"], workers=1)
     run = simulate(CHAIN, "direct")

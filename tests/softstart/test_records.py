@@ -1,0 +1,215 @@
+"""Records: many machines that differ in some values, with the bits of each alone."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, records, simulate
+from softstart.chain import Chain
+from softstart.chain.machines import varied, with_values
+from softstart.controller import make_controller
+from softstart.drive.records import Records
+
+CRANE = Drive.load("crane-4amtkf")
+CHAIN = Chain.load("crane-4-mass")
+FIGURES = ("k_dyn", "start_time", "contacts", "impact_speed", "peak_time", "end_time")
+
+
+def alone(machine: Any, controller: str, name: str, **options: Any) -> float:
+    return float(simulate(machine, controller, **options).summary()[name])
+
+
+def assert_bits_of_single_starts(many: Records, controller: str, **options: Any) -> None:
+    found: Any = simulate(many, controller, **options)
+    for name in FIGURES:
+        own = [alone(one, controller, name, **options) for one in many.elements()]
+        np.testing.assert_array_equal(found[name].values.ravel(), own, err_msg=name)
+
+
+# what they are -------------------------------------------------------------------------------------------
+
+
+def test_fields_in_si_of_one_shape() -> None:
+    many = records(CRANE, gap=["30 deg", 2], load_inertia=[["700 kg*cm^2"], [0.175], [0.2]], damping=0.5)
+    assert many.machine == CRANE
+    assert (many.shape, len(many), list(many.fields)) == ((3, 2), 6, ["gap", "load_inertia"])
+    assert many.fields["gap"].tolist() == [[math.radians(30), 2.0]] * 3
+    each = list(many.elements())
+    assert [one.gap for one in each] == [math.radians(30), 2.0] * 3
+    assert each[5] == CRANE.replace(gap=2.0, load_inertia=0.2, damping=0.5)
+    assert all(type(one) is Drive and isinstance(one.gap, float) for one in each)
+    assert repr(many) == f"<Records of {CRANE.name}: gap, load_inertia of shape (3, 2)>"
+
+
+def test_defaults_are_derived_for_each() -> None:
+    one, other = records(CRANE.replace(maximum_torque=None), starting_torque=[62, 80]).elements()
+    assert (one.maximum_torque, other.maximum_torque) == (62.0, 80.0)
+    assert other.replace(starting_torque=100).maximum_torque == 100
+    assert other.Omega == CRANE.Omega
+
+
+def test_they_cannot_be_changed_from_outside() -> None:
+    gaps = np.array([1.0, 2.0])
+    many = records(CRANE, gap=gaps)
+    gaps[0] = 7.0
+    for one in (many, pickle.loads(pickle.dumps(many)), copy.copy(many)):
+        assert one.fields["gap"][0] == 1.0
+        assert [drive.gap for drive in one.elements()] == [1.0, 2.0]
+    with pytest.raises(ValueError, match="read-only"):
+        many.fields["gap"][0] = 3.0
+    with pytest.raises(AttributeError):
+        many.machine = CRANE  # type: ignore[misc]
+
+
+def test_records_differ_in_further_fields() -> None:
+    many = records(records(CRANE, gap=[[0.5], [2.0]]), damping=[0.1, 0.2], load_torque=3.0)
+    assert [(one.gap, one.damping, one.load_torque) for one in many.elements()] == [
+        (0.5, 0.1, 3.0), (0.5, 0.2, 3.0), (2.0, 0.1, 3.0), (2.0, 0.2, 3.0),
+    ]  # fmt: skip
+    chains = records(records(CHAIN, gap=[0.5, 1.0]), shaft_2_stiffness=4e5)
+    assert list(chains.elements()) == [
+        with_values(CHAIN, {"gap": gap, "shaft_2_stiffness": 4e5}) for gap in (0.5, 1.0)
+    ]
+
+
+def test_an_angle_stays_where_it_is_or_moves_with_its_gap() -> None:
+    flank = CRANE.replace(start_position=0.25)
+    assert [one.theta0 for one in records(flank, gap=[0.5, 1.0]).elements()] == [0.25, 0.25]
+    assert [one.theta0 for one in varied(flank, {"gap": [0.5, 1.0]}).elements()] == [0.25, 0.5]
+    assert list(varied(flank, {"gap": [0.7, 3.0]}).elements()) == [flank.with_gap(0.7), flank.with_gap(3.0)]
+
+
+# their starts --------------------------------------------------------------------------------------------
+
+STARTS = {
+    "gap": st.floats(0.0, 3.0),
+    "load_inertia": st.floats(0.02, 1.0),
+    "stiffness": st.floats(50.0, 5000.0),
+    "damping": st.floats(0.0, 1.5),
+    "load_torque": st.floats(0.0, 30.0),
+    "torque_lag": st.just(0.0) | st.floats(1e-4, 0.01),
+    "start_position": st.floats(-0.3, 0.3),
+    "motor_friction": st.floats(0.0, 5.0),
+}
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_every_figure_has_the_bits_of_a_single_start(data: st.DataObject) -> None:
+    names = data.draw(st.sets(st.sampled_from(sorted(STARTS)), min_size=1, max_size=4))
+    size = data.draw(st.integers(1, 3))
+    fields: dict[str, Any] = {
+        name: np.array(data.draw(st.lists(STARTS[name], min_size=size, max_size=size))) for name in names
+    }
+    if data.draw(st.booleans()):  # one field along an axis of its own
+        name = sorted(names)[0]
+        fields[name] = fields[name][:, None]
+    drive = CRANE.replace(load_kind=data.draw(st.sampled_from(["active", "reactive"])))
+    controller = data.draw(st.sampled_from(["direct", "ramp", "pulse-coast-hold"]))
+    assert_bits_of_single_starts(records(drive, **fields), controller)
+
+
+def test_the_worst_of_unknown_positions_is_that_of_each() -> None:
+    drive = CRANE.replace(load_kind="reactive", start_position="unknown")
+    many = records(drive, gap=[0.2, 0.5, 2.0])
+    assert_bits_of_single_starts(many, "reduced-first-stage")
+    found: Any = simulate(many, "reduced-first-stage")
+    own = [simulate(one, "reduced-first-stage").position for one in many.elements()]
+    assert found.position.values.tolist() == own
+
+
+def test_controllers_and_bases_of_other_drives() -> None:
+    many = records(CRANE, gap=[0.5, 2.0])
+    fitted, base = records(CRANE, gap=[0.4, 1.0]), records(CRANE, load_inertia=[0.1, 0.3])
+    found: Any = simulate(many, "ramp", fitted_to=fitted, base=base)
+    for i, three in enumerate(zip(many.elements(), fitted.elements(), base.elements(), strict=True)):
+        run = simulate(three[0], "ramp", fitted_to=three[1], base=three[2])
+        assert float(found.k_dyn[i]) == run.k_dyn
+    listed: Any = simulate(list(many.elements()), "ramp", workers=2)
+    own: Any = simulate(many, "ramp", workers=1)
+    assert listed.k_dyn.values.tobytes() == own.k_dyn.values.tobytes()
+
+
+def test_parameters_of_a_controller_go_with_the_machines() -> None:
+    times = np.array([0.05, 0.2])
+    found: Any = simulate(records(CRANE, gap=[0.5, 2.0]), make_controller("ramp", {"time": times}))
+    for i, gap in enumerate((0.5, 2.0)):
+        run = simulate(CRANE.replace(gap=gap), "ramp", parameters={"time": times[i]})
+        assert float(found.k_dyn[i]) == run.k_dyn
+
+
+def test_limits_may_differ() -> None:
+    many = records(CRANE, permissible_torque=[100.0, 200.0], permissible_start_time=1.0)
+    found: Any = simulate(many, "direct")
+    assert found.keeps_limits.values.tolist() == [0.0, 1.0]
+    run = simulate(CRANE, "direct")
+    assert found.margin.values[0] == pytest.approx(1.0 - run.peak_torque / 100.0, rel=1e-12)
+
+
+# chains --------------------------------------------------------------------------------------------------
+
+
+def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
+    many = records(CHAIN, gap=[[0.5], [1.0]], shaft_2_stiffness=["4e5 N*m/rad", 5e5], load_torque=100.0)
+    assert list(many.fields) == ["gap", "shaft_2_stiffness"]
+    each = list(many.elements())
+    assert each[3] == with_values(CHAIN, {"gap": 1.0, "shaft_2_stiffness": 5e5, "load_torque": 100.0})
+    found: Any = simulate(many, "ramp")
+    assert found.k_dyn.dims == ("axis_0", "axis_1")
+    assert found.k_dyns.dims == ("axis_0", "axis_1", "shaft")
+    assert found.gap.values.tolist() == [[0.5, 0.5], [1.0, 1.0]]
+    runs = [simulate(one, "ramp") for one in each]
+    assert found.k_dyn.values.ravel().tolist() == [run.k_dyn for run in runs]
+    assert found.k_dyns.values.reshape(4, 3).tolist() == [run.k_dyns.tolist() for run in runs]
+    listed: Any = simulate(each, "ramp")
+    assert listed.k_dyns.values.tobytes() == found.k_dyns.values.tobytes()
+
+
+# what is refused -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("machine", "fields", "said"),
+    [
+        (CRANE, {"gapp": [0.5]}, 'gapp = [0.5]: a drive has no parameter "gapp"; did you mean gap?'),
+        (CHAIN, {"shaft_2_gapp": [0.5]}, "did you mean shaft_2_gap?"),
+        (CHAIN, {"shaft_7_gap": [0.5]}, 'a chain has no parameter "shaft_7_gap"'),
+        (CRANE, {"gap": [1, 2, 3], "damping": [1, 2]}, "damping has shape (2,), gap has shape (3,): arrays"),
+        (CHAIN, {"gap": [1, 2, 3], "load_inertia": [60, 70]}, "gap has shape (3,), load_inertia has shape"),
+        (CRANE, {"gap": []}, "gap = []: "),
+        (CHAIN, {"gap": []}, "gap = []: "),
+        (CRANE, {"gap": [0.5, math.nan]}, "gap[1] = nan: "),
+        (CRANE, {"gap": [[0.5, -1.0]]}, "gap[0, 1] = -1.0: the total angular gap must be 0 or more"),
+        (CHAIN, {"load_inertia": [60.0, -1.0]}, "load_inertia[1] = -1.0: "),
+        (CHAIN, {"shaft_2_gap": [0.5, "1 m"]}, "shaft_2_gap[1] = "),
+        (CRANE, {"starting_torque": [62, 5]}, "starting_torque[1] = 5 N*m: the starting torque cannot move"),
+        (CRANE, {"gap": [0.5, "2 kg"]}, 'gap[1] = "2 kg": kg is a mass, not an angle'),
+        (CRANE, {"gap": [0.5], "damping": -1}, "damping = -1: "),
+        (CRANE, {"load_kind": ["active", "reactive"]}, "load_kind"),
+        (CRANE, {"gap": 0.5}, "records: all fields are single values; give a list for one"),
+        (CRANE, {}, "records: all fields are single values"),
+        (CHAIN, {"gap": 0.5}, "records: all fields are single values"),
+        (5, {"gap": [0.5]}, "drive: give one Drive or Chain"),
+    ],
+)  # fmt: skip
+def test_what_no_machine_can_have(machine: Any, fields: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        records(machine, **fields)
+    assert said in str(caught.value)
+    assert len(caught.value.sentences) == 1
+
+
+def test_all_mistakes_at_once() -> None:
+    for machine, near in ((CRANE, "gap"), (CHAIN, "gap")):
+        with pytest.raises(InputError) as caught:
+            records(machine, gapp=[1.0], load_inertia=[-1.0], stiffness=["soft"])
+        assert len(caught.value.sentences) == 3
+        assert f"did you mean {near}?" in str(caught.value)
