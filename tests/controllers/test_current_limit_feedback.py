@@ -138,7 +138,7 @@ def test_invariant_to_gap_and_inertia(kind: Any, most: float, spread: tuple[floa
     """
     nominal = CRANE.replace(load_kind=kind)
     gaps, inertias = np.meshgrid([0.5, 1.0, 2.0, 4.0], [0.07, 0.175, 0.35], indexing="ij")
-    drives = nominal.replace(gap=gaps, load_inertia=inertias)
+    drives = records(nominal, gap=gaps, load_inertia=inertias)
     soft, direct = (
         simulate(drives, name, fitted_to=nominal, base=nominal).k_dyn.values
         for name in ("current-limit-feedback", "direct")

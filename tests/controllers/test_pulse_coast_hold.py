@@ -321,11 +321,11 @@ def test_a_lag_or_dead_time_not_as_told_hardly_matters(kind: Any) -> None:
         "load_inertia": J1 * np.array([2.0, 5.0])[None, :, None],
         "encoder_phase": np.array([0.0, 0.3, 0.7])[None, None, :],
     }
-    as_told = started(LAGGING.replace(**grid), told(kind))["k_dyn"]
+    as_told = started(records(LAGGING, **grid), told(kind))["k_dyn"]
     for lag in (0.001, 0.003):
-        k = started(LAGGING.replace(**grid), told(kind, torque_lag=lag))["k_dyn"]
+        k = started(records(LAGGING, **grid), told(kind, torque_lag=lag))["k_dyn"]
         assert np.abs(k / as_told - 1.0).max() < 0.01
-    dead = started(LAGGING.replace(computing_delay=0.001, **grid), told(kind))["k_dyn"]
+    dead = started(records(LAGGING, computing_delay=0.001, **grid), told(kind))["k_dyn"]
     assert (dead / as_told).max() < 1.04
 
 
@@ -340,7 +340,7 @@ def test_a_slew_limit_does_not_look_like_a_contact() -> None:
         "gap": np.array([0.5, 2.0])[None, None, :],
     }
     for kind in ("active", "reactive"):
-        starts = simulate(CRANE.replace(load_kind=kind, **grid), PulseCoastHold())
+        starts = simulate(records(CRANE, load_kind=kind, **grid), PulseCoastHold())
         assert np.all(starts.contacts == 1)
         assert float(starts.k_dyn.max()) < 1.25
         assert float(starts.k_dyn.median()) < 1.0

@@ -244,7 +244,7 @@ def test_invariant_to_gap_inertia_and_stiffness() -> None:
     gaps, inertias, factors = np.meshgrid(
         [0.25, 1.0, 4.0], [0.07, 0.175, 0.35], [0.8, 1.0, 1.25], indexing="ij"
     )
-    drives = nominal.replace(gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
+    drives = records(nominal, gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
     peaks = simulate(drives, StateFeedback(), fitted_to=nominal, base=nominal).k_dyn.values
     assert peaks.max() < 1.35
     assert np.ptp(peaks, axis=0).max() < 0.12

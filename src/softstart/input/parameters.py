@@ -259,8 +259,8 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
             raise RefusedError(f"the {parameter.meaning} is one list of numbers, such as {parameter.example}")
     elif not batch and not isinstance(number, float):
         reason = several or "the {meaning} is one number, not a list"
-        named = {"meaning": parameter.meaning, "name": parameter.name, "value": show(value)}
-        raise RefusedError(reason.format(**named))
+        shown = show(value) if isinstance(value, list | tuple) else "[...]"
+        raise RefusedError(reason.format(meaning=parameter.meaning, name=parameter.name, value=shown))
     limit = LIMITS.get(parameter.limit)
     if limit is not None:
         _refuse(number, limit(number), f"the {parameter.meaning} must be {parameter.limit}")
