@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, records, simulate
 from softstart.chain import Chain
-from softstart.chain.machines import varied, with_values
+from softstart.chain.machines import varied
 from softstart.controller import make_controller
 from softstart.drive.records import Records
 
@@ -76,7 +76,7 @@ def test_records_differ_in_further_fields() -> None:
     ]  # fmt: skip
     chains = records(records(CHAIN, gap=[0.5, 1.0]), shaft_2_stiffness=4e5)
     assert list(chains.elements()) == [
-        with_values(CHAIN, {"gap": gap, "shaft_2_stiffness": 4e5}) for gap in (0.5, 1.0)
+        CHAIN.with_values({"gap": gap, "shaft_2_stiffness": 4e5}) for gap in (0.5, 1.0)
     ]
 
 
@@ -161,7 +161,7 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
     many = records(CHAIN, gap=[[0.5], [1.0]], shaft_2_stiffness=["4e5 N*m/rad", 5e5], load_torque=100.0)
     assert list(many.fields) == ["gap", "shaft_2_stiffness"]
     each = list(many.elements())
-    assert each[3] == with_values(CHAIN, {"gap": 1.0, "shaft_2_stiffness": 5e5, "load_torque": 100.0})
+    assert each[3] == CHAIN.with_values({"gap": 1.0, "shaft_2_stiffness": 5e5, "load_torque": 100.0})
     found: Any = simulate(many, "ramp")
     assert found.k_dyn.dims == ("axis_0", "axis_1")
     assert found.k_dyns.dims == ("axis_0", "axis_1", "shaft")

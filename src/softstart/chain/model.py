@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from softstart.chain.elements import (
     Quantity,
     Shaft,
 )
+from softstart.chain.words import Words
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.drive.checks import wrong_units
 from softstart.drive.doubts import TwoMasses
@@ -51,7 +52,7 @@ BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joi
 
 
 @dataclass(frozen=True, init=False)
-class Chain:
+class Chain(Words):
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
     Each quantity is a number in SI or a string with a unit, on its own shaft.
@@ -96,6 +97,9 @@ class Chain:
     ----------
     [R]; everything at one shaft: docs/theory/reduction.md; the file: docs/reference/chain-file.md.
     """
+
+    KIND: ClassVar[str] = "chain"
+    LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 
     masses: tuple[Mass, ...]
     shafts: tuple[Shaft, ...]

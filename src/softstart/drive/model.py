@@ -12,6 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
+from softstart.drive.doubts import TwoMasses
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -25,7 +26,7 @@ from softstart.input.parameter_set import (
     parameter,
     read_settings,
 )  # fmt: skip
-from softstart.input.parameters import Parameter, Wording
+from softstart.input.parameters import Knob, Parameter, Wording
 from softstart.late import late
 from softstart.quantities import show
 
@@ -87,6 +88,8 @@ class Drive(ParameterSet):
     """
 
     WHAT: ClassVar[str] = "a drive"
+    KIND: ClassVar[str] = "drive"
+    LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
     SEVERAL: ClassVar[Mapping[str, str]] = {
         "": "a drive has one value; for several starts use sweep",
         "python": "a drive has one value; for several starts write records(drive, {name}={value})",
@@ -428,6 +431,47 @@ class Drive(ParameterSet):
         one = self if gaps == 1.0 else self.with_gap(gaps * self.gap)
         return one if load_inertia == 1.0 else one.replace(load_inertia=load_inertia * self.load_inertia)
 
+    # ---- by the words of a sweep --------------------------------------------------------------------------
+
+    @property
+    def gap_and_inertia(self) -> tuple[float, float]:
+        """Gap, rad, and inertia of the load, kg m2.
+
+        >>> Drive.load("crane-4amtkf").gap_and_inertia
+        (0.5, 0.175)
+        """
+        return self.gap, self.load_inertia
+
+    @property
+    def motor_at_load(self) -> float:
+        """Inertia of the motor at the shaft of the load, kg m2: the load is at the motor shaft here."""
+        return self.motor_inertia
+
+    def moved(self, gap: float, inertia: float, origin: Any = None) -> Self:
+        """The drive with another gap, as `with_gap`, and another load inertia; `origin` is for chains."""
+        return self.with_gap(gap, load_inertia=inertia)
+
+    def by_path(self) -> dict[str, tuple[Parameter, Any]]:
+        """All parameters by their paths, each with its value."""
+        return {one.path: (one, getattr(self, name)) for name, one in self.PARAMETERS.items()}
+
+    def knob(self, key: str) -> Knob | None:
+        """The parameter that a key names, as in a file or in Python; None where there is none.
+
+        >>> Drive.load("crane-4amtkf").knob("load.inertia").name
+        'load_inertia'
+        """
+        name = BY_PATH.get(key, key)
+        return Knob(name, PARAMETERS[name], getattr(self, name)) if name in PARAMETERS else None
+
+    def knobs(self) -> Iterator[str]:
+        """The keys of all parameters that can be varied, as in a file."""
+        return iter(BY_PATH)
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """The drive with these values; with a gap as `with_gap`."""
+        return self.with_gap(**values) if "gap" in values else self.replace(**values)
+
     # ---- what starts ask of any machine ------------------------------------------------------------------
 
     @property
@@ -444,6 +488,16 @@ class Drive(ParameterSet):
         """
         push = self.Ms - self.motor_friction
         return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
+
+    @property
+    def lumped(self) -> TwoMasses:
+        """The drive as two masses at the motor shaft, as its doubts see it."""
+        travels = (0.5 * self.gap - one.theta0 for one in self.positions.values())
+        return TwoMasses(
+            J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *travels),
+            Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
+            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
+        )  # fmt: skip
 
     @property
     def motor(self) -> Self:
@@ -609,4 +663,5 @@ class Drive(ParameterSet):
 
 
 PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS
+BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
 TABLES: tuple[str, ...] = tuple(table.name for table in Drive.TABLES if table.name)

@@ -12,7 +12,7 @@ import numpy as np
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
+    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
     "sentences_of", "without_unit",
 ]  # fmt: skip
 
@@ -93,6 +93,15 @@ class Parameter:
     def place(self) -> str:
         """What the parameter is called in a sentence about a file: `[load] inertia`."""
         return f"[{self.table}] {self.key}" if self.table else self.key
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A parameter of a machine that can be varied: its word in Python, what it is, and its value."""
+
+    name: str
+    parameter: Parameter
+    value: Any
 
 
 @dataclass(frozen=True)

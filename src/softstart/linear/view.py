@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine, knob, with_values
+from softstart.chain.machines import Machine
 from softstart.chain.model import Chain, load_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
@@ -346,10 +346,10 @@ def linear_view(
         return LinearView(drive, start.controller, "events", (sentence,), point)
     own = Loop(drive, point, start.differencing)
     modes = own.modes()
-    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := knob(drive, key))]
+    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := drive.knob(key))]
     varied = [(f"J2 x {k:g}", {"load_inertia": k * own_values[0]}) for k in inertias]
     varied += [(f"c x {k:g}", {"stiffness": k * own_values[1]}) for k in stiffnesses]
-    variations = [_varied(name, Loop(with_values(start.drive, change), point, start.differencing))
+    variations = [_varied(name, Loop(start.drive.with_values(change), point, start.differencing))
                   for name, change in varied]  # fmt: skip
     outside: Outside | None = None
     cycled: tuple[PredictedCycle, ...] = ()

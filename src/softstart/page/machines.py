@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.elements import Shaft
-from softstart.chain.machines import Machine, here, moved, values_of, varied
+from softstart.chain.machines import Machine, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
@@ -119,7 +119,7 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
     >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].group
     'pinion - wheel shaft'
     """
-    known = values_of(machine)
+    known = machine.by_path()
     rows = _rows_of_chain(machine) if isinstance(machine, Chain) else _rows_of_drive()
     made = (Entry(path, known[path][0], *words) for path, *words in rows if path in known)
     return MappingProxyType({one.path: one for one in made})
@@ -183,17 +183,9 @@ def without(machine: Machine, path: str) -> Machine:
     >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
     None
     """
-    if not isinstance(machine, Chain):
-        return machine.replace(**{values_of(machine)[path][0].name: None})
-    table, _, name = path.partition(".")
-    if table == "motor" and machine.motor is not None:
-        return replace(machine, motor=machine.motor.replace(**{name: None}))
-    if table == "start":
-        return replace(machine, target_speed=None)  # the rated speed of the motor then
-    shafts = list(machine.shafts)
-    index = int(table.removeprefix("shaft[").rstrip("]")) - 1
-    shafts[index] = shafts[index].replace(**{name: None})
-    return replace(machine, shafts=tuple(shafts))
+    knob = machine.knob(path)
+    assert knob is not None
+    return machine.with_values({knob.name: None})
 
 
 def machine_from(text: str, where: str = "") -> Machine:
@@ -203,15 +195,12 @@ def machine_from(text: str, where: str = "") -> Machine:
 
 def single(machine: Machine) -> Machine:
     """The machine if the page can start it; InputError if nothing moves it."""
-    if isinstance(machine, Chain):
-        if machine.motor is None:
-            raise InputError(
-                "[motor] is missing: the page starts the chain by its motor; add it to the file."
-            )
-        if machine.target_speed is None:
-            raise InputError(
-                "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
-            )
+    if machine.motor is None:
+        raise InputError("[motor] is missing: the page starts the chain by its motor; add it to the file.")
+    if machine.target_speed is None:
+        raise InputError(
+            "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
+        )
     return machine
 
 
@@ -263,14 +252,13 @@ def scales_about(origin: Machine) -> Mapping[str, Scale]:
     >>> scales_about(Chain.load("crane-4-mass"))["shaft[1].gap"]
     Scale(low=0.0, high=0.4, logarithmic=False)
     """
-    motor: Any = origin.motor if isinstance(origin, Chain) else origin
+    motor: Any = origin.motor
     Ms, highest, target = (
         float(motor.starting_torque),
         float(motor.maximum_torque),
         float(origin.target_speed or 1.0),
     )
-    loads = sum(origin.at_motor_shaft().Mc) if isinstance(origin, Chain) else float(origin.Mc)
-    weakest = rounded(min(max(1.1 * loads, 0.1 * Ms), 0.9 * Ms), 2)
+    weakest = rounded(min(max(1.1 * origin.lumped.Mc, 0.1 * Ms), 0.9 * Ms), 2)
     found = {
         "motor.starting_torque": Scale(weakest, max(highest, Ms)),
         "motor.torque_lag": Scale(0.0, rounded(max(0.02, 4.0 * float(motor.torque_lag)), 2)),
@@ -356,16 +344,18 @@ def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> A
     """Gaps up to four times that of the machine as loaded, inertias from a fifth to five times its own.
 
     Of a chain: the sum of its gaps at the motor shaft, all widened alike, and the inertia of its load mass.
-    None for a chain without a gap.
+    None where no gap can be widened.
 
     >>> axes = axes_about(Drive.load("crane-4amtkf"), 5, 3)
     >>> axes.gaps, axes.inertias
     ((0.0, 0.5, 1.0, 1.5, 2.0), (0.035, 0.175, 0.875))
     """
-    gap, inertia = here(origin)
-    if isinstance(origin, Chain) and gap == 0.0:
-        return None
+    gap, inertia = origin.gap_and_inertia
     widest = 4.0 * gap if gap > 0.0 else 0.1
+    try:
+        origin.moved(widest, inertia)
+    except InputError:
+        return None
     return Axes(
         tuple(rounded(v, NODE_DIGITS) for v in np.linspace(0.0, widest, gaps)),
         tuple(rounded(v, NODE_DIGITS) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
@@ -379,9 +369,12 @@ def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
     ('all gaps, at the motor shaft', 'inertia of crane')
     """
     gap = SYMBOLS["gap"]
-    if isinstance(machine, Chain):
+    if len(machine.shaft_names) > 1:
         symbols = f"\N{N-ARY SUMMATION}{gap}", f"J{_below(machine.load_index)}"
-        return symbols, ("all gaps, at the motor shaft", f"inertia of {machine.load_mass}")
+        return symbols, (
+            "all gaps, at the motor shaft",
+            f"inertia of {machine.mass_names[machine.load_index]}",
+        )
     return (gap, SYMBOLS["load_inertia"]), (f"gap {gap}", SYMBOLS["load_inertia"])
 
 
@@ -390,10 +383,10 @@ def placeless(machine: Machine, axes: Axes, origin: Machine) -> Machine:
 
     >>> chain = Chain.load("crane-4-mass")
     >>> axes = axes_about(chain)
-    >>> placeless(moved(chain, 0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
+    >>> placeless(chain.moved(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
-    there = moved(machine, axes.gaps[-1], axes.inertias[0], origin)
+    there = machine.moved(axes.gaps[-1], axes.inertias[0], origin)
     if not isinstance(there, Chain):
         return there
     load = there.load_index
@@ -419,7 +412,7 @@ def k_dyn_row(
     are the figures of `softstart.simulate`, to the bit.
     """
     if isinstance(machine, Chain):
-        return np.array([_k_dyn(moved(machine, gap, inertia, origin), controller, nominal) for gap in gaps])
+        return np.array([_k_dyn(machine.moved(gap, inertia, origin), controller, nominal) for gap in gaps])
     of: Any = nominal
     drives = varied(machine, {"gap": list(gaps), "load_inertia": inertia})
     notes = array_starts(drives, controller, fitted_to=of, max_events=MAP_EVENTS)
@@ -437,5 +430,5 @@ def _k_dyn(chain: Machine, controller: Controller, nominal: Machine | None) -> f
 
 def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
     """The mean torques to which K_dyn refers along the inertias of a map, N m."""
-    gap = here(machine)[0]
-    return np.array([moved(machine, gap, inertia).mean_torque for inertia in inertias])
+    gap = machine.gap_and_inertia[0]
+    return np.array([machine.moved(gap, inertia).mean_torque for inertia in inertias])

@@ -30,7 +30,6 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.printed import RPM, at_output, decimals_of, digits, fixed, short, unit
 
-AnyRun = Run
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 INSTANTS = 20_001  # of a chain's start, in which its motor torque is looked at
@@ -140,8 +139,8 @@ class Sheet:
     kind: str
     settings: tuple[Setting, ...]
     own: Drive
-    exact: AnyRun
-    rounded: AnyRun | None
+    exact: Run
+    rounded: Run | None
     failure: str
     variants: int
     corners: bool
@@ -188,7 +187,7 @@ class Sheet:
 def make_sheet(
     machine: Drive | Chain,
     controller: Controller,
-    exact: AnyRun,
+    exact: Run,
     resolution: Resolution,
     row: Row | None = None,
     drawn: Records | None = None,
@@ -202,7 +201,7 @@ def make_sheet(
     ready, own = controller.set_up(drive)
     settings = tuple(_settings(ready, drive, resolution))
     varied = [one for one in settings if one.step is not None]
-    rounded: AnyRun | None = None
+    rounded: Run | None = None
     failure, variants, corners, worst, slowest = "", 0, False, math.nan, math.nan
     worst_values: dict[str, float] = {}
     full_rise: FullRise | None = None
@@ -240,14 +239,12 @@ def make_sheet(
 
 def sheet_drive(machine: Drive | Chain) -> Drive:
     """The drive whose motor and numbers a sheet names: of a chain the two masses that stand for it."""
-    return machine if isinstance(machine, Drive) else machine.design_drive
+    return machine.design_drive
 
 
-def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> AnyRun:
-    """A start under a controller with the numbers of `own`; K_dyn of a chain refers to that chain."""
-    base: Any = None if isinstance(machine, Drive) else machine
-    found: AnyRun = simulate(machine, controller, fitted_to=own, base=base)
-    return found
+def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> Run:
+    """A start under a controller with the numbers of `own`."""
+    return simulate(machine, controller, fitted_to=own)
 
 
 def _within_the_rule(
@@ -421,7 +418,7 @@ def sheet_section(
     )
 
 
-def _motor_torque(run: AnyRun) -> Vector:
+def _motor_torque(run: Run) -> Vector:
     """The motor torque over a start, N m."""
     return run.u
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine, here, varied, with_values
+from softstart.chain.machines import Machine, varied
 from softstart.controller.base import CompiledController
 from softstart.errors import InputError, Mistakes
 from softstart.start.batch import Figures, named, prepared
@@ -109,7 +109,8 @@ def _figures(
     question: Question, changes: Mapping[str, Any], parameters: Mapping[str, Any], controller: str, count: int
 ) -> Figures:
     """One start after another where a controller in plain Python needs it, else one call for all."""
-    own = {"gap": np.full(count, here(question.drive)[0])}  # of every start, so that each chunk is a table
+    gap = question.drive.gap_and_inertia[0]
+    own = {"gap": np.full(count, gap)}  # of every start, so that each chunk is a table
     machines = varied(question.drive, {**own, **changes})
     made = question.maker.make(parameters, controller)
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
@@ -178,8 +179,10 @@ def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
     controller = next((value for c, value in values if c.owner == "controller"), "")
     wrong = Mistakes()
     with wrong.noted():
-        several = any(isinstance(value, np.ndarray) for value in drive.values())
-        (varied if several else with_values)(question.drive, drive)
+        if any(isinstance(value, np.ndarray) for value in drive.values()):
+            varied(question.drive, drive)
+        else:
+            question.drive.with_values(drive)
     with wrong.noted():
         question.maker.make(parameters, controller)
     wrong.settle()

@@ -270,12 +270,7 @@ def _question(
     if not isinstance(metric, str) and not callable(metric):
         wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
     if metric == MARGIN and not has_margin(drive.limits):
-        wrong.append(
-            "metric = margin: the drive has no limits; give limits.shaft_torque in its file, as "
-            '"175 N*m", or limits.start_time.'
-            if isinstance(drive, Drive)
-            else "metric = margin: no shaft of the chain has a limit; give permissible_torque in its file."
-        )
+        wrong.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
     if wrong or ranges is None or room is None:
         raise InputError(wrong)
     return Question(

@@ -5,7 +5,6 @@ import pytest
 
 from softstart import InputError, Status, simulate, sweep
 from softstart.chain import Chain
-from softstart.chain.machines import with_values
 from softstart.sweeping.starts import known_figures
 
 CHAIN = Chain.from_toml(
@@ -30,7 +29,7 @@ def same(results, **options):
         controller = values.pop("controller", "s-curve")
         own = {k.removeprefix("controller_"): values.pop(k) for k in [*values] if k.startswith("controller_")}
         values.pop("sample", None)
-        run = simulate(with_values(CHAIN, values), controller, parameters=own, **options)
+        run = simulate(CHAIN.with_values(values), controller, parameters=own, **options)
         assert list(Status)[int(one.status)] is run.status
         expected = {"k_dyn": run.k_dyn, "start_time": run.start_time, "peak_torque": run.peak_torque}
         expected |= {f"k_dyn_{k + 1}": value for k, value in enumerate(run.k_dyns)}
