@@ -74,10 +74,13 @@ def test_records_differ_in_further_fields() -> None:
     assert [(one.gap, one.damping, one.load_torque) for one in many.elements()] == [
         (0.5, 0.1, 3.0), (0.5, 0.2, 3.0), (2.0, 0.1, 3.0), (2.0, 0.2, 3.0),
     ]  # fmt: skip
-    chains = records(records(CHAIN, gap=[0.5, 1.0]), shaft_2_stiffness=4e5)
+    chains = records(records(CHAIN, gap=[0.5, 1.0], load_torque=99.0), shaft_2_stiffness=[[4e5], [5e5]])
     assert list(chains.elements()) == [
-        CHAIN.with_values({"gap": gap, "shaft_2_stiffness": 4e5}) for gap in (0.5, 1.0)
+        CHAIN.with_values({"gap": gap, "load_torque": 99.0, "shaft_2_stiffness": c})
+        for c in (4e5, 5e5)
+        for gap in (0.5, 1.0)
     ]
+    assert chains.fields["gap"].tolist() == [[0.5, 1.0], [0.5, 1.0]]
 
 
 def test_an_angle_stays_where_it_is_or_moves_with_its_gap() -> None:

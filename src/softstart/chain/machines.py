@@ -100,7 +100,7 @@ def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Colu
 def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     """Chains that differ in these values, by the words of their parameters."""
     chain: Chain = chains.machine
-    wrong, read = list[str](), dict[str, Any](chains.fields)
+    wrong, read = list[str](), dict[str, Any]()
     for key, value in values.items():
         found = chain.knob(key)
         if found is None:
@@ -115,6 +115,7 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
             wording = Wording(written={found.parameter.name: key})
             wrong.append(wording.refused(found.parameter, value, refusal))
     arrays = {name: value for name, value in read.items() if isinstance(value, np.ndarray)}
+    arrays = {**chains.fields, **arrays}
     shapes = ", ".join(f"{name} has shape {value.shape}" for name, value in arrays.items())
     try:
         shape = np.broadcast_shapes(*(value.shape for value in arrays.values()))
@@ -123,6 +124,8 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     if wrong:
         raise InputError(wrong)
     fields = {name: np.broadcast_to(value, shape) for name, value in arrays.items()}
-    rows = zip(*(values.ravel().tolist() for values in fields.values()), strict=True)
-    each = (read | dict(zip(fields, row, strict=True)) for row in rows)
-    return Records(chain, fields, tuple(chain.with_values(one) for one in each))
+    each = np.broadcast_to(np.arange(len(chains.parts)).reshape(chains.shape), shape).ravel()
+    changed = {name: np.broadcast_to(value, shape).ravel().tolist() for name, value in read.items()}
+    rows = [dict(zip(changed, row, strict=True)) for row in zip(*changed.values(), strict=True)]
+    parts = (chains.parts[i].with_values(row) for i, row in zip(each, rows, strict=True))
+    return Records(chain, fields, tuple(parts))

@@ -106,7 +106,7 @@ class Records:
     @property
     def shape(self) -> tuple[int, ...]:
         """The shape to which the values broadcast together."""
-        return next(iter(self.fields.values())).shape
+        return np.broadcast_shapes(*(values.shape for values in self.fields.values()))
 
     def __len__(self) -> int:
         return math.prod(self.shape)

@@ -16,10 +16,9 @@ from softstart.chain.machines import Machine, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.start.batch import array_starts, figures
-from softstart.start.simulation import simulate
 from softstart.tuning.ranges import ranges_of, tunable
 
 STEPS = 600
@@ -411,21 +410,16 @@ def k_dyn_row(
     The controller is set up for each machine, or for `nominal`, to whose mean torque K_dyn then refers. These
     are the figures of `softstart.simulate`, to the bit.
     """
-    if isinstance(machine, Chain):
-        return np.array([_k_dyn(machine.moved(gap, inertia, origin), controller, nominal) for gap in gaps])
-    of: Any = nominal
-    drives = varied(machine, {"gap": list(gaps), "load_inertia": inertia})
-    notes = array_starts(drives, controller, fitted_to=of, max_events=MAP_EVENTS)
-    k: Vector = figures(notes, (of or drives).mean_torque)["k_dyn"][0]
-    return k
-
-
-def _k_dyn(chain: Machine, controller: Controller, nominal: Machine | None) -> float:
-    fitted: Any = nominal
     try:
-        return float(simulate(chain, controller, fitted_to=fitted, max_events=MAP_EVENTS).k_dyn)
-    except (InputError, SimulationError):
-        return math.nan
+        opened = machine.moved(max(gaps), inertia, origin) if machine.gap_and_inertia[0] == 0.0 else machine
+        machines = varied(opened, {"gap": list(gaps), "load_inertia": inertia})
+        notes = array_starts(machines, controller, fitted_to=nominal, max_events=MAP_EVENTS)
+        k: Vector = figures(notes, (nominal or machines).mean_torque)["k_dyn"][0]
+        return k
+    except InputError:
+        if len(gaps) == 1:
+            return np.array([math.nan])
+    return np.concatenate([k_dyn_row(machine, controller, (gap,), inertia, nominal, origin) for gap in gaps])
 
 
 def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
