@@ -14,7 +14,6 @@ import pytest
 from tests.controllers.starts import CRANE, index, random_drive, traced
 
 from softstart import Drive, records, simulate
-from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
 from softstart_controllers.shaft_observer import design, predict
@@ -73,7 +72,7 @@ def test_estimates_stay_close(gap: float, J2: float, lag: float, kind: Any) -> N
     drive = crane(gap, J2, lag, kind)
     run, trace = traced(drive, CurrentLimitFeedback())
     true = run.at(trace[:, 0])
-    error = (trace[:, 1 + index(clf.STATE, "T")] - true["T"]) / base_torque(drive)
+    error = (trace[:, 1 + index(clf.STATE, "T")] - true["T"]) / drive.mean_torque
     first_gap = trace[:, 0] < run.first_contact
     assert np.abs(error[first_gap]).max() < 0.05
     assert np.sqrt(np.mean(error**2)) < 0.07

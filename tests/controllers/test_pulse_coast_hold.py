@@ -21,7 +21,7 @@ from tests.twin import plain
 from softstart import Drive, InputError, Records, records, simulate
 from softstart.kernel.records import size
 from softstart.optimal.solving import optimize
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart_controllers import pulse_coast_hold_step as stepping
 from softstart_controllers import shaft_filter as sf
 from softstart_controllers.contact import (
@@ -50,8 +50,8 @@ def told(kind: Any, **changed: Any) -> Drive:
 
 def started(batch: Records, nominal: Any, controller: PulseCoastHold | None = None) -> dict[str, Any]:
     """Figures of many starts, in their shape."""
-    notes = array_starts(batch, controller or PulseCoastHold(), fitted_to=nominal)
-    found = figures(notes, batch.mean_torque)
+    set_ups = (controller or PulseCoastHold()).set_ups(nominal)
+    found = prepared(batch).figures(set_ups, batch.mean_torque)
     return {name: values.reshape(batch.shape) for name, (values, _, _) in found.items()}
 
 

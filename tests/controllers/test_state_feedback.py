@@ -14,7 +14,6 @@ from tests.controllers.starts import CRANE, index, traced
 from softstart import Drive, InputError, records, simulate
 from softstart.controller.base import numbers_of
 from softstart.drive import library
-from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback as sf
 from softstart_controllers.contact_designs import (
@@ -199,7 +198,7 @@ def test_estimates_stay_close_from_the_first_look_on(gap: float, J2: float, lag:
     run, trace = traced(drive, StateFeedback())
     closed = trace[trace[:, 1 + index(sf.STATE, "phase")] == sf.CLOSED]
     true = run.at(closed[:, 0])
-    base = base_torque(drive)
+    base = drive.mean_torque
     assert np.abs(drive.c * closed[:, 1 + index(sf.STATE, "z")] - true["T"]).max() < 0.1 * base
     assert np.abs(closed[:, 1 + index(sf.STATE, "speed")] - true["w1"]).max() < 0.8
     assert np.abs(closed[:, 1 + index(sf.STATE, "load")] - drive.Mc).max() < 0.25 * base
@@ -234,7 +233,7 @@ def test_a_heavier_load_torque_is_estimated_and_allowed_for() -> None:
     ideal = CRANE.replace(encoder_lines=0)
     heavier = ideal.replace(load_torque=14.0, target_speed=400.0)
     run = simulate(heavier, StateFeedback(), fitted_to=ideal)
-    assert run.T[-1] == pytest.approx(base_torque(CRANE), rel=1e-9)
+    assert run.T[-1] == pytest.approx(CRANE.mean_torque, rel=1e-9)
     assert run.u[-1] == pytest.approx(62.0 - (14.0 - CRANE.Mc) * CRANE.J1 / CRANE.J2, rel=1e-6)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from softstart import Drive, InputError, SimulationError, compare, records, simulate
 from softstart.controller import make_controller
-from softstart.start.batch import array_starts
+from softstart.start.batch import prepared
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -51,7 +51,7 @@ def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
     try:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.5)
         with pytest.raises(KeyboardInterrupt):
-            array_starts(many, make_controller("current-limit-feedback"))
+            prepared(many).notes(make_controller("current-limit-feedback").set_ups(CRANE))
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
         signal.signal(signal.SIGVTALRM, before)
@@ -60,11 +60,11 @@ def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
 
 def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     many, ramp = records(CRANE, gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
-    whole = array_starts(many, ramp)
+    whole = prepared(many).notes(ramp.set_ups(many))
     monkeypatch.setattr(
         "softstart.start.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
     )
-    parts = array_starts(many, ramp)
+    parts = prepared(many).notes(ramp.set_ups(many))
     assert parts.starts.tobytes() == whole.starts.tobytes()
     assert parts.shafts.tobytes() == whole.shafts.tobytes()
 

@@ -16,7 +16,7 @@ from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.doubts import doubts
 from softstart.kernel.records import S_REF, S_SLOPE, S_START
-from softstart.start.batch import array_starts
+from softstart.start.batch import prepared
 from softstart.views import starts
 
 CRANE = Drive.load("crane-4amtkf")
@@ -204,7 +204,8 @@ def test_unknown_is_the_worst_of_three(name: str) -> None:
         assert run.start_time == max(one.start_time for one in three.values())
         assert run.impact_speed == max(one.impact_speed for one in three.values())
         assert run.summary()["positions"]["worst"] == run.position
-        notes = array_starts(records(drive, gap=[drive.gap]), make_controller(name))
+        batch = prepared(records(drive, gap=[drive.gap]))
+        notes = batch.notes([make_controller(name).set_up(drive)])
         many = simulate([drive], name)
         assert float(many.k_dyn[0]) == run.k_dyn
         assert float(many.start_time[0]) == run.start_time

@@ -12,13 +12,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from softstart import formulas
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.profile import TorqueProfile
-from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -48,7 +48,8 @@ class Verification:
     @property
     def chain_k_dyn(self) -> float:
         """Its largest torque over the mean torque of the drive."""
-        return float(metrics.k_dyn(float(self.chain.peak_torques[self.worst_shaft]), self.drive.drive))
+        peak = float(self.chain.peak_torques[self.worst_shaft])
+        return float(formulas.dynamic_coefficient(peak, self.drive.drive.mean_torque))
 
     @property
     def error(self) -> float:

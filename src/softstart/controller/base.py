@@ -256,11 +256,11 @@ class Controller:
         drive = drive.design_drive
         return self.fitted(drive), drive
 
-    def set_ups(self, drives: Drive | Sequence[Drive] | Records) -> Iterator[SetUp]:
-        """`set_up` for each of several machines, last index fastest; parameters may be such arrays.
+    def set_ups(self, drives: Any) -> Iterator[SetUp]:
+        """`set_up` for each machine of records or a list, last index fastest, or for a single one.
 
-        The only place where a controller meets arrays: parameters go with the machines, or all with a single
-        one.
+        The only place where a controller meets arrays: its parameters may be some, as many as machines, or of
+        any length for a single one.
 
         >>> from softstart.controller import make_controller
         >>> crane = Drive.load("crane-4amtkf")
@@ -274,7 +274,7 @@ class Controller:
             if isinstance(value := getattr(self, f.name), np.ndarray)
             and f.metadata.get("kind", "quantity") == "quantity"
         }
-        given: Iterable[Drive]
+        given: Iterable[Any]
         if isinstance(drives, Records):
             given, shape = drives.elements(), drives.shape
         elif isinstance(drives, Sequence):

@@ -22,7 +22,6 @@ from softstart.arrays import Vector
 from softstart.controller.base import Controller, Effort, Sensor, SetUp, label_of
 from softstart.controller.finding import GAIN_FILES, make_controller
 from softstart.drive import Drive
-from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
 from softstart.input.documents import literal, parsed
@@ -112,7 +111,7 @@ class RobustGains(Tuned):
         ready, own = self.controller.set_up(self.nominal)
         return self._called(ready), own
 
-    def set_ups(self, drives: Drive | Sequence[Drive] | Records) -> Iterator[SetUp]:
+    def set_ups(self, drives: Any) -> Iterator[SetUp]:
         """One for all drives."""
         yield self.set_up(self.nominal)
 

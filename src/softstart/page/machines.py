@@ -18,7 +18,7 @@ from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable
 
 STEPS = 600
@@ -413,8 +413,8 @@ def k_dyn_row(
     try:
         opened = machine.moved(max(gaps), inertia, origin) if machine.gap_and_inertia[0] == 0.0 else machine
         machines = varied(opened, {"gap": list(gaps), "load_inertia": inertia})
-        notes = array_starts(machines, controller, fitted_to=nominal, max_events=MAP_EVENTS)
-        k: Vector = figures(notes, (nominal or machines).mean_torque)["k_dyn"][0]
+        starts, set_ups = prepared(machines, None, MAP_EVENTS), controller.set_ups(nominal or machines)
+        k: Vector = starts.figures(set_ups, (nominal or machines).mean_torque)["k_dyn"][0]
         return k
     except InputError:
         if len(gaps) == 1:

@@ -14,7 +14,6 @@ from softstart.drive import PARAMETERS, Drive
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
-from softstart.start import metrics
 from softstart.start.fatigue import HOURS_PER_YEAR
 from softstart.views import chain_schemes
 from softstart.views.printed import RPM, at_output, digits, short, unit, units_of
@@ -99,7 +98,7 @@ def _data(drive: Drive, project: Project) -> Html:
 
 def _derived(drive: Drive) -> Html:
     (rated, basis), units = rated_torque(drive), units_of(drive)
-    mean, twist = float(metrics.base_torque(drive)), units.shown(float(drive.Ms / drive.c), "rad")
+    mean, twist = drive.mean_torque, units.shown(float(drive.Ms / drive.c), "rad")
     found = [
         f"mean shaft torque under the starting torque (K_dyn = 1) {digits(mean)} N m",
         f"elastic frequency with the gap closed {digits(float(drive.Omega) / (2.0 * math.pi))} Hz",

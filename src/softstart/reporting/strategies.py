@@ -14,7 +14,6 @@ from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive
 from softstart.errors import listed
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
-from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
@@ -86,7 +85,7 @@ def strategies_section(
     }
     columns = {heading: cells for heading, cells in columns.items() if any(cells)}
     strong = [rows.index(row) for row in chosen]
-    base = float(metrics.base_torque(drive))
+    base = drive.mean_torque
     notes = [
         (
             f"K_dyn is the largest shaft torque of the whole start, divided by {digits(base)} N m, the mean "

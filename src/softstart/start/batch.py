@@ -169,23 +169,6 @@ def _parts(count: int) -> Iterator[slice]:
         room = max(1, int(room * min(share, 4.0)))
 
 
-def array_starts(
-    machines: Records | Sequence[Any],
-    controller: Controller | Iterable[SetUp],
-    until: float | None = None,
-    fitted_to: Any = None,
-    time_limit: float | None = None,
-    max_events: int = MAX_EVENTS,
-) -> Notes:
-    """The kernel's notes of the starts of many machines; `figures` turns them into labelled figures.
-
-    The controller is set up for each machine, or for `fitted_to`; set-ups that are given serve all starts,
-    one each, or as many in a row. Unlike `simulate`, nothing is checked.
-    """
-    set_ups = controller.set_ups(fitted_to or machines) if isinstance(controller, Controller) else controller
-    return prepared(machines, time_limit, max_events).notes(set_ups, until=until)
-
-
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Machines as rows of the kernel, written once for many calls: a row for each position of each.
@@ -321,11 +304,11 @@ def _limits_of(parts: Sequence[Any]) -> Limits:
     return Limits(every("shaft_torque"), every("start_time"), used_torque=limits[0].used_torque)
 
 
-def figures(notes: Notes, base: Any, until: float | None = None, limits: Limits | None = None) -> Figures:
+def figures(notes: Notes, base: Any, until: float | None = None) -> Figures:
     """The figures of many starts as name -> (values, unit, meaning).
 
-    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start; `limits`
-    likewise, whose life is not checked. Starts that could not be finished have NaN.
+    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
+    could not be finished have NaN.
     """
     reached = ~np.isnan(notes["start_time"])
     held = notes["braked"] == 1.0
@@ -360,8 +343,6 @@ def figures(notes: Notes, base: Any, until: float | None = None, limits: Limits 
     if np.any(notes["position"]):
         names = np.array(["", *UNKNOWN_POSITIONS])[notes["position"].astype(np.int64)]
         found["position"] = (names, "", "position with the largest |T|, of those that are possible")
-    if limits is not None:
-        found |= margins(found, limits)
     found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return found
 

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from softstart.chain.machines import Machine, one_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
@@ -21,7 +22,7 @@ from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import Machine, simulate
+from softstart.start.simulation import simulate
 
 notebook = late("softstart.views.notebook")
 
@@ -198,18 +199,11 @@ def compare(
     ----------
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
-    if isinstance(drive, str):
-        from softstart.chain.model import load_machine
-
-        drive = load_machine(drive)
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    if not is_machine(drive):
-        raise InputError(
-            f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
-        )
+    drive = one_machine(drive)
     if fitted_to is not None and not is_machine(fitted_to):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
     counted = (

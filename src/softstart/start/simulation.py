@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, overload
 
+from softstart.chain.machines import Machine
+from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
-from softstart.drive import Drive
 from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
@@ -23,34 +24,9 @@ if TYPE_CHECKING:
     from softstart.chain.periodic_torque import PeriodicTorque
 
 
-class Machine(Protocol):
-    """What a start asks of a machine: `softstart.drive.Drive` and `softstart.chain.Chain` are both one."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def positions(self) -> Mapping[str, Any]:
-        """The machine at each position at which it may start: one, or three if that is unknown."""
-
-    @property
-    def design_drive(self) -> Drive:
-        """The two masses that controllers are set up for."""
-
-    @property
-    def mean_torque(self) -> Any:
-        """M12avg, N m at the motor shaft, to which K_dyn refers, [G](16)."""
-
-    @property
-    def limits(self) -> Any: ...
-    @property
-    def shaft_names(self) -> tuple[str, ...]: ...
-    def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
-        """The machine with so many times its gaps, and its load inertia."""
-
-
 @overload
 def simulate(
-    drive: Drive | Machine | str,
+    drive: Machine | str,
     controller: str | Controller | None,
     until: float | None = ...,
     *,
@@ -64,7 +40,7 @@ def simulate(
 ) -> Run: ...
 @overload
 def simulate(
-    drive: Records | Sequence[Drive] | Sequence[Machine],
+    drive: Records | Sequence[Machine],
     controller: str | Controller | None,
     until: float | None = ...,
     *,
@@ -154,8 +130,6 @@ def simulate(
     event is missed, and accuracy: docs/theory/numerics.md.
     """
     if isinstance(drive, str):
-        from softstart.chain.model import load_machine
-
         drive = load_machine(drive)
     made = None if controller is None else make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")

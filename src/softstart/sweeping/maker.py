@@ -154,7 +154,7 @@ def _digested(value: object) -> Any:
         path = Path(value)
         return [path.name, _of_file(path)] if path.suffix and path.is_file() else str(value)
     if is_machine(value):
-        return value.to_toml()
+        return value.to_toml()  # type: ignore[attr-defined]
     if isinstance(value, np.ndarray):
         return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
     if isinstance(value, list | tuple):

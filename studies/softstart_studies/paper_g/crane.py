@@ -10,7 +10,6 @@ from scipy.optimize import brentq
 from softstart import Drive, Records, Run, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
-from softstart.start.metrics import base_torque
 
 Method = Literal[1, 2]
 
@@ -40,7 +39,7 @@ def base() -> float:
     >>> round(base(), 2)
     52.86
     """
-    return float(base_torque(CRANE))
+    return CRANE.mean_torque
 
 
 def closed_form(

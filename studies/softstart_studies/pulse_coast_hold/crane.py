@@ -15,7 +15,7 @@ from softstart.controller import Controller
 from softstart.drive import LoadKind
 from softstart.optimal.result import OptimumError
 from softstart.optimal.solving import optimize
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart_studies.paper_g.crane import published
 
 TARGET = 60.0  # rad/s
@@ -72,8 +72,7 @@ class Starts:
 def run(batch: Records, controller: str | Controller, told: Drive) -> Starts:
     """Start all drives of the batch under a controller set up for the drive that it is told."""
     ready = published(controller) if isinstance(controller, str) else controller
-    notes = array_starts(batch, ready, fitted_to=told)
-    found = figures(notes, batch.mean_torque)
+    found = prepared(batch).figures(ready.set_ups(told), batch.mean_torque)
     return Starts(*(found[name][0].reshape(batch.shape) for name in ("k_dyn", "start_time", "contacts")))
 
 
