@@ -98,14 +98,6 @@ def test_batch_equals_single_starts(name: str, kind: Any) -> None:
 
 
 @pytest.mark.parametrize("name", SAMPLED)
-def test_batch_of_two_dimensions(name: str) -> None:
-    batch = records(CRANE, gap=np.array([[0.5], [2.0]]), load_inertia=np.array([0.07, 0.175, 0.3]))
-    result = simulate(batch, name)
-    assert result.k_dyn.shape == (2, 3)
-    assert result.k_dyn.values[1, 0] == simulate(CRANE.replace(gap=2.0, load_inertia=0.07), name).k_dyn
-
-
-@pytest.mark.parametrize("name", SAMPLED)
 def test_reaches_the_target_speed_of_any_sensible_drive(name: str) -> None:
     rng = np.random.default_rng(11)
     for _ in range(150):

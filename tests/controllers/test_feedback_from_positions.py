@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 import pytest
 
-from softstart import Drive, Run, records, simulate
+from softstart import Drive, Run, simulate
 from softstart.drive import UNKNOWN_POSITIONS, library
 
 FEEDBACK = ("pulse-coast-hold", "shaped", "state-feedback", "current-limit-feedback")
@@ -81,14 +81,6 @@ def test_state_feedback_holds_its_reference_while_the_brake_holds() -> None:
     held = run.at(np.linspace(0.0, 0.1, 50))
     np.testing.assert_allclose(held["T"], 120.0, rtol=1e-12)
     assert float(run.at(0.1)["u"]) > 100.0  # it does not let the load down at the release
-
-
-@pytest.mark.parametrize("release", ["torque", 0.05])
-def test_a_batch_that_hangs_is_its_single_starts(release: object) -> None:
-    batch = records(HOIST, load_torque=[60.0, 120.0], gap=[0.05, 0.2], release=release)
-    together = simulate(batch, "state-feedback")
-    single = [simulate(one, "state-feedback").k_dyn for one in batch.elements()]
-    assert together.k_dyn.values.tolist() == single
 
 
 def test_state_feedback_uses_no_position_but_hanging() -> None:

@@ -134,15 +134,6 @@ def test_it_sees_the_contact_only_where_it_needs_to() -> None:
     assert Profile(profile=SENSED).sensors == Sensor.STAGE
 
 
-@pytest.mark.parametrize("limits", [70.0, [62.0, 66.0, 70.0]])
-def test_records_have_the_bits_of_single_starts(limits: float | list[float]) -> None:
-    drives = records(CRANE, gap=[0.5, 1.0, 2.0], maximum_torque=limits)
-    controller = Profile(profile=TorqueProfile([0.0, 0.1], [0.0, 90.0], after_contact=SENSED.after_contact))
-    many = simulate(drives, controller)
-    for i, one in enumerate(drives.elements()):
-        assert float(many.k_dyn[i]) == simulate(one, controller).k_dyn
-
-
 def test_its_parameters_are_short_and_plain(tmp_path: Path) -> None:
     pulse = TorqueProfile([0.0, 0.2], [62.0, 10.0])
     told = simulate(CRANE, Profile(profile=pulse)).summary()["parameters"]

@@ -27,17 +27,6 @@ def test_one_dimension_is_called_start_and_carries_the_field() -> None:
         assert data[name].attrs["long_name"]
 
 
-def test_fields_broadcast_to_a_grid() -> None:
-    gaps, inertias = np.array([0.5, 2.0]), np.array([0.07, 0.1, 0.175])
-    data = simulate(records(CRANE, gap=gaps[:, None], load_inertia=inertias[None, :]), "reduced-two-stage")
-    assert data.k_dyn.dims == ("axis_0", "axis_1")
-    assert data.k_dyn.shape == (2, 3)
-    one = simulate(CRANE.replace(gap=2.0, load_inertia=0.1), "reduced-two-stage")
-    assert float(data.k_dyn[1, 1]) == one.k_dyn
-    assert float(data.gap[1, 1]) == 2.0
-    assert float(data.load_inertia[1, 1]) == 0.1
-
-
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no interval timer")
 def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
     """The kernel hears no signal; a batch of some minutes is given to it in turns, and ends between two."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import pickle
 from typing import Any
@@ -23,18 +22,12 @@ CHAIN = Chain.load("crane-4-mass")
 FIGURES = ("k_dyn", "start_time", "contacts", "impact_speed", "peak_time", "end_time")
 
 
-def alone(machine: Any, controller: str, name: str, **options: Any) -> float:
-    return float(simulate(machine, controller, **options).summary()[name])
-
-
-def assert_bits_of_single_starts(many: Records, controller: str, **options: Any) -> None:
-    found: Any = simulate(many, controller, **options)
+def assert_bits_of_single_starts(many: Records, controller: str) -> list[float]:
+    found: Any = simulate(many, controller)
+    runs = [simulate(one, controller).summary() for one in many.elements()]
     for name in FIGURES:
-        own = [alone(one, controller, name, **options) for one in many.elements()]
-        np.testing.assert_array_equal(found[name].values.ravel(), own, err_msg=name)
-
-
-# what they are -------------------------------------------------------------------------------------------
+        np.testing.assert_array_equal(found[name].values.ravel(), [run[name] for run in runs], err_msg=name)
+    return [float(run["k_dyn"]) for run in runs]
 
 
 def test_fields_in_si_of_one_shape() -> None:
@@ -47,26 +40,22 @@ def test_fields_in_si_of_one_shape() -> None:
     assert each[5] == CRANE.replace(gap=2.0, load_inertia=0.2, damping=0.5)
     assert all(type(one) is Drive and isinstance(one.gap, float) for one in each)
     assert repr(many) == f"<Records of {CRANE.name}: gap, load_inertia of shape (3, 2)>"
-
-
-def test_defaults_are_derived_for_each() -> None:
+    found: Any = simulate(many, "reduced-two-stage")
+    assert found.k_dyn.dims == ("axis_0", "axis_1")
+    assert found.load_inertia.values.tolist() == many.fields["load_inertia"].tolist()
     one, other = records(CRANE.replace(maximum_torque=None), starting_torque=[62, 80]).elements()
-    assert (one.maximum_torque, other.maximum_torque) == (62.0, 80.0)
+    assert (one.maximum_torque, other.maximum_torque) == (62.0, 80.0)  # derived for each
     assert other.replace(starting_torque=100).maximum_torque == 100
-    assert other.Omega == CRANE.Omega
 
 
 def test_they_cannot_be_changed_from_outside() -> None:
     gaps = np.array([1.0, 2.0])
     many = records(CRANE, gap=gaps)
     gaps[0] = 7.0
-    for one in (many, pickle.loads(pickle.dumps(many)), copy.copy(many)):
-        assert one.fields["gap"][0] == 1.0
-        assert [drive.gap for drive in one.elements()] == [1.0, 2.0]
+    for one in (many, pickle.loads(pickle.dumps(many))):
+        assert [drive.gap for drive in one.elements()] == one.fields["gap"].tolist() == [1.0, 2.0]
     with pytest.raises(ValueError, match="read-only"):
         many.fields["gap"][0] = 3.0
-    with pytest.raises(AttributeError):
-        many.machine = CRANE  # type: ignore[misc]
 
 
 def test_records_differ_in_further_fields() -> None:
@@ -86,11 +75,8 @@ def test_records_differ_in_further_fields() -> None:
 def test_an_angle_stays_where_it_is_or_moves_with_its_gap() -> None:
     flank = CRANE.replace(start_position=0.25)
     assert [one.theta0 for one in records(flank, gap=[0.5, 1.0]).elements()] == [0.25, 0.25]
-    assert [one.theta0 for one in varied(flank, {"gap": [0.5, 1.0]}).elements()] == [0.25, 0.5]
-    assert list(varied(flank, {"gap": [0.7, 3.0]}).elements()) == [flank.with_gap(0.7), flank.with_gap(3.0)]
+    assert list(varied(flank, {"gap": [0.5, 3.0]}).elements()) == [flank.with_gap(0.5), flank.with_gap(3.0)]
 
-
-# their starts --------------------------------------------------------------------------------------------
 
 STARTS = {
     "gap": st.floats(0.0, 3.0),
@@ -101,82 +87,70 @@ STARTS = {
     "torque_lag": st.just(0.0) | st.floats(1e-4, 0.01),
     "start_position": st.floats(-0.3, 0.3),
     "motor_friction": st.floats(0.0, 5.0),
+    "motor_viscous_friction": st.floats(0.0, 0.02),
+    "load_viscous_friction": st.floats(0.0, 0.03),
+    "noise_seed": st.integers(0, 3),
 }
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(st.data())
 def test_every_figure_has_the_bits_of_a_single_start(data: st.DataObject) -> None:
-    names = data.draw(st.sets(st.sampled_from(sorted(STARTS)), min_size=1, max_size=4))
+    names = sorted(data.draw(st.sets(st.sampled_from(sorted(STARTS)), min_size=1, max_size=4)))
     size = data.draw(st.integers(1, 3))
-    fields: dict[str, Any] = {
-        name: np.array(data.draw(st.lists(STARTS[name], min_size=size, max_size=size))) for name in names
-    }
+    fields = {one: np.array(data.draw(st.lists(STARTS[one], min_size=size, max_size=size))) for one in names}
     if data.draw(st.booleans()):  # one field along an axis of its own
-        name = sorted(names)[0]
-        fields[name] = fields[name][:, None]
-    drive = CRANE.replace(load_kind=data.draw(st.sampled_from(["active", "reactive"])))
-    controller = data.draw(st.sampled_from(["direct", "ramp", "pulse-coast-hold"]))
+        fields[names[0]] = fields[names[0]][:, None]
+    kind = data.draw(st.sampled_from(["active", "reactive"]))
+    drive = CRANE.replace(load_kind=kind, torque_noise=0.5)
+    controller = data.draw(st.sampled_from(["direct", "ramp", "pulse-coast-hold", "current-limit-feedback"]))
     assert_bits_of_single_starts(records(drive, **fields), controller)
 
 
-def test_the_worst_of_unknown_positions_is_that_of_each() -> None:
-    drive = CRANE.replace(load_kind="reactive", start_position="unknown")
-    many = records(drive, gap=[0.2, 0.5, 2.0])
-    assert_bits_of_single_starts(many, "reduced-first-stage")
-    found: Any = simulate(many, "reduced-first-stage")
-    own = [simulate(one, "reduced-first-stage").position for one in many.elements()]
+def test_noise_positions_and_brakes_have_the_bits_of_single_starts() -> None:
+    noisy = records(CRANE, torque_noise=1.0, noise_seed=[0.0, 1.0, 2.0], torque_lag=0.002)
+    assert len(set(assert_bits_of_single_starts(noisy, "current-limit-feedback"))) == 3
+    hoist = CRANE.replace(load_torque=40.0, brake="motor", start_position="hanging", damping=0.3)
+    for release in ("torque", 0.05):
+        hanging = records(hoist, load_torque=[30.0, 40.0], gap=[0.05, 0.2], release=release)
+        assert_bits_of_single_starts(hanging, "state-feedback")
+    unknown = records(CRANE, load_kind="reactive", start_position="unknown", gap=[0.2, 0.5, 2.0])
+    assert_bits_of_single_starts(unknown, "reduced-first-stage")
+    found: Any = simulate(unknown, "reduced-first-stage")
+    own = [simulate(one, "reduced-first-stage").position for one in unknown.elements()]
     assert found.position.values.tolist() == own
 
 
-def test_controllers_and_bases_of_other_drives() -> None:
-    many = records(CRANE, gap=[0.5, 2.0])
+def test_controllers_bases_parameters_and_limits_of_each() -> None:
+    many = records(CRANE, gap=[0.5, 2.0], permissible_torque=[100.0, 200.0], permissible_start_time=1.0)
     fitted, base = records(CRANE, gap=[0.4, 1.0]), records(CRANE, load_inertia=[0.1, 0.3])
-    found: Any = simulate(many, "ramp", fitted_to=fitted, base=base)
-    for i, three in enumerate(zip(many.elements(), fitted.elements(), base.elements(), strict=True)):
-        run = simulate(three[0], "ramp", fitted_to=three[1], base=three[2])
-        assert float(found.k_dyn[i]) == run.k_dyn
-    listed: Any = simulate(list(many.elements()), "ramp", workers=2)
-    own: Any = simulate(many, "ramp", workers=1)
-    assert listed.k_dyn.values.tobytes() == own.k_dyn.values.tobytes()
-
-
-def test_parameters_of_a_controller_go_with_the_machines() -> None:
+    found: Any = simulate(many, "ramp", fitted_to=fitted, base=base, workers=2)
     times = np.array([0.05, 0.2])
-    found: Any = simulate(records(CRANE, gap=[0.5, 2.0]), make_controller("ramp", {"time": times}))
-    for i, gap in enumerate((0.5, 2.0)):
-        run = simulate(CRANE.replace(gap=gap), "ramp", parameters={"time": times[i]})
+    timed: Any = simulate(many, make_controller("ramp", {"time": times}))
+    for i, (one, told, of) in enumerate(
+        zip(many.elements(), fitted.elements(), base.elements(), strict=True)
+    ):
+        run = simulate(one, "ramp", fitted_to=told, base=of)
         assert float(found.k_dyn[i]) == run.k_dyn
-
-
-def test_limits_may_differ() -> None:
-    many = records(CRANE, permissible_torque=[100.0, 200.0], permissible_start_time=1.0)
-    found: Any = simulate(many, "direct")
-    assert found.keeps_limits.values.tolist() == [0.0, 1.0]
-    run = simulate(CRANE, "direct")
-    assert found.margin.values[0] == pytest.approx(1.0 - run.peak_torque / 100.0, rel=1e-12)
-
-
-# chains --------------------------------------------------------------------------------------------------
+        share = min(1.0 - run.peak_torque / one.permissible_torque, 1.0 - run.start_time)
+        assert float(found.margin[i]) == pytest.approx(share, rel=1e-12)
+        assert float(found.keeps_limits[i]) == (share >= 0.0)
+        assert float(timed.k_dyn[i]) == simulate(one, "ramp", parameters={"time": times[i]}).k_dyn
 
 
 def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
-    many = records(CHAIN, gap=[[0.5], [1.0]], shaft_2_stiffness=["4e5 N*m/rad", 5e5], load_torque=100.0)
+    many = records(
+        "crane-4-mass", gap=[[0.5], [1.0]], shaft_2_stiffness=["4e5 N*m/rad", 5e5], load_torque=100
+    )
     assert list(many.fields) == ["gap", "shaft_2_stiffness"]
     each = list(many.elements())
     assert each[3] == CHAIN.with_values({"gap": 1.0, "shaft_2_stiffness": 5e5, "load_torque": 100.0})
     found: Any = simulate(many, "ramp")
-    assert found.k_dyn.dims == ("axis_0", "axis_1")
     assert found.k_dyns.dims == ("axis_0", "axis_1", "shaft")
     assert found.gap.values.tolist() == [[0.5, 0.5], [1.0, 1.0]]
     runs = [simulate(one, "ramp") for one in each]
     assert found.k_dyn.values.ravel().tolist() == [run.k_dyn for run in runs]
     assert found.k_dyns.values.reshape(4, 3).tolist() == [run.k_dyns.tolist() for run in runs]
-    listed: Any = simulate(each, "ramp")
-    assert listed.k_dyns.values.tobytes() == found.k_dyns.values.tobytes()
-
-
-# what is refused -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -193,13 +167,13 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
         (CRANE, {"gap": [[0.5, -1.0]]}, "gap[0, 1] = -1.0: the total angular gap must be 0 or more"),
         (CHAIN, {"load_inertia": [60.0, -1.0]}, "load_inertia[1] = -1.0: "),
         (CHAIN, {"shaft_2_gap": [0.5, "1 m"]}, "shaft_2_gap[1] = "),
-        (CRANE, {"starting_torque": [62, 5]}, "starting_torque[1] = 5 N*m: the starting torque cannot move"),
+        (CRANE, {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]}, "starting_torque[1] = 5 N*m: "
+         "the starting torque cannot move the load against load_torque[0, 0] = 7 N*m"),
         (CRANE, {"gap": [0.5, "2 kg"]}, 'gap[1] = "2 kg": kg is a mass, not an angle'),
         (CRANE, {"gap": [0.5], "damping": -1}, "damping = -1: "),
         (CRANE, {"load_kind": ["active", "reactive"]}, "load_kind"),
         (CRANE, {"gap": 0.5}, "records: all fields are single values; give a list for one"),
-        (CRANE, {}, "records: all fields are single values"),
-        (CHAIN, {"gap": 0.5}, "records: all fields are single values"),
+        (CHAIN, {}, "records: all fields are single values"),
         (5, {"gap": [0.5]}, "drive: give one Drive or Chain"),
     ],
 )  # fmt: skip
@@ -211,8 +185,7 @@ def test_what_no_machine_can_have(machine: Any, fields: dict[str, Any], said: st
 
 
 def test_all_mistakes_at_once() -> None:
-    for machine, near in ((CRANE, "gap"), (CHAIN, "gap")):
+    for machine in (CRANE, CHAIN):
         with pytest.raises(InputError) as caught:
             records(machine, gapp=[1.0], load_inertia=[-1.0], stiffness=["soft"])
         assert len(caught.value.sentences) == 3
-        assert f"did you mean {near}?" in str(caught.value)

@@ -187,7 +187,7 @@ class Batch:
     def notes(
         self,
         set_ups: Iterable[SetUp],
-        which: Which | None = None,
+        which: Which | slice = slice(None),
         *,
         until: float | None = None,
         time_limit: float | None = None,
@@ -197,16 +197,12 @@ class Batch:
 
         The set-ups of the controller serve all places, one each, or as many in a row.
         """
-        ready = numbers_of(set_ups)
-        if len(self.places) == 1 and which is None:
-            return notes_of(self.rows.limited(time_limit), ready, until, workers)
-        places, sizes = self.places, self.positions
-        if which is not None:
-            places, sizes = places[:, which], sizes[which]
-        notes = [
-            notes_of(self.rows.taken(rows).limited(time_limit), ready, until, workers)
-            for rows in places[: int(sizes.max(initial=1))]
-        ]
+        ready, sizes = numbers_of(set_ups), self.positions[which]
+        # all of a million starts are not copied
+        alone = isinstance(which, slice) and len(self.places) == 1
+        each = [slice(None)] if alone else self.places[: int(sizes.max(initial=1)), which]
+        taken = (self.rows.taken(rows).limited(time_limit) for rows in each)
+        notes = [notes_of(rows, ready, until, workers) for rows in taken]
         if len(notes) == 1:
             return notes[0]
         worst = worst_of(notes)
@@ -217,7 +213,7 @@ class Batch:
         self,
         set_ups: Iterable[SetUp],
         base: Any,
-        which: Which | None = None,
+        which: Which | slice = slice(None),
         *,
         until: float | None = None,
         time_limit: float | None = None,
@@ -228,7 +224,7 @@ class Batch:
         return self.read(notes, base, which, until)
 
     def read(
-        self, notes: Notes, base: Any, which: Which | None = None, until: float | None = None
+        self, notes: Notes, base: Any, which: Which | slice = slice(None), until: float | None = None
     ) -> Figures:
         """The figures in the kernel's notes."""
         found, names = figures(notes, base, until), self.shaft_names
@@ -240,15 +236,12 @@ class Batch:
                 found[f"k_dyn_{k + 1}"] = (largest[:, k] / means, "1", f"K_dyn of {place}")
             for k, place in enumerate(names):
                 found[f"peak_torque_{k + 1}"] = (largest[:, k], "N*m", f"largest |T| of {place}")
-            permissible = self.permissible if which is None else self.permissible[which]
-            used = 100.0 * np.nan_to_num(largest / permissible).max(axis=1)
+            used = 100.0 * np.nan_to_num(largest / self.permissible[which]).max(axis=1)
             meaning = "largest |T| over what its shaft permits"
             found["used_torque"] = (np.where(np.isnan(found["k_dyn"][0]), np.nan, used), "%", meaning)
-        limits: Any = self.limits
-        if which is not None:
-            own = (limits.shaft_torque, limits.start_time)
-            torque, time_ = (None if one is None else one[which] for one in own)
-            limits = replace(limits, shaft_torque=torque, start_time=time_)
+        every: Any = (self.limits.shaft_torque, self.limits.start_time)
+        torque, time_limit = (None if most is None else most[which] for most in every)
+        limits = replace(self.limits, shaft_torque=torque, start_time=time_limit)
         return {**found, **margins(found, limits), "status": status}
 
 
@@ -257,9 +250,9 @@ def named(shaft_names: tuple[str, ...]) -> Figures:
     count, zero = len(shaft_names), np.zeros(1, dtype=np.int64)
     notes = Notes(np.zeros(1, at.NOTES), np.zeros((1, count), at.SHAFT_NOTES))
     notes.starts["release_time"] = math.nan
-    limits = Limits(shaft_torque=1.0, used_torque=1.0)
-    rows = blank((), count + 1)
-    return Batch(shaft_names, zero[None], zero + 1, rows, np.ones((1, count)), limits).read(notes, 1.0)
+    limits: Any = Limits(shaft_torque=np.ones(1), used_torque=1.0)  # type: ignore[arg-type]
+    rows, permissible = blank((), count + 1), np.ones((1, count))
+    return Batch(shaft_names, zero[None], zero + 1, rows, permissible, limits).read(notes, 1.0)
 
 
 def prepared(

@@ -88,19 +88,6 @@ def test_several_cross_checks_at_once(sentences):
     assert [s.split(" ")[0] for s in found] == ["maximum_torque", "load_torque", "initial_load_speed"]
 
 
-def test_arrays_that_do_not_fit(sentences):
-    (sentence,) = sentences(lambda: records(Drive(**GOOD), gap=[1, 2, 3], load_inertia=[1, 2]))
-    assert sentence.startswith("gap has shape (3,), load_inertia has shape (2,): ")
-
-
-def test_a_cross_check_names_the_elements(sentences):
-    (sentence,) = sentences(
-        lambda: records(Drive(**GOOD), starting_torque=[62, 5, 70], load_torque=[[7.0], [8.0]])
-    )
-    assert sentence.startswith("starting_torque[1] = 5 N*m: ")
-    assert "load_torque[0, 0] = 7 N*m" in sentence
-
-
 SETTINGS = [
     ("load.inertia", '"load.inertia": ', "a key, an equals sign and a value"),
     ("=0.07", '"=0.07": ', "a key, an equals sign and a value"),

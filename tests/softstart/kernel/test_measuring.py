@@ -93,15 +93,6 @@ def test_noise_lies_on_the_measured_torque_alone():
     assert error == pytest.approx([0.5 * gauss(3.0, float(i)) for i in range(error.size)], abs=1e-12)
 
 
-def test_a_batch_has_the_noise_of_its_single_starts():
-    seeds = [0.0, 1.0, 2.0]
-    drive = records(CRANE, torque_noise=1.0, noise_seed=seeds, torque_lag=0.002)
-    batch = simulate(drive, "current-limit-feedback").k_dyn.values
-    single = [simulate(one, "current-limit-feedback").k_dyn for one in drive.elements()]
-    assert batch.tolist() == single
-    assert len(set(single)) == 3
-
-
 # dead time -----------------------------------------------------------------------------------------------
 
 
