@@ -78,22 +78,26 @@ def test_an_angle_stays_where_it_is_or_moves_with_its_gap() -> None:
     assert list(varied(flank, {"gap": [0.5, 3.0]}).elements()) == [flank.with_gap(0.5), flank.with_gap(3.0)]
 
 
-STARTS = {
-    "gap": st.floats(0.0, 3.0),
+def some(least: float, most: float) -> st.SearchStrategy[float]:
+    return st.just(0.0) | st.floats(least, most)
+
+
+STARTS: dict[str, st.SearchStrategy[Any]] = {
+    "gap": some(1e-3, 3.0),
     "load_inertia": st.floats(0.02, 1.0),
     "stiffness": st.floats(50.0, 5000.0),
-    "damping": st.floats(0.0, 1.5),
-    "load_torque": st.floats(0.0, 30.0),
-    "torque_lag": st.just(0.0) | st.floats(1e-4, 0.01),
-    "start_position": st.floats(-0.3, 0.3),
-    "motor_friction": st.floats(0.0, 5.0),
-    "motor_viscous_friction": st.floats(0.0, 0.02),
-    "load_viscous_friction": st.floats(0.0, 0.03),
+    "damping": some(1e-3, 1.5),
+    "load_torque": some(0.1, 30.0),
+    "torque_lag": some(1e-4, 0.01),
+    "start_position": some(-0.3, -0.001) | st.floats(0.001, 0.3),
+    "motor_friction": some(0.1, 5.0),
+    "motor_viscous_friction": some(1e-4, 0.02),
+    "load_viscous_friction": some(1e-4, 0.03),
     "noise_seed": st.integers(0, 3),
 }
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_every_figure_has_the_bits_of_a_single_start(data: st.DataObject) -> None:
     names = sorted(data.draw(st.sets(st.sampled_from(sorted(STARTS)), min_size=1, max_size=4)))
@@ -167,8 +171,8 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
         (CRANE, {"gap": [[0.5, -1.0]]}, "gap[0, 1] = -1.0: the total angular gap must be 0 or more"),
         (CHAIN, {"load_inertia": [60.0, -1.0]}, "load_inertia[1] = -1.0: "),
         (CHAIN, {"shaft_2_gap": [0.5, "1 m"]}, "shaft_2_gap[1] = "),
-        (CRANE, {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]}, "starting_torque[1] = 5 N*m: "
-         "the starting torque cannot move the load against load_torque[0, 0] = 7 N*m"),
+        (CRANE.replace(maximum_torque=None), {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]},
+         "starting_torque[1] = 5 N*m: the starting torque cannot move the load against load_torque[0, 0]"),
         (CRANE, {"gap": [0.5, "2 kg"]}, 'gap[1] = "2 kg": kg is a mass, not an angle'),
         (CRANE, {"gap": [0.5], "damping": -1}, "damping = -1: "),
         (CRANE, {"load_kind": ["active", "reactive"]}, "load_kind"),

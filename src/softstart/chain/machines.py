@@ -17,6 +17,7 @@ from softstart.input.parameters import Parameter, Wording, read_value
 from softstart.quantities import RefusedError, nearest, show
 
 Machine = Drive | Chain
+SINGLE = "records: all fields are single values; give a list for one, as gap=[0.5, 2.0]."
 Values = dict[str, tuple[Parameter, Any]]  # by path
 
 
@@ -88,12 +89,10 @@ def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Colu
         machine = Records(machine, {}, (machine,))
     whole = machine.machine
     if isinstance(whole, Chain):
-        found = _chains(machine, values)
-    else:
-        (part,) = machine.parts
-        found = Records.of(whole, change(Columns.of(part), **values))
+        return _chains(machine, values)
+    found = Records.of(whole, change(Columns.of(machine.parts[0]), **values))
     if not found.fields:
-        raise InputError("records: all fields are single values; give a list for one, as gap=[0.5, 2.0].")
+        raise InputError(SINGLE)
     return found
 
 
@@ -121,6 +120,8 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
         shape = np.broadcast_shapes(*(value.shape for value in arrays.values()))
     except ValueError:
         wrong.append(f"{shapes}: {BROADCAST}.")
+    if not (arrays or wrong):
+        wrong.append(SINGLE)
     if wrong:
         raise InputError(wrong)
     fields = {name: np.broadcast_to(value, shape) for name, value in arrays.items()}

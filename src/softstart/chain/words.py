@@ -54,7 +54,7 @@ class Words:
 
         >>> from softstart.chain import Chain
         >>> Chain.load("crane-4-mass").gap_and_inertia[1]
-        70.0
+        69.2
         """
         return float(self.at_motor_shaft().gap.sum()), self.masses[self.load_index].inertia
 

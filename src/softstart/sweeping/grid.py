@@ -150,6 +150,7 @@ def read_column(
 ) -> Column:
     """One column; `parameters` are those of the controllers, None where these are not known.
 
+    >>> from softstart.chain import Chain
     >>> crane = Chain.load("crane-4-mass")
     >>> read_column("shaft[2].gap", ["0.5x", "2x"], None, crane).values.tolist()
     [0.1, 0.4]
