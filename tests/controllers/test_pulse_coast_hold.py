@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -486,12 +486,3 @@ def test_defaults_lie_within_the_ranges_for_tuning() -> None:
             assert between[0] <= fitted.parameters[field.name] <= between[1]
         tuned += multiples is not None or between is not None
     assert tuned == 7
-
-
-def test_batch_of_controllers_equals_single_ones() -> None:
-    speeds = np.array([8.0, 12.0, 14.0])
-    batch = records(cell("reactive", 1.0, 3.0), gap=[0.5, 1.0, 2.0])
-    together = started(batch, batch, PulseCoastHold(coast_speed=speeds))  # type: ignore[arg-type]
-    for i, one in enumerate(batch.elements()):
-        alone = simulate(one, replace(PulseCoastHold(), coast_speed=float(speeds[i])))
-        assert together["k_dyn"][i] == alone.k_dyn

@@ -65,16 +65,6 @@ def test_a_list_may_mix_kinds() -> None:
     assert list(data.load_kind.values) == ["active", "reactive", "active"]
 
 
-def test_a_controller_set_up_for_another_drive() -> None:
-    worn = records(CRANE, gap=[0.5, 2.0])
-    own = simulate(worn, "ramp")
-    fixed = simulate(records(worn, load_inertia=0.35), "ramp", fitted_to=CRANE, base=CRANE)
-    assert float(own.k_dyn[0]) == simulate(CRANE, "ramp").k_dyn
-    heavy = CRANE.replace(gap=2.0, load_inertia=0.35)
-    assert float(fixed.k_dyn[1]) == simulate(heavy, "ramp", fitted_to=CRANE, base=CRANE).k_dyn
-    assert float(fixed.k_dyn[1]) != simulate(heavy, "ramp").k_dyn
-
-
 @pytest.mark.parametrize("rows", [1, 3])
 @pytest.mark.parametrize("role", ["fitted_to", "base"])
 def test_a_drive_of_another_shape_is_refused(rows: int, role: str) -> None:

@@ -13,7 +13,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -250,16 +249,6 @@ class Chain(Words):
             return 0 if self.motor is None else names.index(self.motor.mass)
         raise InputError(f"{show(place)}: {_no_such(place, names)}")
 
-    @property
-    def motor_index(self) -> int:
-        """The index of the mass on which the motor acts; the first where there is no motor."""
-        return 0 if self.motor is None else self.index(self.motor.mass)
-
-    @property
-    def load_index(self) -> int:
-        """The index of the mass that is to reach the target speed."""
-        return self.index(self.load_mass)
-
     def speed_ratios(self, reference: str | int = "motor") -> tuple[float, ...]:
         """The speed of each mass's shaft over that of the reference: `i` of [R], table 1.
 
@@ -286,15 +275,6 @@ class Chain(Words):
     def gaps(self) -> Vector:
         """The gap of each shaft, rad at the motor shaft."""
         return self.at_motor_shaft().gap
-
-    @property
-    def shaft_names(self) -> tuple[str, ...]:
-        """Each shaft by the masses that it joins.
-
-        >>> Chain.load("crane-4-mass").shaft_names[0]
-        'rotor - pinion'
-        """
-        return tuple(f"{a.name} - {b.name}" for a, b in pairwise(self.masses))
 
     @property
     def mean_torque(self) -> float:
@@ -424,21 +404,6 @@ class Chain(Words):
             values = states[name].reshape(states["u"].size, -1)
             columns |= {f"{name} {part} [{unit}]": values[:, i] for i, part in enumerate(parts)}
         return columns
-
-    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
-        """The chain with so many times its gaps, and its load mass with so many times its inertia.
-
-        An angle in a gap keeps its share of it, one beyond a flank its overlap.
-
-        >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
-        0.8
-        """
-        load = self.load_index
-        masses = [
-            mass.replace(inertia=load_inertia * mass.inertia) if i == load else mass
-            for i, mass in enumerate(self.masses)
-        ]
-        return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
     @property
     def freed(self) -> Self:

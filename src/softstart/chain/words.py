@@ -10,6 +10,7 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Self
 
 from softstart.chain.elements import START, TOP, Mass, Motor, Shaft
@@ -35,15 +36,29 @@ class Words:
 
     if TYPE_CHECKING:  # of the chain
 
-        @property
-        def motor_index(self) -> int: ...
-        @property
-        def load_index(self) -> int: ...
-        @property
-        def shaft_names(self) -> tuple[str, ...]: ...
+        def index(self, place: str | int) -> int: ...
         def at_motor_shaft(self) -> Any: ...
         def speed_ratios(self, reference: str | int = ...) -> tuple[float, ...]: ...
-        def changed(self, gaps: float = ..., load_inertia: float = ...) -> Self: ...
+
+    @property
+    def motor_index(self) -> int:
+        """The index of the mass on which the motor acts; the first where there is no motor."""
+        return 0 if self.motor is None else self.index(self.motor.mass)
+
+    @property
+    def load_index(self) -> int:
+        """The index of the mass that is to reach the target speed."""
+        return self.index(self.load_mass)
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Each shaft by the masses that it joins.
+
+        >>> from softstart.chain import Chain
+        >>> Chain.load("crane-4-mass").shaft_names[0]
+        'rotor - pinion'
+        """
+        return tuple(f"{a.name} - {b.name}" for a, b in pairwise(self.masses))
 
     def _replaced(self, **changes: Any) -> Self:
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
@@ -84,6 +99,22 @@ class Words:
             )
         wider = chain.changed(gaps=_share(gap, whole))
         return wider if inertia == load else wider._with_part("mass", wider.load_index, "inertia", inertia)
+
+    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+        """The chain with so many times its gaps, and its load mass with so many times its inertia.
+
+        An angle in a gap keeps its share of it, one beyond a flank its overlap.
+
+        >>> from softstart.chain import Chain
+        >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
+        0.8
+        """
+        load = self.load_index
+        masses = [
+            mass.replace(inertia=load_inertia * mass.inertia) if i == load else mass
+            for i, mass in enumerate(self.masses)
+        ]
+        return self._replaced(masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
     def by_path(self) -> dict[str, tuple[Parameter, Any]]:
         """All parameters by their paths, each with its value.

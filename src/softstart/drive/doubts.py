@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from softstart.drive.checks import elastic_frequency
 
@@ -30,14 +30,7 @@ class TwoMasses(NamedTuple):
     ratio: float  # turns of the motor for one of the output
 
 
-class Lumped(Protocol):
-    """A machine that says what it is as two masses."""
-
-    @property
-    def lumped(self) -> TwoMasses: ...
-
-
-def doubts(machine: Lumped) -> list[str]:
+def doubts(machine: Any) -> list[str]:
     """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed

@@ -29,7 +29,7 @@ from softstart.reporting.result import (
     controllers_of,
     provenance,
 )
-from softstart.reporting.sheet import Sheet, make_sheet, sheet_drive, sheet_section
+from softstart.reporting.sheet import Sheet, make_sheet, sheet_section
 from softstart.start.comparison import REFERENCE, Comparison, compared
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
@@ -380,7 +380,7 @@ def _sheets(report: ChainReport) -> Html:
     """The sheet of the chosen strategy; its percentages are of the chain's motor."""
     recommended = report.comparison.recommendation.recommended is not None
     return sheet_section(
-        sheet_drive(report.drive),
+        report.drive.design_drive,
         report.sheets,
         report.resolution,
         report.chosen.name if report.chosen else "",

@@ -197,7 +197,7 @@ def make_sheet(
     With the `row` by which the strategy was chosen, the values of the sheet keep what that row keeps, on the
     drives `drawn` too where the drive is known within intervals.
     """
-    drive = sheet_drive(machine)
+    drive = machine.design_drive
     ready, own = controller.set_up(drive)
     settings = tuple(_settings(ready, drive, resolution))
     varied = [one for one in settings if one.step is not None]
@@ -211,7 +211,7 @@ def make_sheet(
         settings, moved = _within_the_rule(machine, ready, own, settings, row, drawn)
         varied = [one for one in settings if one.step is not None]
         values = {one.name: one.rounded for one in varied}
-        rounded = _start(machine, replace(ready, **values), own)
+        rounded = simulate(machine, replace(ready, **values), fitted_to=own)
         if kind_of(controller) in ORDINARY and isinstance(machine, Drive):
             full_rise = _full_rise(machine, replace(ready, **values), own, resolution)
             gear_ramp = _gear_ramp(machine, replace(ready, **values), own)
@@ -235,16 +235,6 @@ def make_sheet(
         torque_step=resolution.step("", "N*m", rated_torque(drive)[0]) or 0.0, full_rise=full_rise,
         computes_with=computes_with(ready, own), moved=moved, gear_ramp=gear_ramp,
     )  # fmt: skip
-
-
-def sheet_drive(machine: Drive | Chain) -> Drive:
-    """The drive whose motor and numbers a sheet names: of a chain the two masses that stand for it."""
-    return machine.design_drive
-
-
-def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> Run:
-    """A start under a controller with the numbers of `own`."""
-    return simulate(machine, controller, fitted_to=own)
 
 
 def _within_the_rule(
