@@ -11,7 +11,7 @@ import pytest
 from tests import twin
 from tests.controllers.starts import CRANE, random_drive, traced
 
-from softstart import Drive, InputError, records, simulate
+from softstart import Drive, InputError, simulate
 from softstart.controller import CompiledController, controller_class, make_controller
 from softstart.drive import library
 from softstart.kernel.records import NOTES
@@ -80,21 +80,6 @@ def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> No
     assert all(np.array_equal(one.notes[name], two.notes[name], equal_nan=True) for name in NOTES.names)
     assert np.array_equal(one.states, two.states)
     assert np.array_equal(one.events, two.events)
-
-
-@pytest.mark.parametrize("name", SAMPLED)
-@pytest.mark.parametrize("kind", ["active", "reactive"])
-def test_batch_equals_single_starts(name: str, kind: Any) -> None:
-    rng = np.random.default_rng(5)
-    fields = [random_drive(rng, load_kind=kind).values() for _ in range(40)]
-    varied = [key for key, value in fields[0].items() if isinstance(value, float)]
-    batch = records(CRANE, load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
-    together = simulate(batch, name)
-    for i, one in enumerate(batch.elements()):
-        run = simulate(one, name)
-        assert together.k_dyn.values[i] == run.k_dyn
-        assert together.start_time.values[i] == run.start_time
-        assert together.contacts.values[i] == run.contacts
 
 
 @pytest.mark.parametrize("name", SAMPLED)

@@ -12,7 +12,6 @@ from scipy.linalg import expm
 from tests.controllers.starts import CRANE, index, traced
 
 from softstart import Drive, InputError, records, simulate
-from softstart.controller.base import numbers_of
 from softstart.drive import library
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback as sf
@@ -112,16 +111,6 @@ def test_thousands_of_weights_need_few_designs(monkeypatch: pytest.MonkeyPatch) 
     for q, r in 10 ** np.random.default_rng(2).uniform(-1.5, 1.5, (5000, 2)):
         assert feedback_gains(0.1, 0.0, 0.0, q, r) == pytest.approx([1.0, 2.0, 0.0])
     assert len(asked) <= 17 * 17
-
-
-def test_batch_has_the_numbers_of_its_drives() -> None:
-    lags = [0, 1e-3, 0.01]
-    batch = records(CRANE, load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096], torque_lag=lags)
-    weights = {"torque_weight": np.array([1.0, 3.0, 10.0]), "rate_weight": np.array([0.5, 4.0, 2.0])}
-    _, together = numbers_of(StateFeedback(**weights).set_ups(batch))  # type: ignore[arg-type, misc]
-    for i, one in enumerate(batch.elements()):
-        own = {name: float(values[i]) for name, values in weights.items()}
-        assert np.array_equal(together[i], StateFeedback(**own).fitted(one).vector(one))
 
 
 def distance_to_instability(drive: Drive, plant: Drive) -> float:

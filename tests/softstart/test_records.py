@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, records, simulate
 from softstart.chain import Chain
 from softstart.chain.machines import varied
-from softstart.controller import make_controller
+from softstart.controller import make_controller, ready_controller_names
 from softstart.drive.records import Records
 
 CRANE = Drive.load("crane-4amtkf")
@@ -97,7 +97,7 @@ STARTS: dict[str, st.SearchStrategy[Any]] = {
 }
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_every_figure_has_the_bits_of_a_single_start(data: st.DataObject) -> None:
     names = sorted(data.draw(st.sets(st.sampled_from(sorted(STARTS)), min_size=1, max_size=4)))
@@ -107,7 +107,7 @@ def test_every_figure_has_the_bits_of_a_single_start(data: st.DataObject) -> Non
         fields[names[0]] = fields[names[0]][:, None]
     kind = data.draw(st.sampled_from(["active", "reactive"]))
     drive = CRANE.replace(load_kind=kind, torque_noise=0.5)
-    controller = data.draw(st.sampled_from(["direct", "ramp", "pulse-coast-hold", "current-limit-feedback"]))
+    controller = data.draw(st.sampled_from(sorted(ready_controller_names())))
     assert_bits_of_single_starts(records(drive, **fields), controller)
 
 
@@ -131,9 +131,8 @@ def test_controllers_bases_parameters_and_limits_of_each() -> None:
     found: Any = simulate(many, "ramp", fitted_to=fitted, base=base, workers=2)
     times = np.array([0.05, 0.2])
     timed: Any = simulate(many, make_controller("ramp", {"time": times}))
-    for i, (one, told, of) in enumerate(
-        zip(many.elements(), fitted.elements(), base.elements(), strict=True)
-    ):
+    each = zip(many.elements(), fitted.elements(), base.elements(), strict=True)
+    for i, (one, told, of) in enumerate(each):
         run = simulate(one, "ramp", fitted_to=told, base=of)
         assert float(found.k_dyn[i]) == run.k_dyn
         share = min(1.0 - run.peak_torque / one.permissible_torque, 1.0 - run.start_time)
@@ -161,7 +160,7 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
     ("machine", "fields", "said"),
     [
         (CRANE, {"gapp": [0.5]}, 'gapp = [0.5]: a drive has no parameter "gapp"; did you mean gap?'),
-        (CHAIN, {"shaft_2_gapp": [0.5]}, "did you mean shaft_2_gap?"),
+        (CHAIN, {"gapp": [0.5]}, "did you mean gap?"),
         (CHAIN, {"shaft_7_gap": [0.5]}, 'a chain has no parameter "shaft_7_gap"'),
         (CRANE, {"gap": [1, 2, 3], "damping": [1, 2]}, "damping has shape (2,), gap has shape (3,): arrays"),
         (CHAIN, {"gap": [1, 2, 3], "load_inertia": [60, 70]}, "gap has shape (3,), load_inertia has shape"),
@@ -186,10 +185,7 @@ def test_what_no_machine_can_have(machine: Any, fields: dict[str, Any], said: st
         records(machine, **fields)
     assert said in str(caught.value)
     assert len(caught.value.sentences) == 1
-
-
-def test_all_mistakes_at_once() -> None:
-    for machine in (CRANE, CHAIN):
+    if "gapp" in fields:  # all mistakes at once
         with pytest.raises(InputError) as caught:
-            records(machine, gapp=[1.0], load_inertia=[-1.0], stiffness=["soft"])
+            records(machine, **fields, load_inertia=[-1.0], stiffness=["soft"])
         assert len(caught.value.sentences) == 3
