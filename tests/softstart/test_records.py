@@ -26,8 +26,8 @@ def assert_bits_of_single_starts(many: Records, controller: str) -> list[float]:
     found: Any = simulate(many, controller)
     runs = [simulate(one, controller).summary() for one in many.elements()]
     for name in FIGURES:
-        np.testing.assert_array_equal(found[name].values.ravel(), [run[name] for run in runs], err_msg=name)
-    return [float(run["k_dyn"]) for run in runs]
+        np.testing.assert_array_equal(found[name].values.ravel(), [run[name] for run in runs], name)
+    return [run["k_dyn"] for run in runs]
 
 
 def test_fields_in_si_of_one_shape() -> None:
@@ -50,12 +50,11 @@ def test_fields_in_si_of_one_shape() -> None:
 
 def test_they_cannot_be_changed_from_outside() -> None:
     gaps = np.array([1.0, 2.0])
-    many = records(CRANE, gap=gaps)
+    many = pickle.loads(pickle.dumps(records(CRANE, gap=gaps)))
     gaps[0] = 7.0
-    for one in (many, pickle.loads(pickle.dumps(many))):
-        assert [drive.gap for drive in one.elements()] == one.fields["gap"].tolist() == [1.0, 2.0]
+    assert [drive.gap for drive in many.elements()] == many.fields["gap"].tolist() == [1.0, 2.0]
     with pytest.raises(ValueError, match="read-only"):
-        many.fields["gap"][0] = 3.0
+        records(CRANE, gap=gaps).fields["gap"][0] = 3.0
 
 
 def test_records_differ_in_further_fields() -> None:
@@ -119,10 +118,9 @@ def test_noise_positions_and_brakes_have_the_bits_of_single_starts() -> None:
         hanging = records(hoist, load_torque=[30.0, 40.0], gap=[0.05, 0.2], release=release)
         assert_bits_of_single_starts(hanging, "state-feedback")
     unknown = records(CRANE, load_kind="reactive", start_position="unknown", gap=[0.2, 0.5, 2.0])
-    assert_bits_of_single_starts(unknown, "reduced-first-stage")
-    found: Any = simulate(unknown, "reduced-first-stage")
-    own = [simulate(one, "reduced-first-stage").position for one in unknown.elements()]
-    assert found.position.values.tolist() == own
+    assert_bits_of_single_starts(unknown, "ramp")
+    found: Any = simulate(unknown, "ramp")
+    assert found.position.values.tolist() == [simulate(one, "ramp").position for one in unknown.elements()]
 
 
 def test_controllers_bases_parameters_and_limits_of_each() -> None:
@@ -172,7 +170,6 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
         (CHAIN, {"shaft_2_gap": [0.5, "1 m"]}, "shaft_2_gap[1] = "),
         (CRANE.replace(maximum_torque=None), {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]},
          "starting_torque[1] = 5 N*m: the starting torque cannot move the load against load_torque[0, 0]"),
-        (CRANE, {"gap": [0.5, "2 kg"]}, 'gap[1] = "2 kg": kg is a mass, not an angle'),
         (CRANE, {"gap": [0.5], "damping": -1}, "damping = -1: "),
         (CRANE, {"load_kind": ["active", "reactive"]}, "load_kind"),
         (CRANE, {"gap": 0.5}, "records: all fields are single values; give a list for one"),
