@@ -11,7 +11,6 @@ from tests.softstart.kernel.test_brake import HOIST
 
 from softstart import Chain, Drive, InputError, compare, linear_view, records, simulate
 from softstart.chain import reduce_chain
-from softstart.chain.machines import varied
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.doubts import doubts
 from softstart.kernel.records import S_REF, S_SLOPE, S_START
@@ -168,8 +167,6 @@ def test_an_angle_keeps_its_place_in_a_wider_gap() -> None:
     assert beyond.with_gap(1.0).theta0 == pytest.approx(-0.52)
     assert inside.with_gap(0.5) == inside
     assert inside.replace(gap=1.0).theta0 == -0.1
-    both = varied(inside, {"gap": [0.5, 2.0]})
-    np.testing.assert_allclose(both.fields["start_position"], [-0.1, -0.4])
     assert inside.with_gap(1.0, start_position=0.3).theta0 == 0.3
     hanging = HOIST.replace(start_position=HOIST.theta0)
     row = compare(hanging, ["direct"]).rows[0]

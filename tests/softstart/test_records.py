@@ -171,6 +171,7 @@ def test_chains_answer_to_the_words_of_a_drive_and_of_their_parts() -> None:
         (CRANE.replace(maximum_torque=None), {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]},
          "starting_torque[1] = 5 N*m: the starting torque cannot move the load against load_torque[0, 0]"),
         (CRANE, {"gap": [0.5], "damping": -1}, "damping = -1: "),
+        (CRANE, {"rated_torque": [23.0, 30.0]}, "rated_torque[1] = 30 N*m"),
         (CRANE, {"load_kind": ["active", "reactive"]}, "load_kind"),
         (CRANE, {"gap": 0.5}, "records: all fields are single values; give a list for one"),
         (CHAIN, {}, "records: all fields are single values"),

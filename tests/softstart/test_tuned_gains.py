@@ -129,8 +129,7 @@ def test_batches_start_as_single_drives_do(gains):
         run = simulate(drive, gains)
         assert float(together.k_dyn[k]) == run.k_dyn
         assert float(together.start_time[k]) == run.start_time
-    listed = simulate(list(drives.elements()), gains)
-    assert np.array_equal(listed.k_dyn, together.k_dyn)
+    assert np.array_equal(simulate(list(drives.elements()), gains).k_dyn, together.k_dyn)
 
 
 def test_a_schedule_goes_by_what_is_declared_and_a_set_by_its_own_drive():

@@ -5,7 +5,6 @@ import math
 import pytest
 from tests.softstart.drive.conftest import GOOD
 
-from softstart import records
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.reporting.resolution import rated_torque
@@ -122,11 +121,8 @@ def test_rated_torque_power_and_speed_agree_within_what_a_data_sheet_rounds():
     crane = Drive.load("crane-4amtkf")  # 2.2 kW at 880 rpm, 23.87 N m
     assert crane.replace(rated_torque="24 N*m").rated_torque == 24.0
     assert crane.replace(rated_power=None, rated_torque=30).rated_torque == 30.0
-    assert records(crane, rated_torque=[23.0, 24.0]).shape == (2,)
     with pytest.raises(InputError, match=r"rated_torque = 30 N\*m: with the rated speed .* 2200 W"):
         crane.replace(rated_torque=30)
-    with pytest.raises(InputError, match=r"rated_torque\[1\] = 30 N\*m"):
-        records(crane, rated_torque=[23.0, 30.0])
 
 
 def test_the_rated_torque_of_a_data_sheet_is_what_inverters_count_in():

@@ -15,7 +15,6 @@ from tests.softstart.drive.conftest import GOOD
 
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, TABLES, Drive
 from softstart.errors import InputError
-from softstart.quantities import show
 
 CRANE = {**GOOD, "target_speed": None, "rated_speed": 92.0}
 
@@ -97,16 +96,12 @@ def test_frozen(crane):
     assert copy.copy(crane) is crane
 
 
-@pytest.mark.parametrize(
-    ("gap", "again"),
-    [([0.5, 2.0], "[0.5, 2.0]"), (("1 deg", 2), "('1 deg', 2)"), (np.array([0.5, 2.0]), "[...]")],
-)
-def test_a_drive_has_one_value(crane, gap, again):
-    with pytest.raises(InputError) as caught:
-        crane.replace(gap=gap)
-    assert str(caught.value) == (
-        f"gap = {show(gap)}: a drive has one value; for several starts write records(drive, gap={again})."
-    )
+def test_a_drive_has_one_value(crane):
+    several = "; for several starts write records(drive, gap="
+    for gap, again in (([0.5, 2.0], "[0.5, 2.0])."), (np.array([0.5, 2.0]), "[...]).")):
+        with pytest.raises(InputError) as caught:
+            crane.replace(gap=gap)
+        assert str(caught.value) == f"gap = [0.5, 2.0]: a drive has one value{several}{again}"
     with pytest.raises(InputError, match=r"\[shaft\] gap = \[0.5, 2\]: a drive has one value; .* use sweep"):
         Drive.from_toml(crane.to_toml().replace("gap = 0.5", "gap = [0.5, 2]"))
 
