@@ -170,7 +170,6 @@ def test_the_figure_shows_the_run(run: Run) -> None:
         ({"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
         ({"fitted_to": 3.0}, "fitted_to = 3.0"),
         ({"fitted_to": WORN}, "fitted_to: records of shape (2,)"),
-        ({"base": WORN}, "base: records of shape (2,)"),
         ({"max_events": True}, "max_events = True"),
         ({"max_events": 0}, "max_events = 0"),
         ({"max_events": 1.5}, "max_events = 1.5"),
