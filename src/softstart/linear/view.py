@@ -304,7 +304,7 @@ def linear_view(
     Raises
     ------
     InputError
-        If the input is wrong (a batch of drives, an unknown controller).
+        If the input is wrong (an unknown controller).
     SimulationError
         If the start cannot be simulated.
 
