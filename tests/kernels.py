@@ -44,28 +44,28 @@ def sensitivity() -> None:
 
 def controllers() -> None:
     """Every controller in a single start and in a batch."""
-    from softstart import Drive, TorqueProfile, simulate
+    from softstart import Drive, TorqueProfile, records, simulate
     from softstart.controller import make_controller, ready_controller_names
 
     crane = Drive.load("crane-4amtkf")
     profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
     for controller in (profile, *map(make_controller, ready_controller_names())):
         assert simulate(crane, controller).energy.residual < 1e-6
-        simulate(crane.replace(gap=[0.5, 2.0]), controller)
+        simulate(records(crane, gap=[0.5, 2.0]), controller)
 
 
 def plain() -> None:
     """A controller that is called from Python."""
     from tests import twin as twins
 
-    from softstart import Drive, simulate
+    from softstart import Drive, records, simulate
     from softstart.controller import CompiledController, make_controller
 
     crane, direct = Drive.load("crane-4amtkf"), make_controller("direct")
     assert isinstance(direct, CompiledController)
     twin = twins.plain(direct, crane)
     assert simulate(crane, twin).k_dyn == simulate(crane, "direct").k_dyn
-    simulate(crane.replace(gap=[0.5, 2.0]), twin)
+    simulate(records(crane, gap=[0.5, 2.0]), twin)
 
 
 def robust() -> None:

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
-from softstart.start.metrics import base_torque
 from softstart_controllers.landing import horizon, over_dead_time, pole, shaft_torque_under
 from softstart_controllers.reduced import load_drift, reduced_torque
 from softstart_controllers.sampled import (
@@ -262,7 +261,7 @@ class CurrentLimitFeedback(CompiledController):
         """From the nominal drive; neither gap nor start position enter."""
         period = sample_period(drive) if self.period is None else self.period
         low = reduced_torque(drive) if self.low_torque is None else self.low_torque
-        base = base_torque(drive)
+        base = drive.mean_torque
         threshold = min(THRESHOLD * base, LOW_SHARE * shaft_torque_under(drive, low))
         uncertainty = self.uncertainty
         if uncertainty is None:

@@ -29,7 +29,6 @@ from typing import Any
 
 from softstart.controller.compiled import Vector, compiled, inner, record
 from softstart.drive import Drive
-from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
 from softstart_controllers.reduced import load_drift
 from softstart_controllers.sampled import encoder_count, mean_torque, patience, pulling_load, sample_period
@@ -290,7 +289,7 @@ def contact_threshold(drive: Drive, low: Any, approach_speed: Any, period: Any) 
     speed = approach_speed * drive.J1
     ahead = math.sqrt(rounding**2 + 4.0 * LOW_SHARE * horizon(drive, period) * speed)
     root = 2.0 * LOW_SHARE * speed / (rounding + ahead)
-    return min(THRESHOLD * base_torque(drive), LOW_SHARE * shaft_torque_under(drive, low), root**2)
+    return min(THRESHOLD * drive.mean_torque, LOW_SHARE * shaft_torque_under(drive, low), root**2)
 
 
 def horizon(drive: Drive, period: Any) -> float:

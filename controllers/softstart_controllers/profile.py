@@ -185,5 +185,4 @@ class Profile(CompiledController):
         if second is not None:
             parts += [second.time, second.torque]
         head = [period, first.time.size, 0.0 if second is None else second.time.size, first.time.size]
-        row = np.concatenate([head, *parts])
-        return np.broadcast_to(row, (*drive.shape, row.size))
+        return np.concatenate([head, *parts])

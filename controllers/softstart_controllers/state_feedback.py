@@ -19,7 +19,6 @@ from softstart.controller.compiled import (
     size,
 )
 from softstart.drive import Drive
-from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains
 from softstart_controllers.landing import (
@@ -357,7 +356,7 @@ class StateFeedback(CompiledController):
         step = Omega * p.period
         ratio = min(0.5 * drive.d * Omega / drive.c, landing.LARGEST_DAMPING)
         lag = drive.torque_lag + SLEWED_SHARE * drive.Ms / drive.torque_rate
-        noise = encoder_count(drive) ** 2 / 12.0 / (base_torque(drive) / drive.c) ** 2 / p.uncertainty**2
+        noise = encoder_count(drive) ** 2 / 12.0 / (drive.mean_torque / drive.c) ** 2 / p.uncertainty**2
         noise = min(max(noise, share**2 / step / FASTEST**8), share**2 / step / SLOWEST**8)
         angle, speed, twist, rate, load = observer_gains(step, ratio, share, noise)
         return stack(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from softstart import Controller, Drive, simulate
+from softstart import Controller, Drive, Records, records, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
@@ -82,7 +82,7 @@ def live(extent: Extent, progress: Progress) -> Life:
         drive, names, extent.scheduled, [float(drive.J2)], extent.restarts, extent.generations, progress
     )
     gaps = np.array(extent.life)
-    worn = drive.replace(gap=gaps)
+    worn = records(drive, gap=gaps)
     courses = {}
     for name, tuning in tunings.items():
         progress(f"{name}: starts over the life")
@@ -115,7 +115,7 @@ def _robust(tuning: Tuning) -> Controller:
     return tuning.robust.controller
 
 
-def _course(worn: Drive, controller: Controller, fitted_to: Drive | None) -> Course:
+def _course(worn: Records, controller: Controller, fitted_to: Drive | None) -> Course:
     found: Any = simulate(worn, controller, fitted_to=fitted_to)
     return Course(np.asarray(found.k_dyn), np.asarray(found.start_time))
 

@@ -83,29 +83,6 @@ def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> No
 
 
 @pytest.mark.parametrize("name", SAMPLED)
-@pytest.mark.parametrize("kind", ["active", "reactive"])
-def test_batch_equals_single_starts(name: str, kind: Any) -> None:
-    rng = np.random.default_rng(5)
-    fields = [random_drive(rng, load_kind=kind).values() for _ in range(40)]
-    varied = [key for key, value in fields[0].items() if isinstance(value, float)]
-    batch = Drive(load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
-    together = simulate(batch, name)
-    for i, one in enumerate(batch.elements()):
-        run = simulate(one, name)
-        assert together.k_dyn.values[i] == run.k_dyn
-        assert together.start_time.values[i] == run.start_time
-        assert together.contacts.values[i] == run.contacts
-
-
-@pytest.mark.parametrize("name", SAMPLED)
-def test_batch_of_two_dimensions(name: str) -> None:
-    batch = CRANE.replace(gap=np.array([[0.5], [2.0]]), load_inertia=np.array([0.07, 0.175, 0.3]))
-    result = simulate(batch, name)
-    assert result.k_dyn.shape == (2, 3)
-    assert result.k_dyn.values[1, 0] == simulate(CRANE.replace(gap=2.0, load_inertia=0.07), name).k_dyn
-
-
-@pytest.mark.parametrize("name", SAMPLED)
 def test_reaches_the_target_speed_of_any_sensible_drive(name: str) -> None:
     rng = np.random.default_rng(11)
     for _ in range(150):

@@ -83,14 +83,6 @@ def test_state_feedback_holds_its_reference_while_the_brake_holds() -> None:
     assert float(run.at(0.1)["u"]) > 100.0  # it does not let the load down at the release
 
 
-@pytest.mark.parametrize("release", ["torque", 0.05])
-def test_a_batch_that_hangs_is_its_single_starts(release: object) -> None:
-    batch = HOIST.replace(load_torque=np.array([60.0, 120.0]), gap=np.array([0.05, 0.2]), release=release)
-    together = simulate(batch, "state-feedback")
-    single = [simulate(one, "state-feedback").k_dyn for one in batch.elements()]
-    assert together.k_dyn.values.tolist() == single
-
-
 def test_state_feedback_uses_no_position_but_hanging() -> None:
     for where in UNKNOWN_POSITIONS:
         one = HOIST.replace(start_position=where, brake="none")

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from tests import twin
 
-from softstart import Drive, InputError, TorqueProfile, compare, simulate
+from softstart import Drive, InputError, TorqueProfile, compare, records, simulate
 from softstart.controller import CompiledController, Sensor, make_controller, ready_controller_names
 from softstart_controllers.direct import Direct
 from softstart_controllers.profile import Profile
@@ -51,7 +51,7 @@ def test_steps_alone_or_with_lag_and_limiter_twin_and_batch_agree(
     controller = Profile(profile=profile, period=period)
     run = simulate(drive, controller, until=0.3)
     plain = simulate(drive, twin.plain(controller, drive), until=0.3)
-    many = simulate(drive.replace(maximum_torque=[62.0, 70.0]), controller, until=0.3)
+    many = simulate(records(drive, maximum_torque=[62.0, 70.0]), controller, until=0.3)
     assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
     assert plain.recorded.states.tobytes() == run.recorded.states.tobytes()
 
@@ -132,18 +132,6 @@ def test_with_a_period_the_second_profile_begins_at_a_sample() -> None:
 def test_it_sees_the_contact_only_where_it_needs_to() -> None:
     assert Profile(profile=TorqueProfile([0.0], [1.0])).sensors == Sensor.NONE
     assert Profile(profile=SENSED).sensors == Sensor.STAGE
-
-
-@pytest.mark.parametrize("limits", [70.0, [62.0, 66.0, 70.0]])
-def test_batches_share_one_table(limits: float | list[float]) -> None:
-    drive = CRANE.replace(gap=[0.5, 1.0, 2.0], maximum_torque=limits)
-    controller = Profile(profile=TorqueProfile([0.0, 0.1], [0.0, 90.0], after_contact=SENSED.after_contact))
-    vector = controller.vector(drive)
-    assert vector.shape[:-1] == (3,)
-    assert vector.strides[0] == 0
-    many = simulate(drive, controller)
-    for i, one in enumerate(drive.elements()):
-        assert float(many.k_dyn[i]) == simulate(one, controller).k_dyn
 
 
 def test_its_parameters_are_short_and_plain(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,10 @@ from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, 
 from tests.controllers.starts import CRANE, index, random_drive, traced
 from tests.twin import plain
 
-from softstart import Drive, InputError, simulate
+from softstart import Drive, InputError, Records, records, simulate
 from softstart.kernel.records import size
 from softstart.optimal.solving import optimize
-from softstart.start.batch import array_starts, figures
-from softstart.start.metrics import base_torque
+from softstart.start.batch import prepared
 from softstart_controllers import pulse_coast_hold_step as stepping
 from softstart_controllers import shaft_filter as sf
 from softstart_controllers.contact import (
@@ -49,11 +48,11 @@ def told(kind: Any, **changed: Any) -> Drive:
     return LAGGING.replace(load_kind=kind, **changed)
 
 
-def started(batch: Drive, nominal: Drive, controller: PulseCoastHold | None = None) -> dict[str, Any]:
-    """Figures of a batch, in its shape."""
-    notes = array_starts(batch, controller or PulseCoastHold(), fitted_to=nominal)
-    base = np.broadcast_to(base_torque(batch), batch.shape).ravel()
-    return {name: values.reshape(batch.shape) for name, (values, _, _) in figures(notes, base).items()}
+def started(batch: Records, nominal: Any, controller: PulseCoastHold | None = None) -> dict[str, Any]:
+    """Figures of many starts, in their shape."""
+    set_ups = (controller or PulseCoastHold()).set_ups(nominal)
+    found = prepared(batch).figures(set_ups, batch.mean_torque)
+    return {name: values.reshape(batch.shape) for name, (values, _, _) in found.items()}
 
 
 def state(trace: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
@@ -264,7 +263,7 @@ def test_with_everything_ideal_it_is_the_optimum(gap: float, ratio: float) -> No
 
 def over_the_optimum(kind: Any, gap: float, ratio: float, phases: int = 8, **really: Any) -> float:
     """The worst of the encoder phases; the optimum of an ideal torque at the longest of their start times."""
-    batch = cell(kind, gap, ratio, encoder_phase=np.arange(phases) / phases, **really)
+    batch = records(cell(kind, gap, ratio, **really), encoder_phase=np.arange(phases) / phases)
     found = started(batch, told(kind))
     assert np.all(found["contacts"] == 1)
     ideal = cell(kind, gap, ratio, **really).replace(torque_lag=0.0, computing_delay=0.0)
@@ -289,7 +288,8 @@ def test_near_the_optimum_with_gap_inertia_and_load_speed_unknown(
 
 def test_reactive_load_the_same_at_every_gap() -> None:
     """Gaps 0.5 to 2 rad, J2 = 2 to 5 J1, 16 encoder phases: K_dyn 0.980 to 1.004, spread 2.3 %."""
-    batch = LAGGING.replace(
+    batch = records(
+        LAGGING,
         load_kind="reactive",
         gap=np.linspace(0.5, 2.0, 16)[:, None, None],
         load_inertia=J1 * np.linspace(2.0, 5.0, 7)[None, :, None],
@@ -321,11 +321,11 @@ def test_a_lag_or_dead_time_not_as_told_hardly_matters(kind: Any) -> None:
         "load_inertia": J1 * np.array([2.0, 5.0])[None, :, None],
         "encoder_phase": np.array([0.0, 0.3, 0.7])[None, None, :],
     }
-    as_told = started(LAGGING.replace(**grid), told(kind))["k_dyn"]
+    as_told = started(records(LAGGING, **grid), told(kind))["k_dyn"]
     for lag in (0.001, 0.003):
-        k = started(LAGGING.replace(**grid), told(kind, torque_lag=lag))["k_dyn"]
+        k = started(records(LAGGING, **grid), told(kind, torque_lag=lag))["k_dyn"]
         assert np.abs(k / as_told - 1.0).max() < 0.01
-    dead = started(LAGGING.replace(computing_delay=0.001, **grid), told(kind))["k_dyn"]
+    dead = started(records(LAGGING, computing_delay=0.001, **grid), told(kind))["k_dyn"]
     assert (dead / as_told).max() < 1.04
 
 
@@ -340,7 +340,7 @@ def test_a_slew_limit_does_not_look_like_a_contact() -> None:
         "gap": np.array([0.5, 2.0])[None, None, :],
     }
     for kind in ("active", "reactive"):
-        starts = simulate(CRANE.replace(load_kind=kind, **grid), PulseCoastHold())
+        starts = simulate(records(CRANE, load_kind=kind, **grid), PulseCoastHold())
         assert np.all(starts.contacts == 1)
         assert float(starts.k_dyn.max()) < 1.25
         assert float(starts.k_dyn.median()) < 1.0
@@ -486,12 +486,3 @@ def test_defaults_lie_within_the_ranges_for_tuning() -> None:
             assert between[0] <= fitted.parameters[field.name] <= between[1]
         tuned += multiples is not None or between is not None
     assert tuned == 7
-
-
-def test_batch_of_controllers_equals_single_ones() -> None:
-    speeds = np.array([8.0, 12.0, 14.0])
-    batch = cell("reactive", 1.0, 3.0).replace(gap=np.array([0.5, 1.0, 2.0]))
-    together = started(batch, batch, PulseCoastHold(coast_speed=speeds))  # type: ignore[arg-type]
-    for i, one in enumerate(batch.elements()):
-        alone = simulate(one, replace(PulseCoastHold(), coast_speed=float(speeds[i])))
-        assert together["k_dyn"][i] == alone.k_dyn

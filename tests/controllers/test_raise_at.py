@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, formulas, simulate
+from softstart import Drive, InputError, formulas, records, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.kernel.records import S_REF, S_START
@@ -29,8 +29,9 @@ def cell(name: str, where: str, damping: float, lag: float, kind: str) -> tuple[
     """K_dyn and start time over gaps and inertias: by how much `peak` is above `end`."""
     gap, inertia = (grid.ravel() for grid in np.meshgrid(GAPS, INERTIAS, indexing="ij"))
     J2 = inertia * CRANE.J1
-    drives = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind, start_position=where)
-    drives = drives.replace(damping=2.0 * damping * drives.c / drives.Omega)
+    drive = CRANE.replace(torque_lag=lag, load_kind=kind, start_position=where)
+    d = [2.0 * damping * CRANE.c / CRANE.replace(load_inertia=one).Omega for one in J2.tolist()]
+    drives = records(drive, gap=gap, load_inertia=J2, damping=d)
     peak, end = (simulate(drives, make_controller(name, {"raise_at": at})) for at in ("peak", "end"))
     return (peak.k_dyn - end.k_dyn).values, (peak.start_time - end.start_time).values
 

@@ -18,7 +18,6 @@ from tests.controllers.starts import CRANE, index, random_drive, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.profile import TorqueProfile
-from softstart.start.metrics import base_torque
 from softstart_controllers import landing, shaped
 from softstart_controllers.profile import Profile
 from softstart_controllers.shaped import Shaped
@@ -208,7 +207,7 @@ def test_the_first_look_at_the_contact_tells_its_state(
     first = np.argmax(trace[:, 1 + index(shaped.STATE, "phase")] > shaped.GAP_OPEN)
     seen = trace[first]
     true = run.at([seen[0]])
-    unit = base_torque(drive)
+    unit = drive.mean_torque
     assert 0.0 < seen[0] - run.first_contact < 0.0065
     assert abs(drive.c * seen[1 + index(shaped.STATE, "z")] - true["T"][0]) / unit < 0.04
     rate = true["w1"][0] - true["w2"][0]

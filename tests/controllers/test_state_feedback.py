@@ -11,10 +11,8 @@ import pytest
 from scipy.linalg import expm
 from tests.controllers.starts import CRANE, index, traced
 
-from softstart import Drive, InputError, simulate
-from softstart.controller.base import numbers_of
+from softstart import Drive, InputError, records, simulate
 from softstart.drive import library
-from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback as sf
 from softstart_controllers.contact_designs import (
@@ -115,17 +113,6 @@ def test_thousands_of_weights_need_few_designs(monkeypatch: pytest.MonkeyPatch) 
     assert len(asked) <= 17 * 17
 
 
-def test_batch_has_the_numbers_of_its_drives() -> None:
-    batch = CRANE.replace(
-        load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096], torque_lag=[0, 1e-3, 0.01]
-    )
-    weights = {"torque_weight": np.array([1.0, 3.0, 10.0]), "rate_weight": np.array([0.5, 4.0, 2.0])}
-    _, together = numbers_of(StateFeedback(**weights).set_ups(batch))  # type: ignore[arg-type, misc]
-    for i, one in enumerate(batch.elements()):
-        own = {name: float(values[i]) for name, values in weights.items()}
-        assert np.array_equal(together[i], StateFeedback(**own).fitted(one).vector(one))
-
-
 def distance_to_instability(drive: Drive, plant: Drive) -> float:
     """Smallest |1 + L| of the loop, cut at the demand; 1/that is the peak of its sensitivity."""
     p = StateFeedback().fitted(drive).vector(drive).view(sf.PARAMETERS)[0]
@@ -200,7 +187,7 @@ def test_estimates_stay_close_from_the_first_look_on(gap: float, J2: float, lag:
     run, trace = traced(drive, StateFeedback())
     closed = trace[trace[:, 1 + index(sf.STATE, "phase")] == sf.CLOSED]
     true = run.at(closed[:, 0])
-    base = base_torque(drive)
+    base = drive.mean_torque
     assert np.abs(drive.c * closed[:, 1 + index(sf.STATE, "z")] - true["T"]).max() < 0.1 * base
     assert np.abs(closed[:, 1 + index(sf.STATE, "speed")] - true["w1"]).max() < 0.8
     assert np.abs(closed[:, 1 + index(sf.STATE, "load")] - drive.Mc).max() < 0.25 * base
@@ -235,7 +222,7 @@ def test_a_heavier_load_torque_is_estimated_and_allowed_for() -> None:
     ideal = CRANE.replace(encoder_lines=0)
     heavier = ideal.replace(load_torque=14.0, target_speed=400.0)
     run = simulate(heavier, StateFeedback(), fitted_to=ideal)
-    assert run.T[-1] == pytest.approx(base_torque(CRANE), rel=1e-9)
+    assert run.T[-1] == pytest.approx(CRANE.mean_torque, rel=1e-9)
     assert run.u[-1] == pytest.approx(62.0 - (14.0 - CRANE.Mc) * CRANE.J1 / CRANE.J2, rel=1e-6)
 
 
@@ -245,7 +232,7 @@ def test_invariant_to_gap_inertia_and_stiffness() -> None:
     gaps, inertias, factors = np.meshgrid(
         [0.25, 1.0, 4.0], [0.07, 0.175, 0.35], [0.8, 1.0, 1.25], indexing="ij"
     )
-    drives = nominal.replace(gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
+    drives = records(nominal, gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
     peaks = simulate(drives, StateFeedback(), fitted_to=nominal, base=nominal).k_dyn.values
     assert peaks.max() < 1.35
     assert np.ptp(peaks, axis=0).max() < 0.12

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.stats import binomtest
 from tests.softstart.optimal.test_from_positions import random_unknown
 
-from softstart import Drive, Identification, identify, plan_experiments, simulate
+from softstart import Drive, Identification, identify, plan_experiments, records, simulate
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS
 from softstart.errors import InputError
@@ -43,7 +43,7 @@ from softstart.identification.planning import (
     _edges,
     made_up_log,
 )  # fmt: skip
-from softstart.start.batch import array_starts
+from softstart.start.batch import prepared
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
@@ -138,7 +138,7 @@ def planned(number: int) -> dict[str, Any]:
     runs = {}
     for one in plan.experiments:
         play = make_controller("profile", {"profile": one.profile})
-        found = array_starts(wide.replace(start_position=places), play, until=one.end)
+        found = prepared(records(wide, start_position=places)).notes([play.set_up(wide)], until=one.end)
         worst = float(places[np.argmax(found.peaks[:, 0])])
         run = simulate(wide.replace(start_position=worst), play, until=one.end)
         runs[one.name] = {

@@ -41,7 +41,7 @@ import pytest
 import xarray  # noqa: F401 - before the first fork
 import zarr  # noqa: F401
 
-from softstart import Drive, InputError, pareto, simulate, sweep, tune
+from softstart import Drive, InputError, pareto, records, simulate, sweep, tune
 from softstart.errors import DamagedWarning
 
 LIMIT = 10.0  # s: longer is a hang; more on a machine that does much else (--limit)
@@ -209,7 +209,7 @@ def damaged(
 ) -> Iterator[str]:
     """Damage stores; the violations."""
     simulate(CRANE, "ramp")  # compiled before the first fork
-    simulate(CRANE.replace(gap=[0.5, 2.0]), "reduced-first-stage")
+    simulate(records(CRANE, gap=[0.5, 2.0]), "reduced-first-stage")
     true = {}
     for kind, work in KINDS.items():
         place = home / kind

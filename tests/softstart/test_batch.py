@@ -9,15 +9,15 @@ from types import FrameType
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, SimulationError, compare, simulate
+from softstart import Drive, InputError, SimulationError, compare, records, simulate
 from softstart.controller import make_controller
-from softstart.start.batch import array_starts
+from softstart.start.batch import prepared
 
 CRANE = Drive.load("crane-4amtkf")
 
 
 def test_one_dimension_is_called_start_and_carries_the_field() -> None:
-    data = simulate(CRANE.replace(gap=[0.5, 1.0, 2.0]), "direct")
+    data = simulate(records(CRANE, gap=[0.5, 1.0, 2.0]), "direct")
     assert data.k_dyn.dims == ("start",)
     np.testing.assert_array_equal(data.gap, [0.5, 1.0, 2.0])
     assert list(data.coords) == ["gap"]
@@ -27,17 +27,6 @@ def test_one_dimension_is_called_start_and_carries_the_field() -> None:
         assert data[name].attrs["long_name"]
 
 
-def test_fields_broadcast_to_a_grid() -> None:
-    gaps, inertias = np.array([0.5, 2.0]), np.array([0.07, 0.1, 0.175])
-    data = simulate(CRANE.replace(gap=gaps[:, None], load_inertia=inertias[None, :]), "reduced-two-stage")
-    assert data.k_dyn.dims == ("axis_0", "axis_1")
-    assert data.k_dyn.shape == (2, 3)
-    one = simulate(CRANE.replace(gap=2.0, load_inertia=0.1), "reduced-two-stage")
-    assert float(data.k_dyn[1, 1]) == one.k_dyn
-    assert float(data.gap[1, 1]) == 2.0
-    assert float(data.load_inertia[1, 1]) == 0.1
-
-
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no interval timer")
 def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
     """The kernel hears no signal; a batch of some minutes is given to it in turns, and ends between two."""
@@ -45,13 +34,13 @@ def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
     def interrupted(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    many = CRANE.replace(gap=np.linspace(0.1, 4.0, 400_000))
+    many = records(CRANE, gap=np.linspace(0.1, 4.0, 400_000))
     before = signal.signal(signal.SIGVTALRM, interrupted)
     spent = time.process_time()
     try:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.5)
         with pytest.raises(KeyboardInterrupt):
-            array_starts(many, make_controller("current-limit-feedback"))
+            prepared(many).notes(make_controller("current-limit-feedback").set_ups(CRANE))
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
         signal.signal(signal.SIGVTALRM, before)
@@ -59,12 +48,12 @@ def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
 
 
 def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    many, ramp = CRANE.replace(gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
-    whole = array_starts(many, ramp)
+    many, ramp = records(CRANE, gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
+    whole = prepared(many).notes(ramp.set_ups(many))
     monkeypatch.setattr(
         "softstart.start.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
     )
-    parts = array_starts(many, ramp)
+    parts = prepared(many).notes(ramp.set_ups(many))
     assert parts.starts.tobytes() == whole.starts.tobytes()
     assert parts.shafts.tobytes() == whole.shafts.tobytes()
 
@@ -76,22 +65,12 @@ def test_a_list_may_mix_kinds() -> None:
     assert list(data.load_kind.values) == ["active", "reactive", "active"]
 
 
-def test_a_controller_set_up_for_another_drive() -> None:
-    worn = CRANE.replace(gap=[0.5, 2.0])
-    own = simulate(worn, "ramp")
-    fixed = simulate(worn.replace(load_inertia=0.35), "ramp", fitted_to=CRANE, base=CRANE)
-    assert float(own.k_dyn[0]) == simulate(CRANE, "ramp").k_dyn
-    heavy = CRANE.replace(gap=2.0, load_inertia=0.35)
-    assert float(fixed.k_dyn[1]) == simulate(heavy, "ramp", fitted_to=CRANE, base=CRANE).k_dyn
-    assert float(fixed.k_dyn[1]) != simulate(heavy, "ramp").k_dyn
-
-
 @pytest.mark.parametrize("rows", [1, 3])
 @pytest.mark.parametrize("role", ["fitted_to", "base"])
 def test_a_drive_of_another_shape_is_refused(rows: int, role: str) -> None:
-    other = CRANE.replace(load_inertia=np.linspace(0.1, 0.2, rows))
+    other = records(CRANE, load_inertia=np.linspace(0.1, 0.2, rows))
     with pytest.raises(InputError, match=role):
-        simulate(CRANE.replace(gap=[0.5, 2.0]), "ramp", **{role: other})
+        simulate(records(CRANE, gap=[0.5, 2.0]), "ramp", **{role: other})
     with pytest.raises(InputError, match=role):
         simulate([CRANE, CRANE], "ramp", **{role: other})
 
@@ -103,7 +82,7 @@ def test_a_controller_that_wants_to_be_asked_for_ever_is_stopped() -> None:
 
 def test_the_kernel_does_a_hundred_thousand() -> None:
     gaps = np.linspace(0.01, 4.0, 100_000)
-    data = simulate(CRANE.replace(gap=gaps), "direct")
+    data = simulate(records(CRANE, gap=gaps), "direct")
     # [G](17), the closed form on every one
     impact = CRANE.c / CRANE.Omega * np.sqrt(gaps * (62 * 0.175 + 7.16 * 0.035) / (0.035 * 0.175))
     mean = (62 * 0.175 + 7.16 * 0.035) / 0.21
@@ -132,7 +111,8 @@ def test_strides_over_repeated_contacts_keep_every_bit(strategy: str, kind: str,
     """A batch takes repeated contacts in one stride, a recorded start goes through each: the same bits."""
     rng = np.random.default_rng(11)
     count = 100
-    drives = CRANE.replace(
+    drives = records(
+        CRANE,
         load_kind=kind,
         gap=rng.uniform(0.01, 4.0, count),
         load_inertia=10 ** rng.uniform(-2, 1, count),

@@ -39,7 +39,7 @@ def test_draws_have_the_intervals_and_the_correlations_that_are_shown(found: Ide
     drawn = found.draws(40_000, seed=1)
     logs = []
     for one in found.shared:
-        values = np.asarray(getattr(drawn, one.name))
+        values = drawn.fields[one.name]
         ends = np.quantile(values, [0.025, 0.975])
         width = one.upper - one.lower
         assert ends == pytest.approx([one.lower, one.upper], abs=0.02 * width), one.name
@@ -58,7 +58,7 @@ def test_what_was_saved_is_loaded_to_the_bit(found: Identification, folder: Path
     assert read.guess == found.guess
     assert read.estimates == kept.estimates
     assert np.array_equal(read.correlations, found.correlations)
-    assert np.array_equal(read.draws(20).gap, kept.draws(20).gap)
+    assert np.array_equal(read.draws(20).fields["gap"], kept.draws(20).fields["gap"])
     assert (read.ripple, read.searches, read.agreed, read.notes) == (
         found.ripple, found.searches, found.agreed, found.notes,
     )  # fmt: skip
@@ -143,7 +143,7 @@ def test_friction_that_may_be_none_is_kept_drawn_and_compared(tmp_path: Path) ->
     rubbed.save(tmp_path)
     read = Identification.load(tmp_path)
     assert read.estimates == rubbed.rounded().estimates
-    drawn = np.asarray(read.draws(4000).motor_friction)
+    drawn = read.draws(4000).fields["motor_friction"]
     assert drawn.min() >= 0.0
     assert np.quantile(drawn, 0.975) == pytest.approx(one.upper, rel=0.05)
     row = compare(read, ["direct"]).rows[0]

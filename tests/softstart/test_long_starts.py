@@ -104,7 +104,7 @@ class Spinner(CompiledController):
     kernel: ClassVar[Any] = spin
 
     def vector(self, drive: Drive) -> Vector:
-        return np.zeros((*drive.shape, 1))
+        return np.zeros(1)
 
 
 def test_a_controller_that_comes_while_the_watch_ends_is_named(

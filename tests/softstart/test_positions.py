@@ -10,13 +10,11 @@ from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, compare, linear_view, simulate
+from softstart import Drive, InputError, compare, linear_view, records, simulate
 from softstart.chain import reduce_chain
-from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.doubts import doubts
 from softstart.kernel.records import S_REF, S_SLOPE, S_START
-from softstart.start.batch import array_starts
 from softstart.views import starts
 
 CRANE = Drive.load("crane-4amtkf")
@@ -50,8 +48,9 @@ def test_defaults() -> None:
     assert plain.replace(brake="motor").replace(brake="none").start_position == "mid-gap"
     held = plain.replace(load_kind="reactive")  # by friction, wherever it came to rest
     assert held.start_position == held.replace(brake="motor").start_position == "unknown"
-    assert held.replace(gap=[0.0, 0.1]).start_position == "unknown"
-    for no_doubt in ({"gap": 0.0}, {"initial_load_speed": -1.0}, {"initial_motor_speed": [0.0, 1.0]}):
+    for fields, where in (({"gap": [0.0, 0.1]}, "unknown"), ({"initial_motor_speed": [0.0, 1.0]}, "mid-gap")):
+        assert {one.start_position for one in records(held, **fields).elements()} == {where}
+    for no_doubt in ({"gap": 0.0}, {"initial_load_speed": -1.0}, {"initial_motor_speed": 1.0}):
         assert held.replace(**no_doubt).start_position == "mid-gap"
     assert held.replace(initial_speed="reversal").start_position == "opposite-flank"
     assert held.replace(start_position="mid-gap").start_position == "mid-gap"
@@ -168,7 +167,6 @@ def test_an_angle_keeps_its_place_in_a_wider_gap() -> None:
     assert beyond.with_gap(1.0).theta0 == pytest.approx(-0.52)
     assert inside.with_gap(0.5) == inside
     assert inside.replace(gap=1.0).theta0 == -0.1
-    np.testing.assert_allclose(inside.with_gap([0.5, 2.0]).theta0, [-0.1, -0.4])
     assert inside.with_gap(1.0, start_position=0.3).theta0 == 0.3
     hanging = HOIST.replace(start_position=HOIST.theta0)
     row = compare(hanging, ["direct"]).rows[0]
@@ -201,12 +199,10 @@ def test_unknown_is_the_worst_of_three(name: str) -> None:
         assert run.start_time == max(one.start_time for one in three.values())
         assert run.impact_speed == max(one.impact_speed for one in three.values())
         assert run.summary()["positions"]["worst"] == run.position
-        notes = array_starts(drive.replace(gap=[drive.gap]), make_controller(name))
         many = simulate([drive], name)
         assert float(many.k_dyn[0]) == run.k_dyn
         assert float(many.start_time[0]) == run.start_time
         assert str(many.position.values[0]) == run.position
-        assert notes.peaks.tolist() == [[run.peak_torque]]
 
 
 def test_each_position_is_the_drive_with_that_position() -> None:
@@ -227,7 +223,7 @@ def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
     run, same = simulate(plain, "ramp"), simulate(named, "ramp")
     assert (run.k_dyn, run.start_time, run.position) == (same.k_dyn, same.start_time, same.position)
     assert list(run.positions) == list(UNKNOWN_POSITIONS)
-    found = simulate(plain.replace(gap=[0.0, 0.5]), "ramp")
+    found = simulate(records(plain, gap=[0.0, 0.5]), "ramp")
     assert float(found.k_dyn[1]) == run.k_dyn
     alone = simulate(plain.replace(gap=0.0), "ramp")
     assert float(found.k_dyn[0]) == alone.k_dyn

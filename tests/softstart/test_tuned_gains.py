@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, compare, pareto, simulate, sweep, tune
+from softstart import Drive, InputError, compare, pareto, records, simulate, sweep, tune
 from softstart.cli.main import main
 from softstart.controller import make_controller
 from softstart.controller.tuned import (
@@ -116,7 +116,7 @@ def test_a_single_cell():
 
 def batch():
     gaps, inertias = (a.ravel() for a in np.meshgrid([0.3, 0.8, 2.0], [0.07, 0.2], indexing="ij"))
-    return CRANE.replace(gap=gaps, load_inertia=inertias)
+    return records(CRANE, gap=gaps, load_inertia=inertias)
 
 
 @pytest.mark.parametrize(
@@ -129,8 +129,7 @@ def test_batches_start_as_single_drives_do(gains):
         run = simulate(drive, gains)
         assert float(together.k_dyn[k]) == run.k_dyn
         assert float(together.start_time[k]) == run.start_time
-    listed = simulate(list(drives.elements()), gains)
-    assert np.array_equal(listed.k_dyn, together.k_dyn)
+    assert np.array_equal(simulate(list(drives.elements()), gains).k_dyn, together.k_dyn)
 
 
 def test_a_schedule_goes_by_what_is_declared_and_a_set_by_its_own_drive():
@@ -181,7 +180,7 @@ def test_a_loose_plain_controller_goes_the_whole_way(tmp_path):
     for what in ("schedule", "robust"):
         tuned.to_toml(tmp_path / f"{what}.toml", what)
     tuned.to_csv(tmp_path / "schedule.csv")
-    drives = CRANE.replace(gap=[0.5, 0.75, 1.0])
+    drives = records(CRANE, gap=[0.5, 0.75, 1.0])
     made = {
         file: make_controller(str(tmp_path / file), allow_code=True)
         for file in ("schedule.toml", "schedule.csv", "robust.toml")

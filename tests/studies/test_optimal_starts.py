@@ -13,7 +13,6 @@ from softstart.optimal import whole_certificate
 from softstart.optimal.exact import replay
 from softstart.optimal.result import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
-from softstart.start.metrics import base_torque
 from softstart.study import Verdict, find_study
 from softstart.views.optima import front_figure
 from softstart_studies.optimal_starts import OptimalStarts, find, limits, pictures, present, sensor, smooth
@@ -103,7 +102,7 @@ def test_profiles_are_those_of_the_anchor_and_end_in_step(found):
     assert [float(end[name]) for name in ("w1", "w2")] == pytest.approx([TARGET, TARGET], rel=1e-8)
     assert start.run.contacts == 1
     assert 0.0 <= start.run.u.min() <= start.run.u.max() <= 62.0
-    assert start.run.peak_torque / base_torque(crane()) == pytest.approx(start.point.k_dyn, rel=1e-12)
+    assert start.run.peak_torque / crane().mean_torque == pytest.approx(start.point.k_dyn, rel=1e-12)
 
 
 def test_the_front_falls_and_holds_its_bound(found):
@@ -149,7 +148,7 @@ def test_what_is_said_of_a_profile_for_several_gaps(found):
     rows = sensor.table(found.sensed).rows
     assert [row[1] for row in rows] == [0.5, 0.6]
     for row, run in zip(rows, one.worth.blind.runs, strict=True):
-        assert row[3] == pytest.approx(run.peak_torque / base_torque(crane()), abs=1e-4)
+        assert row[3] == pytest.approx(run.peak_torque / crane().mean_torque, abs=1e-4)
     blind, by_gap = sensor.claims(found.sensed)
     assert blind.verdict is Verdict.REFUTED  # reacting like the blind one it is worth nothing
     assert by_gap.verdict is Verdict.REFUTED
@@ -189,7 +188,7 @@ def test_landmarks(gap):
     )  # the hold is just within Ms
     assert (best.method, best.k_dyn) == ("closed-form", pytest.approx(1.0, abs=1e-5))
     idle = replay(crane(gap), TorqueProfile([0.0], [0.0]), until=1.0)
-    assert idle.stages[1].peak_torque / base_torque(crane(gap)) == pytest.approx(one.floor, rel=1e-9)
+    assert idle.stages[1].peak_torque / crane(gap).mean_torque == pytest.approx(one.floor, rel=1e-9)
 
 
 # what is said and drawn ----------------------------------------------------------------------------------

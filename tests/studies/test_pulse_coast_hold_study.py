@@ -40,7 +40,7 @@ def test_it_is_registered():
 
 def test_drives_of_the_grid():
     batch = starts("reactive", (0.5, 2.0), (2.0, 5.0), 4)
-    one = batch.elements().__iter__().__next__()
+    one = next(batch.elements())
     assert (one.gap, one.load_inertia, one.encoder_phase) == (0.5, 2.0 * TOLD.J1, 0.0)
     assert (one.torque_lag, one.encoder_lines, one.load_kind) == (LAG, 4096, "reactive")
     assert ideal("active", 2.0, 5.0).torque_lag == 0.0

@@ -13,7 +13,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -33,6 +32,7 @@ from softstart.chain.elements import (
     Quantity,
     Shaft,
 )
+from softstart.chain.words import Words
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.drive.checks import wrong_units
 from softstart.drive.doubts import TwoMasses
@@ -51,7 +51,7 @@ BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joi
 
 
 @dataclass(frozen=True, init=False)
-class Chain:
+class Chain(Words):
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
     Each quantity is a number in SI or a string with a unit, on its own shaft.
@@ -103,6 +103,8 @@ class Chain:
     release_time: ClassVar[float] = 0.0
     position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
     gear_ratio: ClassVar[None] = None  # masses and shafts are given at their own shafts
+    KIND: ClassVar[str] = "chain"
+    LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 
     masses: tuple[Mass, ...]
     shafts: tuple[Shaft, ...]
@@ -231,16 +233,6 @@ class Chain:
             return 0 if self.motor is None else names.index(self.motor.mass)
         raise InputError(f"{show(place)}: {_no_such(place, names)}")
 
-    @property
-    def motor_index(self) -> int:
-        """The index of the mass on which the motor acts; the first where there is no motor."""
-        return 0 if self.motor is None else self.index(self.motor.mass)
-
-    @property
-    def load_index(self) -> int:
-        """The index of the mass that is to reach the target speed."""
-        return self.index(self.load_mass)
-
     def speed_ratios(self, reference: str | int = "motor") -> tuple[float, ...]:
         """The speed of each mass's shaft over that of the reference: `i` of [R], table 1.
 
@@ -267,15 +259,6 @@ class Chain:
     def gaps(self) -> Vector:
         """The gap of each shaft, rad at the motor shaft."""
         return self.at_motor_shaft().gap
-
-    @property
-    def shaft_names(self) -> tuple[str, ...]:
-        """Each shaft by the masses that it joins.
-
-        >>> Chain.load("crane-4-mass").shaft_names[0]
-        'rotor - pinion'
-        """
-        return tuple(f"{a.name} - {b.name}" for a, b in pairwise(self.masses))
 
     @property
     def mean_torque(self) -> float:
@@ -479,21 +462,6 @@ class Chain:
             values = states[name].reshape(states["u"].size, -1)
             columns |= {f"{name} {part} [{unit}]": values[:, i] for i, part in enumerate(parts)}
         return columns
-
-    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
-        """The chain with so many times its gaps, and its load mass with so many times its inertia.
-
-        An angle in a gap keeps its share of it, one beyond a flank its overlap.
-
-        >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
-        0.8
-        """
-        load = self.load_index
-        masses = [
-            mass.replace(inertia=load_inertia * mass.inertia) if i == load else mass
-            for i, mass in enumerate(self.masses)
-        ]
-        return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
     @property
     def freed(self) -> Self:

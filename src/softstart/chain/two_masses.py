@@ -12,13 +12,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from softstart import formulas
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.profile import TorqueProfile
-from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -48,7 +48,8 @@ class Verification:
     @property
     def chain_k_dyn(self) -> float:
         """Its largest torque over the mean torque of the drive."""
-        return float(metrics.k_dyn(float(self.chain.peak_torques[self.worst_shaft]), self.drive.drive))
+        peak = float(self.chain.peak_torques[self.worst_shaft])
+        return float(formulas.dynamic_coefficient(peak, self.drive.drive.mean_torque))
 
     @property
     def error(self) -> float:
@@ -104,7 +105,7 @@ def verify_on_chain(
     Raises
     ------
     InputError
-        For bad input, as a batch of drives or a chain without a motor.
+        For bad input, as a chain without a motor.
     SimulationError
         If one of the two starts cannot be finished.
 
@@ -120,8 +121,6 @@ def verify_on_chain(
     ----------
     What a reduction keeps: [R], docs/theory/reduction.md; how to use it: docs/howto/reduce-a-driveline.md.
     """
-    if drive.shape != ():
-        raise InputError(f"{drive.name}: a batch of shape {drive.shape}; give a single drive.")
     made = make_controller(controller, parameters)
     whole = simulate(chain, made, until, fitted_to=drive, base=drive)
     return Verification(simulate(drive, made, until), whole)

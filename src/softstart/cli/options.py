@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import shlex
@@ -95,11 +94,6 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
         given = read_settings(settings, Drive.PARAMETERS)[0]
         if sheet is not None and "assumed" not in given:
             drive = drive.replace(assumed=found.assumed_still(given))
-    if drive.shape != ():
-        raise InputError(
-            f'"{name}": lists of values make {math.prod(drive.shape)} drives, and the command line starts '
-            "one at a time; give one value a key (softstart.simulate in Python takes batches)."
-        )
     return drive
 
 

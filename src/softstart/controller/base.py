@@ -19,6 +19,7 @@ import numpy as np
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
+from softstart.drive.records import Records
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
 Kind = Literal["quantity", "text", "object"]
@@ -255,10 +256,11 @@ class Controller:
         drive = drive.design_drive
         return self.fitted(drive), drive
 
-    def set_ups(self, drives: Drive | Sequence[Drive]) -> Iterator[SetUp]:
-        """`set_up` for each element of a batch of drives, last index fastest; parameters may be such arrays.
+    def set_ups(self, drives: Any) -> Iterator[SetUp]:
+        """`set_up` for each machine of records or a list, last index fastest, or for a single one.
 
-        The only place where a controller meets arrays.
+        The only place where a controller meets arrays: its parameters may be some, as many as machines, or of
+        any length for a single one.
 
         >>> from softstart.controller import make_controller
         >>> crane = Drive.load("crane-4amtkf")
@@ -272,13 +274,18 @@ class Controller:
             if isinstance(value := getattr(self, f.name), np.ndarray)
             and f.metadata.get("kind", "quantity") == "quantity"
         }
-        each = drives.elements() if isinstance(drives, Drive) else iter(drives)
+        given: Iterable[Any]
+        if isinstance(drives, Records):
+            given, shape = drives.elements(), drives.shape
+        elif isinstance(drives, Sequence):
+            given, shape = drives, (len(drives),)
+        else:
+            shape = np.broadcast_shapes(*(values.shape for values in arrays.values()))
+            given = repeat(drives) if arrays else (drives,)
+        each = (one.design_drive for one in given)
         if not arrays:
             yield from map(self.set_up, each)
             return
-        shape = drives.shape if isinstance(drives, Drive) else (len(drives),)
-        if isinstance(drives, Drive) and shape == ():
-            shape, each = np.broadcast_shapes(*(values.shape for values in arrays.values())), repeat(drives)
         columns = (np.broadcast_to(values, shape).ravel().tolist() for values in arrays.values())
         for row, drive in zip(zip(*columns, strict=True), each, strict=False):
             yield replace(self, **dict(zip(arrays, row, strict=True))).set_up(drive)

@@ -111,7 +111,7 @@ class RobustGains(Tuned):
         ready, own = self.controller.set_up(self.nominal)
         return self._called(ready), own
 
-    def set_ups(self, drives: Drive | Sequence[Drive]) -> Iterator[SetUp]:
+    def set_ups(self, drives: Any) -> Iterator[SetUp]:
         """One for all drives."""
         yield self.set_up(self.nominal)
 

@@ -13,6 +13,7 @@ from softstart.quantities import RefusedError, Units, Value, show
 
 __all__ = ["FRICTIONS", "contradictions", "elastic_frequency", "wrong_units"]
 
+BROADCAST: Final = "arrays of records must broadcast together; give them one length, or a single number"
 FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
 
 Values = Mapping[str, Any]
@@ -51,9 +52,7 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
         listed = ", ".join(
             f"{wording.label(parameters[name])} has shape {shape}" for name, shape in arrays.items()
         )
-        yield wording.sentence(
-            listed, "arrays of one drive must broadcast together; give them one length, or a single number"
-        )
+        yield wording.sentence(listed, BROADCAST)
         return
     both = _Pairs(values, parameters, wording, shape)
     yield from both.broken(

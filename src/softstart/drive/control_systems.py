@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.errors import InputError
 from softstart.late import late
 
 if TYPE_CHECKING:
@@ -51,13 +50,11 @@ def in_contact(drive: Drive) -> control.StateSpace:
     Outputs are the states and `shaft_torque`. Holds while the flank presses (`shaft_torque > 0`; with
     the `modelica` law also while the damping torque is below that of the spring).
 
-    Raises `InputError` for a batch.
 
     >>> from softstart.drive import Drive
     >>> in_contact(Drive.load("crane-4amtkf")).output_labels
     ['z', 'w1', 'w2', 'shaft_torque']
     """
-    _single(drive)
     J1, J2, c, d = (float(value) for value in (drive.J1, drive.J2, drive.c, drive.d))
     torque = np.array([[c, d, -d]])
     states = ["z", "w1", "w2"]
@@ -100,13 +97,12 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     States `phi1, w1, phi2, w2`, then `reference` (the demand behind the rate limit) if `torque_rate` is
     finite and `u` if there is a `torque_lag`. `params` holds J1, J2, c, d, gap, Mc, b1 and b2, to be
     overridden in a simulation. Give it `initial_state(drive)`, and a `max_step` below the shortest stage to
-    the solver, or it may step over a contact. Raises `InputError` for a batch.
+    the solver, or it may step over a contact.
 
     >>> from softstart.drive import Drive
     >>> whole_drive(Drive.load("servo-axis-small")).state_labels
     ['phi1', 'w1', 'phi2', 'w2', 'u']
     """
-    _single(drive)
     states = _states(drive)
     actuator = _actuator(drive, states)
     smoothing = _SMOOTHING * float(drive.elastic_period)
@@ -155,7 +151,6 @@ def initial_state(drive: Drive) -> Vector:
     >>> initial_state(Drive.load("crane-4amtkf").replace(start_position=-0.25))
     array([-0.25,  0.  ,  0.  ,  0.  ])
     """
-    _single(drive)
     mechanical = [
         float(drive.theta0),
         float(drive.initial_motor_speed),
@@ -195,13 +190,6 @@ def _actuator(drive: Drive, states: list[str]) -> Callable[[Vector, float], tupl
         return wanted, rates
 
     return actuator
-
-
-def _single(drive: Drive) -> None:
-    if drive.shape != ():
-        raise InputError(
-            f"{drive.name}: a batch of shape {drive.shape} is not one system; take one of drive.elements()."
-        )
 
 
 def _system_name(drive: Drive) -> str:

@@ -38,7 +38,7 @@ def doubts(machine: Any) -> list[str]:
     direct at the first contact, [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
     below 1 before the larger inertia. A chain counts by the lever rule.
 
-    >>> from softstart import Drive
+    >>> from softstart.drive import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> doubts(crane)
     []

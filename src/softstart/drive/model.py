@@ -26,7 +26,7 @@ from softstart.input.parameter_set import (
     parameter,
     read_settings,
 )  # fmt: skip
-from softstart.input.parameters import Parameter, Wording
+from softstart.input.parameters import Knob, Parameter, Wording
 from softstart.late import late
 from softstart.quantities import show
 
@@ -51,9 +51,8 @@ library = Library("softstart.drive", "a drive", "drives")
 class Drive(ParameterSet):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
-    Each quantity is a number in SI, a string with a unit, or an array of such (a batch: arrays broadcast
-    together to `shape`). Angles are in rad at the motor shaft. A drive is frozen and its arrays are
-    read-only; equal drives hash alike.
+    Each quantity is a number in SI or a string with a unit; many drives are `softstart.records`. Angles are
+    in rad at the motor shaft. A drive is frozen; equal drives hash alike.
 
     Without `start_position`, an active load behind a brake hangs, a reversal begins on the opposite flank,
     and a reactive load at rest with a gap is at an unknown position: friction holds it wherever the last stop
@@ -89,7 +88,12 @@ class Drive(ParameterSet):
     """
 
     WHAT: ClassVar[str] = "a drive"
-    BATCH: ClassVar[bool] = True
+    KIND: ClassVar[str] = "drive"
+    LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
+    SEVERAL: ClassVar[Mapping[str, str]] = {
+        "": "a drive has one value; for several starts use sweep",
+        "python": "a drive has one value; for several starts write records(drive, {name}={value})",
+    }
     SHEET: ClassVar[Any]  # `DataSheet`, which knows drives
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
@@ -348,38 +352,6 @@ class Drive(ParameterSet):
         given = self.given()
         return document_text((table, given) for table in self.TABLES)
 
-    # ---- batches -----------------------------------------------------------------------------------------
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape that the arrays among the parameters broadcast to; () for a single drive.
-
-        >>> Drive.load("crane-4amtkf").replace(gap=[0.5, 1, 2]).shape
-        (3,)
-        """
-        return np.broadcast_shapes(*(v.shape for v in vars(self).values() if isinstance(v, np.ndarray)))
-
-    def elements(self) -> Iterator[Self]:
-        """The single drives of a batch, last index fastest; a single drive is its own only element.
-
-        >>> [drive.gap for drive in Drive.load("crane-4amtkf").replace(gap=[0.5, 1, 2]).elements()]
-        [0.5, 1.0, 2.0]
-        """
-        shape = self.shape
-        if shape == ():
-            yield self
-            return
-        varied = {
-            name: np.broadcast_to(value, shape).ravel().tolist()
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
-        for row in zip(*varied.values(), strict=True):
-            # each element was checked with the batch
-            one = type(self).__new__(type(self))
-            vars(one).update(vars(self) | dict(zip(varied, row, strict=True)))
-            yield one
-
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
     @property
@@ -459,6 +431,47 @@ class Drive(ParameterSet):
         one = self if gaps == 1.0 else self.with_gap(gaps * self.gap)
         return one if load_inertia == 1.0 else one.replace(load_inertia=load_inertia * self.load_inertia)
 
+    # ---- by the words of a sweep --------------------------------------------------------------------------
+
+    @property
+    def gap_and_inertia(self) -> tuple[float, float]:
+        """Gap, rad, and inertia of the load, kg m2.
+
+        >>> Drive.load("crane-4amtkf").gap_and_inertia
+        (0.5, 0.175)
+        """
+        return self.gap, self.load_inertia
+
+    @property
+    def motor_at_load(self) -> float:
+        """Inertia of the motor at the shaft of the load, kg m2: the load is at the motor shaft here."""
+        return self.motor_inertia
+
+    def moved(self, gap: float, inertia: float, origin: Any = None) -> Self:
+        """The drive with another gap, as `with_gap`, and another load inertia; `origin` is for chains."""
+        return self.with_gap(gap, load_inertia=inertia)
+
+    def by_path(self) -> dict[str, tuple[Parameter, Any]]:
+        """All parameters by their paths, each with its value."""
+        return {one.path: (one, getattr(self, name)) for name, one in self.PARAMETERS.items()}
+
+    def knob(self, key: str) -> Knob | None:
+        """The parameter that a key names, as in a file or in Python; None where there is none.
+
+        >>> Drive.load("crane-4amtkf").knob("load.inertia").name
+        'load_inertia'
+        """
+        name = BY_PATH.get(key, key)
+        return Knob(name, PARAMETERS[name], getattr(self, name)) if name in PARAMETERS else None
+
+    def knobs(self) -> Iterator[str]:
+        """The keys of all parameters that can be varied, as in a file."""
+        return iter(BY_PATH)
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """The drive with these values; with a gap as `with_gap`."""
+        return self.with_gap(**values) if "gap" in values else self.replace(**values)
+
     # ---- what starts ask of any machine ------------------------------------------------------------------
 
     @property
@@ -475,6 +488,16 @@ class Drive(ParameterSet):
         """
         push = self.Ms - self.motor_friction
         return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
+
+    @property
+    def lumped(self) -> TwoMasses:
+        """The drive as two masses at the motor shaft, as its doubts see it."""
+        travels = (0.5 * self.gap - one.theta0 for one in self.positions.values())
+        return TwoMasses(
+            J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *travels),
+            Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
+            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
+        )  # fmt: skip
 
     @property
     def motor(self) -> Self:
@@ -571,16 +594,6 @@ class Drive(ParameterSet):
     def two_masses(self) -> Self:
         """The drive of two masses that stands for the machine: the drive itself."""
         return self
-
-    @property
-    def lumped(self) -> TwoMasses:
-        """The drive as two masses, for checks of their size."""
-        ahead = (0.5 * self.gap - one.theta0 for one in self.positions.values())
-        return TwoMasses(
-            J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *ahead),
-            Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
-            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
-        )  # fmt: skip
 
     def with_damping_ratio(self, ratio: float) -> Self:
         """The drive with this damping ratio, if it has no damping."""
@@ -679,7 +692,6 @@ class Drive(ParameterSet):
         beyond the gap and the speeds `w1` and `w2`, and the output `shaft_torque`. The nonlinear one has the
         input `demand` and the outputs `phi1, w1, phi2, w2, u, T`; start it from
         `control_systems.initial_state(drive)`. Both are described in `softstart.drive.control_systems`.
-        Raises `InputError` for a batch.
 
         >>> sorted(round(float(abs(pole)), 3) for pole in Drive.load("crane-4amtkf").to_control().poles())
         [0.0, 112.397, 112.397]
@@ -690,4 +702,5 @@ class Drive(ParameterSet):
 
 
 PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS
+BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
 TABLES: tuple[str, ...] = tuple(table.name for table in Drive.TABLES if table.name)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
+from softstart.drive.records import Columns
 from softstart.errors import SimulationError
 from softstart.identification.logs import Log
 from softstart.kernel.records import ENDED, MACHINE, S_PHI
@@ -79,8 +80,8 @@ class LogModel:
         elif not changes:
             changes = {"gap": np.full(len(values), float(self.drive.gap))}
         # numbers already, and within their ranges: to read and check them takes longer than the motion
-        drive = object.__new__(Drive)
-        vars(drive).update(vars(self.drive) | changes)
+        drive = Columns.of(self.drive)
+        vars(drive).update(changes)
         rows = rows_of(drive)
         named = rows.machines.view(MACHINE)[:, 0]
         named["longest"], named["time_limit"] = math.inf, 1e9 + float(self.times[-1])

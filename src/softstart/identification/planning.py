@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from softstart.arrays import Vector
+from softstart.chain.machines import records
 from softstart.controller import Controller, make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
@@ -24,7 +25,7 @@ from softstart.identification.traces import FEWEST, Kind
 from softstart.late import late
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
-from softstart.start.batch import array_starts
+from softstart.start.batch import prepared
 from softstart.start.engine import ended
 from softstart.start.rows import MAX_EVENTS
 
@@ -488,7 +489,8 @@ class _Bench:
 
     def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
         """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
-        notes = array_starts(self._starts(places), _player(profile), until=end)
+        starts = records(self.wide, start_position=places) if self.moving else [self.wide]
+        notes = prepared(starts).notes([_player(profile).set_up(self.wide)], until=end)
         for one in notes.starts:
             ended(one, int(one["status"]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
         return notes.peaks[:, 0], notes["gap_events"]
@@ -502,9 +504,6 @@ class _Bench:
         shares = places / (0.5 * float(self.drive.gap) or 1.0)
         found = model.travels([{POSITION: share} if self.moving else {} for share in shares.tolist()])
         return found[:, 0], found[:, 1]
-
-    def _starts(self, places: Vector) -> Drive:
-        return self.wide.replace(start_position=places) if self.moving else self.wide
 
     def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> Vector:
         """By which share each of some positions exceeds the limits, below 0 where it keeps them."""

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Matrix, Vector, plain_fields
+from softstart.chain.machines import records
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
@@ -180,8 +182,8 @@ class Identification:
         """Whether intervals are stated: not where the drive does not explain the logs, or time was short."""
         return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
 
-    def draws(self, count: int = 200, seed: int = 0) -> Drive:
-        """Drives that the logs leave possible: a batch, drawn from the joint distribution of the estimates.
+    def draws(self, count: int = 200, seed: int = 0) -> Records:
+        """Drives that the logs leave possible, drawn from the joint distribution of the estimates.
 
         >>> from softstart import identify
         >>> from softstart.identification.planning import made_up_log
@@ -199,11 +201,12 @@ class Identification:
         values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
         normal = np.random.default_rng(seed).standard_normal((count, len(which)))
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
-        return self.drive.replace(
+        return records(
+            self.drive,
             **{
                 self.estimates[i].name: self.estimates[i].moved(move)
                 for i, move in zip(which, moves.T, strict=True)
-            }
+            },
         )
 
     def k_dyn(

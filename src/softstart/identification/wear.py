@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import varied
 from softstart.controller import Controller
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
@@ -277,7 +278,7 @@ def follow_wear(
         last, drawn = each[-1].drive, each[-1].draws()
         made = make_controllers(controllers, {})
         now = tuple(compared(last, one, None, worst_case=(), drawn=drawn) for one in made)
-        wide, all_wide = last.with_gap(worn), drawn.with_gap(worn)
+        wide, all_wide = last.with_gap(worn), varied(drawn, {"gap": worn})
         then = tuple(compared(wide, one, None, None, last, (), all_wide) for one in made)
     return Wear(
         tuple(each), tuple(names), tuple(days), line, worn, now, then, tuple(_notes(each, days, line))

@@ -92,11 +92,13 @@ def like(cls: type[ParameterSet], name: str) -> Any:
 class ParameterSet:
     """A value made of parameters: frozen, equal by content, hashable, copied and pickled as such.
 
-    All mistakes of one input raise a single `InputError`. `WHAT` names it in sentences, as "a drive"; with
-    `BATCH` its numbers may be arrays, which are read-only.
+    All mistakes of one input raise a single `InputError`. `WHAT` names it in sentences, as "a drive", and
+    `SEVERAL` says, by the style of the wording, what to do with several values for one. With `BATCH` its
+    numbers may be arrays, which are read-only.
     """
 
     WHAT: ClassVar[str] = "a table"
+    SEVERAL: ClassVar[Mapping[str, str]] = {}
     BATCH: ClassVar[bool] = False
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
     TABLES: ClassVar[tuple[Table, ...]] = ()
@@ -144,7 +146,9 @@ class ParameterSet:
         `known` holds values among those given that were read before.
         """
         parameters = self.PARAMETERS
-        values, found = read_values(given, parameters, wording, batch=self.BATCH, known=known)
+        values, found = read_values(
+            given, parameters, wording, batch=self.BATCH, known=known, several=self.SEVERAL
+        )
         wrong = [*mistakes, *found]
         if not given.keys() <= parameters.keys():
             wrong += [

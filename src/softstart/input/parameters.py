@@ -12,7 +12,7 @@ import numpy as np
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
+    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
     "sentences_of", "without_unit",
 ]  # fmt: skip
 
@@ -93,6 +93,15 @@ class Parameter:
     def place(self) -> str:
         """What the parameter is called in a sentence about a file: `[load] inertia`."""
         return f"[{self.table}] {self.key}" if self.table else self.key
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A parameter of a machine that can be varied: its word in Python, what it is, and its value."""
+
+    name: str
+    parameter: Parameter
+    value: Any
 
 
 @dataclass(frozen=True)
@@ -181,12 +190,15 @@ def read_values(
     *,
     batch: bool = False,
     known: Mapping[str, Any] | None = None,
+    several: Mapping[str, str] = {},
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """The values of `parameters` (by the names used in `given`), and what is wrong or missing.
 
     `known` holds values that were read before. None stands for "not given" where that is the default.
+    `several` has the reason why a list is refused, by the style of the wording.
     """
     values: dict[str, Any] = {}
+    reason = several.get(wording.style, several.get("", ""))
     mistakes: list[Mistake] = []
     for name, parameter in parameters.items():
         if known is not None and name in known:
@@ -194,7 +206,7 @@ def read_values(
         elif name in given and not (given[name] is None and parameter.default is None):
             value = given[name]
             try:
-                values[name] = read_value(parameter, value, batch=batch)
+                values[name] = read_value(parameter, value, batch=batch, several=reason)
             except RefusedError as refusal:
                 mistakes.append(Mistake(wording.refused(parameter, value, refusal)))
         elif parameter.default is REQUIRED:
@@ -234,10 +246,10 @@ def without_unit(
     return found
 
 
-def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> Any:
+def read_value(parameter: Parameter, value: object, *, batch: bool = False, several: str = "") -> Any:
     """One value in SI, as text, or one of the choices; raises `RefusedError` with reason and remedy.
 
-    A `batch` lets arrays of any shape through.
+    A `batch` lets arrays of any shape through; otherwise `several` is the reason why they are refused.
 
     >>> read_value(Parameter("gap", "rad", "total gap", '"0.5 rad"', "0 or more"), "500 mrad")
     0.5
@@ -255,7 +267,9 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> A
         if number.ndim > 1:
             raise RefusedError(f"the {parameter.meaning} is one list of numbers, such as {parameter.example}")
     elif not batch and not isinstance(number, float):
-        raise RefusedError(f"the {parameter.meaning} is one number, not a list")
+        reason = several or "the {meaning} is one number, not a list"
+        shown = show(value) if isinstance(value, list | tuple) else "[...]"
+        raise RefusedError(reason.format(meaning=parameter.meaning, name=parameter.name, value=shown))
     limit = LIMITS.get(parameter.limit)
     if limit is not None:
         _refuse(number, limit(number), f"the {parameter.meaning} must be {parameter.limit}")

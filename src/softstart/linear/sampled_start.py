@@ -113,7 +113,7 @@ class SampledStart:
     def of(cls, drive: Machine, controller: Controller, fitted_to: Machine | None = None) -> SampledStart:
         """The controller set up for this (or that) drive; no rounding or noise, the target speed far away."""
         fitted, own = controller.set_up((fitted_to or drive).design_drive)
-        rows = rows_of(drive).limited()
+        rows = rows_of(drive)
         machine = rows.machine
         differencing = bool(machine.encoder > 0.0)
         machine.target *= FAR

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine, knob, with_values
+from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
+from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
 from softstart.late import late
@@ -28,7 +29,6 @@ from softstart.linear.operating_point import (
 from softstart.linear.sampled_plant import single, sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
-from softstart.start.simulation import is_machine
 
 if TYPE_CHECKING:
     import control
@@ -304,7 +304,7 @@ def linear_view(
     Raises
     ------
     InputError
-        If the input is wrong, as an unknown controller.
+        If the input is wrong (an unknown controller).
     SimulationError
         If the start cannot be simulated.
 
@@ -346,10 +346,10 @@ def linear_view(
         return LinearView(drive, start.controller, "events", (sentence,), point)
     own = Loop(drive, point, start.differencing)
     modes = own.modes()
-    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := knob(drive, key))]
+    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := drive.knob(key))]
     varied = [(f"J2 x {k:g}", {"load_inertia": k * own_values[0]}) for k in inertias]
     varied += [(f"c x {k:g}", {"stiffness": k * own_values[1]}) for k in stiffnesses]
-    variations = [_varied(name, Loop(with_values(start.drive, change), point, start.differencing))
+    variations = [_varied(name, Loop(start.drive.with_values(change), point, start.differencing))
                   for name, change in varied]  # fmt: skip
     outside: Outside | None = None
     cycled: tuple[PredictedCycle, ...] = ()

@@ -162,10 +162,6 @@ class Problem:
         drive = self.drive
         if not isinstance(drive, Drive):
             raise InputError(f"drive = {drive!r}: give a Drive; Drive.load reads one from a file or by name.")
-        if drive.shape != ():
-            raise InputError(
-                "drive: an optimum is for one drive; for several under one profile, optimize_robust."
-            )
         if drive.computing_delay != 0.0:
             object.__setattr__(self, "drive", drive := drive.replace(computing_delay=0.0))
         wrong += drive.without_friction("optimal starts and bounds are known without this friction only")
@@ -290,7 +286,7 @@ def problem_of(
     >>> problem_of(Drive.load("crane-4amtkf"), 0.5).terminal
     'synchronous'
     """
-    from softstart.start.simulation import is_machine
+    from softstart.drive.records import is_machine
 
     if isinstance(machine, Drive) or not is_machine(machine):
         return Problem(machine, start_time, terminal or usual_terminal(machine), **asked)

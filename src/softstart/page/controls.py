@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
-from softstart.chain.machines import values_of
 from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, STRATEGY, Screen
@@ -130,7 +129,7 @@ class Controls:
         if path in self._screen.strategy_paths():
             self._session.set_parameter(_own(path), None)
         else:
-            loaded = values_of(self._session.origin)[self._entry(path).path][1]
+            loaded = self._session.origin.by_path()[self._entry(path).path][1]
             if loaded is None:
                 self._session.clear(path)
             else:

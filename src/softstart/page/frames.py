@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Machine, here, values_of
+from softstart.chain.machines import Machine
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
@@ -285,7 +285,7 @@ class Screen:
         return line
 
     def _here(self) -> tuple[float, float]:
-        gap, inertia = here(self.session.machine)
+        gap, inertia = self.session.machine.gap_and_inertia
         return self.units.shown(gap, "rad"), inertia
 
     def others(self) -> Iterator[Frame | None]:
@@ -344,7 +344,7 @@ class Screen:
         nominal = machine if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
         head = self._map_head(axes)
-        order = from_middle(len(axes.inertias), axes.nearest(*here(machine))[1])
+        order = from_middle(len(axes.inertias), axes.nearest(*machine.gap_and_inertia)[1])
         self._map_of = None  # from here on it has rows of both, if this is left half-way
         for index in order:
             k: list[float | None] = []
@@ -377,7 +377,7 @@ class Screen:
         session = self.session
         machine = session.machine
         allowed = machine.limits.shaft_torque
-        inertias = (here(machine)[1],) * len(axes.inertias) if self.kept else axes.inertias
+        inertias = (machine.gap_and_inertia[1],) * len(axes.inertias) if self.kept else axes.inertias
         symbols, labels = map_words(machine)
         return {
             "gaps": [self.units.shown(gap, "rad") for gap in axes.gaps],
@@ -462,7 +462,7 @@ def fields(
     A mark is a position on the slider and what it means.
     """
     shown: dict[str, list[Any]] = {}
-    now, before = values_of(machine), values_of(origin)
+    now, before = machine.by_path(), origin.by_path()
     for path, one in shown_entries.items():
         scale, si = scales.get(path), one.parameter.unit
         none = None if scale is None else 0.0  # no damping is a damping ratio of 0

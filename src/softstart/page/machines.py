@@ -12,15 +12,13 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.elements import Shaft
-from softstart.chain.machines import Machine, here, moved, values_of
+from softstart.chain.machines import Machine, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError
 from softstart.input.parameters import Parameter
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
-from softstart.start.simulation import simulate
+from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable
 
 STEPS = 600
@@ -120,7 +118,7 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
     >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].group
     'pinion - wheel shaft'
     """
-    known = values_of(machine)
+    known = machine.by_path()
     rows = _rows_of_chain(machine) if isinstance(machine, Chain) else _rows_of_drive()
     made = (Entry(path, known[path][0], *words) for path, *words in rows if path in known)
     return MappingProxyType({one.path: one for one in made})
@@ -184,17 +182,9 @@ def without(machine: Machine, path: str) -> Machine:
     >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
     None
     """
-    if not isinstance(machine, Chain):
-        return machine.replace(**{values_of(machine)[path][0].name: None})
-    table, _, name = path.partition(".")
-    if table == "motor" and machine.motor is not None:
-        return replace(machine, motor=machine.motor.replace(**{name: None}))
-    if table == "start":
-        return replace(machine, target_speed=None)  # the rated speed of the motor then
-    shafts = list(machine.shafts)
-    index = int(table.removeprefix("shaft[").rstrip("]")) - 1
-    shafts[index] = shafts[index].replace(**{name: None})
-    return replace(machine, shafts=tuple(shafts))
+    knob = machine.knob(path)
+    assert knob is not None
+    return machine.with_values({knob.name: None})
 
 
 def machine_from(text: str, where: str = "") -> Machine:
@@ -203,20 +193,12 @@ def machine_from(text: str, where: str = "") -> Machine:
 
 
 def single(machine: Machine) -> Machine:
-    """The machine if the page can start it; InputError if it is several, or nothing moves it."""
-    if isinstance(machine, Chain):
-        if machine.motor is None:
-            raise InputError(
-                "[motor] is missing: the page starts the chain by its motor; add it to the file."
-            )
-        if machine.target_speed is None:
-            raise InputError(
-                "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
-            )
-    elif machine.shape != ():
+    """The machine if the page can start it; InputError if nothing moves it."""
+    if machine.motor is None:
+        raise InputError("[motor] is missing: the page starts the chain by its motor; add it to the file.")
+    if machine.target_speed is None:
         raise InputError(
-            f"{machine.name}: lists of values make {math.prod(machine.shape)} drives, and the page starts "
-            "one; give one value a key."
+            "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
         )
     return machine
 
@@ -269,14 +251,13 @@ def scales_about(origin: Machine) -> Mapping[str, Scale]:
     >>> scales_about(Chain.load("crane-4-mass"))["shaft[1].gap"]
     Scale(low=0.0, high=0.4, logarithmic=False)
     """
-    motor: Any = origin.motor if isinstance(origin, Chain) else origin
+    motor: Any = origin.motor
     Ms, highest, target = (
         float(motor.starting_torque),
         float(motor.maximum_torque),
         float(origin.target_speed or 1.0),
     )
-    loads = sum(origin.at_motor_shaft().Mc) if isinstance(origin, Chain) else float(origin.Mc)
-    weakest = rounded(min(max(1.1 * loads, 0.1 * Ms), 0.9 * Ms), 2)
+    weakest = rounded(min(max(1.1 * origin.lumped.Mc, 0.1 * Ms), 0.9 * Ms), 2)
     found = {
         "motor.starting_torque": Scale(weakest, max(highest, Ms)),
         "motor.torque_lag": Scale(0.0, rounded(max(0.02, 4.0 * float(motor.torque_lag)), 2)),
@@ -362,16 +343,18 @@ def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> A
     """Gaps up to four times that of the machine as loaded, inertias from a fifth to five times its own.
 
     Of a chain: the sum of its gaps at the motor shaft, all widened alike, and the inertia of its load mass.
-    None for a chain without a gap.
+    None where no gap can be widened.
 
     >>> axes = axes_about(Drive.load("crane-4amtkf"), 5, 3)
     >>> axes.gaps, axes.inertias
     ((0.0, 0.5, 1.0, 1.5, 2.0), (0.035, 0.175, 0.875))
     """
-    gap, inertia = here(origin)
-    if isinstance(origin, Chain) and gap == 0.0:
-        return None
+    gap, inertia = origin.gap_and_inertia
     widest = 4.0 * gap if gap > 0.0 else 0.1
+    try:
+        origin.moved(widest, inertia)
+    except InputError:
+        return None
     return Axes(
         tuple(rounded(v, NODE_DIGITS) for v in np.linspace(0.0, widest, gaps)),
         tuple(rounded(v, NODE_DIGITS) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
@@ -385,9 +368,12 @@ def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
     ('all gaps, at the motor shaft', 'inertia of crane')
     """
     gap = SYMBOLS["gap"]
-    if isinstance(machine, Chain):
+    if len(machine.shaft_names) > 1:
         symbols = f"\N{N-ARY SUMMATION}{gap}", f"J{_below(machine.load_index)}"
-        return symbols, ("all gaps, at the motor shaft", f"inertia of {machine.load_mass}")
+        return symbols, (
+            "all gaps, at the motor shaft",
+            f"inertia of {machine.mass_names[machine.load_index]}",
+        )
     return (gap, SYMBOLS["load_inertia"]), (f"gap {gap}", SYMBOLS["load_inertia"])
 
 
@@ -396,10 +382,10 @@ def placeless(machine: Machine, axes: Axes, origin: Machine) -> Machine:
 
     >>> chain = Chain.load("crane-4-mass")
     >>> axes = axes_about(chain)
-    >>> placeless(moved(chain, 0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
+    >>> placeless(chain.moved(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
-    there = moved(machine, axes.gaps[-1], axes.inertias[0], origin)
+    there = machine.moved(axes.gaps[-1], axes.inertias[0], origin)
     if not isinstance(there, Chain):
         return there
     load = there.load_index
@@ -424,25 +410,19 @@ def k_dyn_row(
     The controller is set up for each machine, or for `nominal`, to whose mean torque K_dyn then refers. These
     are the figures of `softstart.simulate`, to the bit.
     """
-    if isinstance(machine, Chain):
-        return np.array([_k_dyn(moved(machine, gap, inertia, origin), controller, nominal) for gap in gaps])
-    of: Any = nominal
-    drives = machine.with_gap(list(gaps), load_inertia=inertia)
-    notes = array_starts(drives, controller, fitted_to=of, max_events=MAP_EVENTS)
-    base = np.broadcast_to(metrics.base_torque(of or drives), (len(gaps),))
-    k: Vector = figures(notes, base)["k_dyn"][0]
-    return k
-
-
-def _k_dyn(chain: Machine, controller: Controller, nominal: Machine | None) -> float:
-    fitted: Any = nominal
     try:
-        return float(simulate(chain, controller, fitted_to=fitted, max_events=MAP_EVENTS).k_dyn)
-    except (InputError, SimulationError):
-        return math.nan
+        opened = machine.moved(max(gaps), inertia, origin) if machine.gap_and_inertia[0] == 0.0 else machine
+        machines = varied(opened, {"gap": list(gaps), "load_inertia": inertia})
+        starts, set_ups = prepared(machines, None, MAP_EVENTS), controller.set_ups(nominal or machines)
+        k: Vector = starts.figures(set_ups, (nominal or machines).mean_torque)["k_dyn"][0]
+        return k
+    except InputError:
+        if len(gaps) == 1:
+            return np.array([math.nan])
+    return np.concatenate([k_dyn_row(machine, controller, (gap,), inertia, nominal, origin) for gap in gaps])
 
 
 def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
     """The mean torques to which K_dyn refers along the inertias of a map, N m."""
-    gap = here(machine)[0]
-    return np.array([moved(machine, gap, inertia).mean_torque for inertia in inertias])
+    gap = machine.gap_and_inertia[0]
+    return np.array([machine.moved(gap, inertia).mean_torque for inertia in inertias])

@@ -6,7 +6,7 @@ import logging
 import re
 from typing import Any, NamedTuple
 
-from softstart.chain.machines import Machine, Values, values_of
+from softstart.chain.machines import Machine, Values
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest
@@ -112,7 +112,7 @@ class Change(NamedTuple):
 
 def changes(old: Machine, new: Machine) -> list[Change]:
     """The parameters in which two machines differ; those that follow another one only where they do not."""
-    first, second = values_of(old), values_of(new)
+    first, second = old.by_path(), new.by_path()
     found = []
     for path in dict.fromkeys([*first, *second]):
         parameter, value = first.get(path) or (second[path][0], None)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine, moved
+from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
@@ -225,7 +225,7 @@ class Session:
 
     def move(self, gap: float, load_inertia: float) -> None:
         """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""
-        self._put(drive=moved(self.machine, gap, load_inertia, self.origin))
+        self._put(drive=self.machine.moved(gap, load_inertia, self.origin))
 
     def set_parameter(self, name: str, value: str | float | None, gesture: str = "") -> None:
         """Change one parameter of the selected strategy; None gives it back its default.

@@ -11,7 +11,6 @@ import math
 from functools import partial
 from typing import Any
 
-from softstart.chain.machines import values_of
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
@@ -52,7 +51,7 @@ def _data(drive: Any, project: Project) -> Html:
     """What is known of the drive and from where; in a sentence what is absent."""
     rows, absent = [], list[str]()
     sourced, units, ratio = bool(project.sources), units_of(drive), drive.gear_ratio
-    for path, (parameter, value) in values_of(drive).items():
+    for path, (parameter, value) in drive.by_path().items():
         if value is None or value == "" or parameter.name in HIDDEN:
             continue
         source = project.source_of(path)

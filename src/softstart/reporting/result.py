@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from softstart import __version__
-from softstart.chain.machines import values_of
 from softstart.chain.model import Chain, load_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
+from softstart.drive.records import is_machine
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.late import late
@@ -34,7 +34,7 @@ from softstart.reporting.sheet import Sheet, make_sheet
 from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compared, make_controllers
 from softstart.start.fatigue import DEFAULT_SLOPE, Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
-from softstart.start.simulation import is_machine, simulate
+from softstart.start.simulation import simulate
 
 document = late("softstart.reporting.document")  # renders a Report, so it stands above this module
 
@@ -289,7 +289,7 @@ def report(
     several = len(machine.shaft_names) > 1
     budget = (SHAFTS_BUDGET if several else BUDGET) if budget is None else budget
     steps = checked_steps(resolution, budget)
-    known = values_of(machine)
+    known = machine.by_path()
     if wrong := [one.parameter for one in about.sources if one.parameter not in known]:
         raise InputError(
             f'project: [[source]] "{wrong[0]}" is a parameter of a drive, and "{machine.name}" has none of '

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from softstart.arrays import Matrix
+from softstart.chain.machines import varied
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.quantities import Units
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.strategies import K_DYN, SMALL, WIDE, name_in_figure
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart.start.fatigue import Fatigue
 from softstart.views import fatigue as lives
 from softstart.views.drawing import drawing, new_figure, plain_ticks
@@ -102,9 +102,8 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     """The map of a controller that was set up for `drive`."""
     gaps, inertias = axes_of(drive)
     shape = len(gaps), len(inertias)
-    many = drive.with_gap(np.array(gaps)[:, None], load_inertia=np.array(inertias)[None, :])
-    notes = array_starts(many, controller, fitted_to=drive)
-    found = figures(notes, metrics.base_torque(drive))
+    many = varied(drive, {"gap": np.array(gaps)[:, None], "load_inertia": np.array(inertias)[None, :]})
+    found = prepared(many).figures(controller.set_ups(drive), drive.mean_torque)
     time = np.asarray(found["start_time"][0], dtype=np.float64).reshape(shape)
     k = np.asarray(found["k_dyn"][0], dtype=np.float64).reshape(shape)
     return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k), time)

@@ -18,19 +18,18 @@ from softstart.chain.model import Chain
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError, listed
 from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import prepared
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.printed import RPM, at_output, decimals_of, digits, fixed, short, unit
 
-AnyRun = Run
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 INSTANTS = 20_001  # of a chain's start, in which its motor torque is looked at
@@ -140,8 +139,8 @@ class Sheet:
     kind: str
     settings: tuple[Setting, ...]
     own: Drive
-    exact: AnyRun
-    rounded: AnyRun | None
+    exact: Run
+    rounded: Run | None
     failure: str
     variants: int
     corners: bool
@@ -188,21 +187,21 @@ class Sheet:
 def make_sheet(
     machine: Drive | Chain,
     controller: Controller,
-    exact: AnyRun,
+    exact: Run,
     resolution: Resolution,
     row: Row | None = None,
-    drawn: Drive | None = None,
+    drawn: Records | None = None,
 ) -> Sheet:
     """The sheet of a strategy on a drive or chain; `exact` is its start there.
 
     With the `row` by which the strategy was chosen, the values of the sheet keep what that row keeps, on the
     drives `drawn` too where the drive is known within intervals.
     """
-    drive = sheet_drive(machine)
+    drive = machine.design_drive
     ready, own = controller.set_up(drive)
     settings = tuple(_settings(ready, drive, resolution))
     varied = [one for one in settings if one.step is not None]
-    rounded: AnyRun | None = None
+    rounded: Run | None = None
     failure, variants, corners, worst, slowest = "", 0, False, math.nan, math.nan
     worst_values: dict[str, float] = {}
     full_rise: FullRise | None = None
@@ -212,7 +211,7 @@ def make_sheet(
         settings, moved = _within_the_rule(machine, ready, own, settings, row, drawn)
         varied = [one for one in settings if one.step is not None]
         values = {one.name: one.rounded for one in varied}
-        rounded = _start(machine, replace(ready, **values), own)
+        rounded = simulate(machine, replace(ready, **values), fitted_to=own)
         if kind_of(controller) in ORDINARY and isinstance(machine, Drive):
             full_rise = _full_rise(machine, replace(ready, **values), own, resolution)
             gear_ramp = _gear_ramp(machine, replace(ready, **values), own)
@@ -238,25 +237,13 @@ def make_sheet(
     )  # fmt: skip
 
 
-def sheet_drive(machine: Drive | Chain) -> Drive:
-    """The drive whose motor and numbers a sheet names: of a chain the two masses that stand for it."""
-    return machine if isinstance(machine, Drive) else machine.design_drive
-
-
-def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> AnyRun:
-    """A start under a controller with the numbers of `own`; K_dyn of a chain refers to that chain."""
-    base: Any = None if isinstance(machine, Drive) else machine
-    found: AnyRun = simulate(machine, controller, fitted_to=own, base=base)
-    return found
-
-
 def _within_the_rule(
     machine: Drive | Chain,
     ready: Controller,
     own: Drive,
     settings: Sequence[Setting],
     row: Row | None,
-    drawn: Drive | None,
+    drawn: Records | None,
 ) -> tuple[tuple[Setting, ...], tuple[str, ...]]:
     """The settings at the steps nearest to them that keep what the row keeps, and which were moved for that.
 
@@ -290,7 +277,9 @@ def _steps_beside(count: int) -> list[tuple[int, ...]]:
     return [(0,) * count, *alone]
 
 
-def _broken(machine: Drive | Chain, controller: Controller, own: Drive, row: Row, drawn: Drive | None) -> str:
+def _broken(
+    machine: Drive | Chain, controller: Controller, own: Drive, row: Row, drawn: Records | None
+) -> str:
     """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
     cases = tuple(case for case in row.worst_case if case in CASES)
     found = compared(machine, controller, row.direct, fitted_to=own, worst_case=cases, drawn=drawn)
@@ -365,13 +354,8 @@ def _starts(
 ) -> tuple[Any, Any]:
     """K_dyn and start times of the drive or chain with the values off by these half steps."""
     each = [{one.name: one.off(side) for one, side in zip(varied, row, strict=True)} for row in sides]
-    if not isinstance(drive, Drive):
-        runs = [_start(drive, replace(ready, **values), own) for values in each]
-        times = np.array([run.start_time for run in runs])
-        return np.where(np.isnan(times), np.nan, [run.k_dyn for run in runs]), times
     set_ups = [(replace(ready, **values), own) for values in each]
-    notes = array_starts(drive.replace(gap=np.full(len(sides), float(drive.gap))), set_ups)
-    found = figures(notes, metrics.base_torque(drive))
+    found = prepared([drive]).figures(set_ups, drive.mean_torque, np.zeros(len(sides), dtype=np.int64))
     time = np.asarray(found["start_time"][0], dtype=np.float64)
     return np.where(np.isnan(time), np.nan, found["k_dyn"][0]), time
 
@@ -424,7 +408,7 @@ def sheet_section(
     )
 
 
-def _motor_torque(run: AnyRun) -> Vector:
+def _motor_torque(run: Run) -> Vector:
     """The motor torque over a start, N m."""
     return run.u
 

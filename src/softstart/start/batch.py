@@ -16,6 +16,7 @@ from softstart import formulas
 from softstart.arrays import Matrix, Vector
 from softstart.controller.base import CompiledController, Controller, Sensor, SetUp, numbers_of
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
+from softstart.drive.records import Records, each_of
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
@@ -23,7 +24,7 @@ from softstart.late import late
 from softstart.processes import Pool
 from softstart.start.engine import run_one, watched
 from softstart.start.recorded import Recorder
-from softstart.start.rows import MAX_EVENTS, Rows, joined, rows_of
+from softstart.start.rows import MAX_EVENTS, Rows, blank, joined, rows_of
 from softstart.start.status import status_of
 
 if TYPE_CHECKING:
@@ -55,14 +56,7 @@ _LATEST = ("start_time", "excess", "excess_time")  # of several positions the la
 
 @dataclass(frozen=True, eq=False)
 class Notes:
-    """What the kernel notes of many starts: a row for each, of each shaft a column.
-
-    >>> from softstart.controller import make_controller
-    >>> crane = Drive.load("crane-4amtkf")
-    >>> notes = array_starts(crane.replace(gap=[0.5, 2.0]), make_controller("direct"))
-    >>> notes.peaks.round(2).tolist()
-    [[164.81], [257.18]]
-    """
+    """What the kernel notes of many starts: a row for each, of each shaft a column."""
 
     starts: NDArray[np.void]
     shafts: NDArray[np.void]
@@ -175,72 +169,69 @@ def _parts(count: int) -> Iterator[slice]:
         room = max(1, int(room * min(share, 4.0)))
 
 
-def array_starts(
-    drive: Drive,
-    controller: Controller | Iterable[SetUp],
-    until: float | None = None,
-    fitted_to: Drive | None = None,
-    time_limit: float | None = None,
-    max_events: int = MAX_EVENTS,
-) -> Notes:
-    """The kernel's notes of all starts of a Drive with array fields, last index of the drive fastest.
-
-    `figures` turns them into labelled figures. The controller is set up for each start, or once for a single
-    `fitted_to`; set-ups that are given serve all starts, one each, or as many in a row. Unlike `simulate`,
-    nothing is checked.
-    """
-    whole = fitted_to or drive.design_drive
-    ready = numbers_of(controller.set_ups(whole) if isinstance(controller, Controller) else controller)
-    notes = [notes_of(rows_of(one, time_limit, max_events), ready, until) for one in drive.positions.values()]
-    return worst_of(notes) if len(notes) > 1 else notes[0]
-
-
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Machines as rows of the kernel, written once for many calls: a row for each position of each.
 
-    `begins` has the first row of each machine, and one more at the end; `permissible` the torques of shafts.
+    `places` has the rows of each machine, a row for each of its `positions` (the last one again where another
+    machine has more); `permissible` has the torques of its shafts, `limits` its limits as arrays.
     """
 
-    machines: tuple[Any, ...]
-    begins: Which
+    shaft_names: tuple[str, ...]
+    places: NDArray[np.int64]
+    positions: Which
     rows: Rows
     permissible: Matrix
+    limits: Limits
+
+    def notes(
+        self,
+        set_ups: Iterable[SetUp],
+        which: Which | slice = slice(None),
+        *,
+        until: float | None = None,
+        time_limit: float | None = None,
+        workers: int = 1,
+    ) -> Notes:
+        """The kernel's notes of machines `which[i]` in place i, of several positions the worst; or of all.
+
+        The set-ups of the controller serve all places, one each, or as many in a row.
+        """
+        ready, sizes = numbers_of(set_ups), self.positions[which]
+        # all of a million starts are not copied
+        alone = isinstance(which, slice) and len(self.places) == 1
+        each = [slice(None)] if alone else self.places[: int(sizes.max(initial=1)), which]
+        taken = (self.rows.taken(rows).limited(time_limit) for rows in each)
+        notes = [notes_of(rows, ready, until, workers) for rows in taken]
+        if len(notes) == 1:
+            return notes[0]
+        worst = worst_of(notes)
+        worst.starts["position"][sizes == 1] = 0.0
+        return worst
 
     def figures(
         self,
-        which: Which,
         set_ups: Iterable[SetUp],
         base: Any,
-        time_limit: float | None = None,
+        which: Which | slice = slice(None),
         *,
         until: float | None = None,
+        time_limit: float | None = None,
         workers: int = 1,
     ) -> Figures:
-        """Figures by name of the starts of machines `which[i]` in place i, of several positions the worst.
+        """Figures by name of the same starts. `base` is M12avg in N m, one or one a start."""
+        notes = self.notes(set_ups, which, until=until, time_limit=time_limit, workers=workers)
+        return self.read(notes, base, which, until)
 
-        The set-ups of the controller serve all places in `which`, one each, or as many in a row. `base` is
-        M12avg in N m, one or one a start.
-        """
-        sizes = np.diff(self.begins)[which]
-        ready, first = numbers_of(set_ups), self.begins[which]
-        places = [first + np.minimum(k, sizes - 1) for k in range(int(sizes.max(initial=1)))]
-        notes = [
-            notes_of(self.rows.taken(rows).limited(time_limit), ready, until, workers) for rows in places
-        ]
-        worst = worst_of(notes) if len(notes) > 1 else notes[0]
-        worst.starts["position"][sizes == 1] = 0.0
-        return self.read(which, worst, base, until)
-
-    def read(self, which: Which, notes: Notes, base: Any, until: float | None) -> Figures:
+    def read(
+        self, notes: Notes, base: Any, which: Which | slice = slice(None), until: float | None = None
+    ) -> Figures:
         """The figures in the kernel's notes."""
-        first = self.machines[0]
-        found = figures(notes, base, until)
-        names = first.shaft_names
-        means = np.broadcast_to(np.asarray(base, dtype=np.float64), which.shape)
+        found, names = figures(notes, base, until), self.shaft_names
+        means = np.broadcast_to(np.asarray(base, dtype=np.float64), notes.starts.shape)
         status = found.pop("status")
-        largest = np.where(np.isnan(found["k_dyn"][0])[:, None], np.nan, notes.peaks)
         if len(names) > 1:
+            largest = np.where(np.isnan(found["k_dyn"][0])[:, None], np.nan, notes.peaks)
             for k, place in enumerate(names):
                 found[f"k_dyn_{k + 1}"] = (largest[:, k] / means, "1", f"K_dyn of {place}")
             for k, place in enumerate(names):
@@ -248,31 +239,69 @@ class Batch:
             used = 100.0 * np.nan_to_num(largest / self.permissible[which]).max(axis=1)
             meaning = "largest |T| over what its shaft permits"
             found["used_torque"] = (np.where(np.isnan(found["k_dyn"][0]), np.nan, used), "%", meaning)
-        found |= margins(found, limits_of_all([self.machines[i] for i in which]))
-        return {**found, "status": status}
-
-    def named(self) -> Figures:
-        """The names of all figures, with units and meanings, of starts that are not made."""
-        starts, shafts = np.zeros(1, at.NOTES), np.zeros((1, self.rows.count - 1), at.SHAFT_NOTES)
-        starts["release_time"] = math.nan
-        return self.read(np.array([0]), Notes(starts, shafts), 1.0, None)
+        every: Any = (self.limits.shaft_torque, self.limits.start_time)
+        torque, time_limit = (None if most is None else most[which] for most in every)
+        limits = replace(self.limits, shaft_torque=torque, start_time=time_limit)
+        return {**found, **margins(found, limits), "status": status}
 
 
-def prepared(machines: Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS) -> Batch:
-    """Machines that go through one call of the kernel; InputError for machines that do not match."""
-    each = [list(one.positions.values()) for one in machines]
-    rows = [rows_of(one, time_limit, max_events) for several in each for one in several]
-    begins = np.cumsum([0, *(len(several) for several in each)])
+def named(shaft_names: tuple[str, ...]) -> Figures:
+    """The names of all figures, with units and meanings, of starts of machines with these shafts."""
+    count, zero = len(shaft_names), np.zeros(1, dtype=np.int64)
+    notes = Notes(np.zeros(1, at.NOTES), np.zeros((1, count), at.SHAFT_NOTES))
+    notes.starts["release_time"] = math.nan
+    limits: Any = Limits(shaft_torque=np.ones(1), used_torque=1.0)  # type: ignore[arg-type]
+    rows, permissible = blank((), count + 1), np.ones((1, count))
+    return Batch(shaft_names, zero[None], zero + 1, rows, permissible, limits).read(notes, 1.0)
+
+
+def prepared(
+    machines: Records | Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
+) -> Batch:
+    """Machines that go through one call of the kernel; InputError for machines that do not match.
+
+    >>> from softstart.controller import make_controller
+    >>> crane, direct = Drive.load("crane-4amtkf"), make_controller("direct")
+    >>> batch = prepared([crane, crane.replace(gap=2.0)])
+    >>> batch.notes([direct.set_up(crane)]).peaks.round(2).tolist()
+    [[164.81], [257.18]]
+    """
+    parts = machines.parts if isinstance(machines, Records) else tuple(machines)
+    each = [list(part.positions.values()) for part in parts]
+    rows = [[rows_of(one, time_limit, max_events) for one in several] for several in each]
+    counts = [len(several[0].machines) for several in rows]
+    positions = np.repeat([len(several) for several in rows], counts)
+    begins = np.cumsum([0, *(len(several) * count for several, count in zip(rows, counts, strict=True))])
+    places = np.empty((int(positions.max()), positions.size), dtype=np.int64)
+    first = np.repeat(begins[:-1], counts) + np.concatenate([np.arange(count) for count in counts])
+    for k, place in enumerate(places):
+        place[:] = first + np.minimum(k, positions - 1) * np.repeat(counts, counts)
     return Batch(
-        tuple(machines), begins, joined(rows), np.stack([one.permissible_torques for one in machines])
-    )
+        parts[0].shaft_names, places, positions, joined([row for several in rows for row in several]),
+        np.concatenate([np.atleast_2d(part.permissible_torques) for part in parts]), _limits_of(parts),
+    )  # fmt: skip
 
 
-def figures(notes: Notes, base: Any, until: float | None = None, limits: Limits | None = None) -> Figures:
+def _limits_of(parts: Sequence[Any]) -> Limits:
+    """The limits of each machine; one without a limit may have any figure."""
+    limits = [part.limits for part in parts]
+
+    def every(name: str) -> Any:
+        own = [getattr(one, name) for one in limits]
+        if all(one is None for one in own):
+            return None
+        return np.concatenate(
+            [each_of(part, math.inf if one is None else one) for part, one in zip(parts, own, strict=True)]
+        )
+
+    return Limits(every("shaft_torque"), every("start_time"), used_torque=limits[0].used_torque)
+
+
+def figures(notes: Notes, base: Any, until: float | None = None) -> Figures:
     """The figures of many starts as name -> (values, unit, meaning).
 
-    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start; `limits`
-    likewise, whose life is not checked. Starts that could not be finished have NaN.
+    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
+    could not be finished have NaN.
     """
     reached = ~np.isnan(notes["start_time"])
     held = notes["braked"] == 1.0
@@ -307,8 +336,6 @@ def figures(notes: Notes, base: Any, until: float | None = None, limits: Limits 
     if np.any(notes["position"]):
         names = np.array(["", *UNKNOWN_POSITIONS])[notes["position"].astype(np.int64)]
         found["position"] = (names, "", "position with the largest |T|, of those that are possible")
-    if limits is not None:
-        found |= margins(found, limits)
     found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return found
 
@@ -332,7 +359,7 @@ def margins(found: Figures, limits: Limits) -> Figures:
 
 
 def simulate_many(
-    machines: Drive | Sequence[Any],
+    machines: Records | Sequence[Any],
     controller: Controller,
     until: float | None,
     fitted_to: Any,
@@ -341,55 +368,49 @@ def simulate_many(
     max_events: int,
     workers: int | None = None,
 ) -> xarray.Dataset:
-    """`simulate` for a Drive with array fields or a list of machines; see there.
+    """`simulate` for records or a list of machines; see there.
 
     The dimension is `start` for a list and for one-dimensional fields, `axis_0`, `axis_1`, ... otherwise;
     the fields that differ become coordinates. Machines with several shafts have `k_dyns` and `peak_torques`
     too, with the dimension `shaft`.
     """
-    if isinstance(machines, Drive):
-        notes = array_starts(machines, controller, until, fitted_to, time_limit, max_events)
-        shape = machines.shape
+    batch = prepared(machines, time_limit, max_events)
+    if isinstance(machines, Records):
+        shape, means = machines.shape, machines.mean_torque
         dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
-        mean = np.broadcast_to((base or machines).mean_torque, shape).reshape(-1)
-        found = figures(notes, mean, until, limits_of_each(machines))
-        varied = {
-            name: (dims, np.broadcast_to(values, shape).copy())
-            for name in PARAMETERS
-            if isinstance(values := getattr(machines, name), np.ndarray)
-        }
-        return _dataset(
-            {name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, varied
-        )
-    listed = list(machines)
-    nominal = [one.design_drive for one in ([fitted_to] if fitted_to is not None else listed)]
-    means = np.array([(base or one).mean_torque for one in listed], dtype=np.float64)
-    batch = prepared(listed, time_limit, max_events)
+        coordinates: dict[str, Any] = {name: (dims, one.copy()) for name, one in machines.fields.items()}
+        named = {machines.parts[0].shaft_names}
+    else:
+        shape, dims = (len(machines),), ("start",)
+        means = np.array([one.mean_torque for one in machines], dtype=np.float64)
+        coordinates = {"drive": (dims, [one.name for one in machines])}
+        coordinates |= {name: (dims, values) for name, values in _different(machines)}
+        named = {one.shaft_names for one in machines}
     found = batch.figures(
-        np.arange(len(listed)),
-        map(controller.set_up, nominal),
-        means,
-        until=until,
-        workers=workers or os.cpu_count() or 1,
-    )
-    names = listed[0].shaft_names
+        controller.set_ups(fitted_to or machines), means if base is None else base.mean_torque,
+        until=until, workers=workers or os.cpu_count() or 1,
+    )  # fmt: skip
     data: dict[str, Any] = {
-        name: (("start",), *one) for name, one in found.items() if name.rstrip("0123456789")[-1] != "_"
+        name: (dims, one[0].reshape(shape), *one[1:])
+        for name, one in found.items()
+        if name.rstrip("0123456789")[-1] != "_"
     }
-    if len(names) > 1:
+    if (count := len(batch.shaft_names)) > 1:
         for one, many in (("k_dyn", "k_dyns"), ("peak_torque", "peak_torques")):
-            columns = [found[f"{one}_{k + 1}"] for k in range(len(names))]
-            values = np.stack([column[0] for column in columns], axis=1)
-            data[many] = (("start", "shaft"), values, columns[0][1], f"{found[one][2]}, of each shaft")
-    coordinates: dict[str, Any] = {"drive": (("start",), [one.name for one in listed])}
-    if len(names) > 1 and len({one.shaft_names for one in listed}) == 1:
-        coordinates["shaft"] = (("shaft",), list(names))
-    if all(isinstance(one, Drive) for one in listed):
-        for name in PARAMETERS:
-            given = [getattr(one, name) for one in listed]
-            if name != "name" and not PARAMETERS[name].many and any(value != given[0] for value in given):
-                coordinates[name] = (("start",), given)
+            columns = [found[f"{one}_{k + 1}"] for k in range(count)]
+            values = np.stack([column[0].reshape(shape) for column in columns], axis=-1)
+            data[many] = ((*dims, "shaft"), values, columns[0][1], f"{found[one][2]}, of each shaft")
+        if len(named) == 1:
+            coordinates["shaft"] = (("shaft",), list(batch.shaft_names))
     return _dataset(data, coordinates)
+
+
+def _different(machines: Sequence[Any]) -> Iterator[tuple[str, list[Any]]]:
+    """The parameters in which drives of a list differ; of chains they are not known by name."""
+    for name in PARAMETERS if all(isinstance(one, Drive) for one in machines) else ():
+        given = [getattr(one, name) for one in machines]
+        if name != "name" and not PARAMETERS[name].many and any(value != given[0] for value in given):
+            yield name, given
 
 
 def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.Dataset:
@@ -398,23 +419,3 @@ def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.
          for name, (dims, values, unit, meaning) in data.items()},
         coords=coordinates,
     )  # fmt: skip
-
-
-def limits_of_all(machines: Sequence[Any]) -> Limits:
-    """The limits of each machine; one without a limit may have any figure."""
-
-    def each(name: str) -> Any:
-        own = [getattr(one.limits, name) for one in machines]
-        return None if all(one is None for one in own) else np.array([one or math.inf for one in own])
-
-    return Limits(each("shaft_torque"), each("start_time"), used_torque=machines[0].limits.used_torque)
-
-
-def limits_of_each(drive: Drive) -> Limits:
-    """The limits of a drive with array fields; those that differ, in the order of the starts."""
-
-    def flat(most: Any) -> Any:
-        return np.broadcast_to(most, drive.shape).ravel() if isinstance(most, np.ndarray) else most
-
-    limits = drive.limits
-    return replace(limits, shaft_torque=flat(limits.shaft_torque), start_time=flat(limits.start_time))

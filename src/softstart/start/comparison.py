@@ -11,16 +11,18 @@ from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from softstart.chain.machines import Machine, one_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.doubts import doubts
+from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import Machine, is_machine, simulate
+from softstart.start.simulation import simulate
 
 notebook = late("softstart.views.notebook")
 
@@ -49,13 +51,13 @@ class Uncertain(Protocol):
 
     @property
     def drive(self) -> Drive: ...
-    def draws(self, count: int = ..., seed: int = ...) -> Drive:
-        """Drives that are left possible, as a batch."""
+    def draws(self, count: int = ..., seed: int = ...) -> Records:
+        """Drives that are left possible."""
 
 
 def intervals(
     run: Run,
-    drawn: Drive,
+    drawn: Records,
     controller: str | Controller,
     until: float | None = None,
     fitted_to: Drive | None = None,
@@ -197,21 +199,12 @@ def compare(
     ----------
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
-    if isinstance(drive, str):
-        from softstart.chain.model import load_machine
-
-        drive = load_machine(drive)
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    if not is_machine(drive):
-        raise InputError(
-            f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
-        )
-    if getattr(drive, "shape", ()) != ():
-        raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
-    if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
+    drive = one_machine(drive)
+    if fitted_to is not None and not is_machine(fitted_to):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
     counted = (
         (worst_case,) if isinstance(worst_case, str) else CASES if worst_case is None else tuple(worst_case)
@@ -256,7 +249,7 @@ def compared(
     until: float | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
-    drawn: Drive | None = None,
+    drawn: Records | None = None,
 ) -> Row:
     """The row of one controller; `direct` is the start that its times are compared with.
 

@@ -7,40 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from softstart import formulas
-from softstart.drive import Drive
 from softstart.kernel import records as at
 from softstart.start.recorded import Recorded
 
 REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
 # share of the target speed by which a load that has settled may still be below it
 SETTLED_BAND = 0.001
-
-
-def base_torque(drive: Drive) -> Any:
-    """M12avg_base = (Ms J2 + J1 Mc)/(J1 + J2) in N m, [G](16): the mean shaft torque under full torque.
-
-    What the Coulomb friction of the motor takes does not reach the shaft: Ms - friction stands for Ms.
-    Viscous friction is left out, it is zero as the motion begins: K_dyn does not depend on the target speed.
-
-    >>> crane = Drive.load("crane-4amtkf")
-    >>> round(base_torque(crane), 2), round(base_torque(crane.replace(motor_friction=6.0)), 2)
-    (52.86, 47.86)
-    """
-    return ((drive.Ms - drive.motor_friction) * drive.J2 + drive.J1 * drive.Mc) / (drive.J1 + drive.J2)
-
-
-def k_dyn(peak_torque: Any, drive: Drive) -> Any:
-    """Dynamic coefficient K_dyn = peak |T| / M12avg_base, [G](16); `drive` gives the base.
-
-    >>> round(k_dyn(105.72, Drive.load("crane-4amtkf")), 3)
-    2.0
-    """
-    return formulas.dynamic_coefficient(peak_torque, base_torque(drive))
 
 
 def settled_time(recorded: Recorded, target_speed: float, band: float = SETTLED_BAND) -> float:

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
-from softstart.drive import Drive, Limit, Limits
+from softstart.drive import Limit, Limits
 from softstart.start.fatigue import worst_damage
 from softstart.start.run import Run
 
@@ -350,10 +350,9 @@ def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> R
             f"{1e3 * longer:.3g} ms, {1e-3 * less / longer:.2g} per ms)"
         )
     these = "these" if len(best) > 1 else "this one"
-    give = "[limits] in the drive file" if isinstance(drive, Drive) else "shafts their permissible_torque"
     text = (
         f"No other strategy beats {these} in K_dyn and time at once: {'; '.join(parts)}. Which one is enough "
-        f"depends on what the machine withstands: give {give}."
+        f"depends on what the machine withstands: give {drive.LIMITS_GIVEN}."
     )
     return Recommendation(text, None, best, limits)
 

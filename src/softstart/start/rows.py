@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
+from softstart.drive.records import Columns, each_of
 from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.kernel.motor import encoder_count
@@ -62,6 +64,8 @@ class Rows:
 
     def limited(self, time_limit: float | None = None, max_events: int | None = None) -> Rows:
         """The same with another time limit or cap on events."""
+        if time_limit is None and max_events is None:
+            return self
         machines = self.machines.copy()
         named = machines.view(at.MACHINE)[:, 0]
         if time_limit is not None:
@@ -73,6 +77,8 @@ class Rows:
 
 def joined(rows: Sequence[Rows]) -> Rows:
     """Starts in one call; InputError for machines that do not match."""
+    if len(rows) == 1:
+        return rows[0]
     motors = {(one.count, one.machine.motor, one.machine.load) for one in rows}
     if len(motors) > 1:
         raise InputError(
@@ -98,7 +104,7 @@ def rows_of(
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, Any] | None = None,
 ) -> Rows:
-    """A machine as rows of the kernel: one, or one for each element of a Drive with array fields.
+    """A machine as a row of the kernel; columns of drives as many.
 
     Without `time_limit` a start that never reaches its target speed is given up after a hundred times
     the duration of a stiff machine's start plus a hundred elastic periods, counted from a brake's release. No
@@ -124,7 +130,8 @@ def rows_of(
     return made
 
 
-def _blank(shape: tuple[int, ...], masses: int, curves: int = 0) -> Rows:
+def blank(shape: tuple[int, ...], masses: int, curves: int = 0) -> Rows:
+    """Rows of zeros for so many starts."""
     count = math.prod(shape)
     return Rows(
         np.zeros((count, at.N_MACHINE)),
@@ -154,13 +161,9 @@ def _motor(named: Any, motor: Any, column: Any = lambda values: values) -> None:
 
 
 def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
-    """The rows of a drive, and how long a stiff one takes."""
-    shape = drive.shape
-    made = _blank(shape, 2)
-
-    def column(values: object) -> Vector:
-        return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).ravel()
-
+    """The rows of a drive or of columns of drives, and how long stiff ones take."""
+    made = blank(drive.shape if isinstance(drive, Columns) else (), 2)
+    column = partial(each_of, drive)
     named = made.machines.view(at.MACHINE)[:, 0]
     masses, shaft = made.masses.view(at.MASS)[..., 0], made.shafts.view(at.SHAFT)[:, 0, 0]
     J1, J2, c, Mc, Ms = map(column, (drive.J1, drive.J2, drive.c, drive.Mc, drive.Ms))
@@ -192,7 +195,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     if count > at.MOST_MASSES:
         raise InputError(f"mass: {count} masses; a start takes {at.MOST_MASSES} at most, so join some first.")
     curved = [(i, mass) for i, mass in enumerate(chain.masses) if mass.curve is not None]
-    made = _blank((), count, len(curved))
+    made = blank((), count, len(curved))
     named = made.machines.view(at.MACHINE)[:, 0]
     masses, shafts = made.masses.view(at.MASS)[0, :, 0], made.shafts.view(at.SHAFT)[0, :, 0]
     reactive = arrays.reactive & (arrays.Mc > 0.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, overload
 
+from softstart.chain.machines import Machine
+from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
-from softstart.drive import Drive
+from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
 from softstart.start.engine import check_limits, ended, run_one
@@ -22,39 +24,9 @@ if TYPE_CHECKING:
     from softstart.chain.periodic_torque import PeriodicTorque
 
 
-class Machine(Protocol):
-    """What a start asks of a machine: `softstart.drive.Drive` and `softstart.chain.Chain` are both one."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def positions(self) -> Mapping[str, Any]:
-        """The machine at each position at which it may start: one, or three if that is unknown."""
-
-    @property
-    def design_drive(self) -> Drive:
-        """The two masses that controllers are set up for."""
-
-    @property
-    def mean_torque(self) -> Any:
-        """M12avg, N m at the motor shaft, to which K_dyn refers, [G](16)."""
-
-    @property
-    def limits(self) -> Any: ...
-    @property
-    def shaft_names(self) -> tuple[str, ...]: ...
-    def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
-        """The machine with so many times its gaps, and its load inertia."""
-
-
-def is_machine(given: object) -> bool:
-    """Whether this is a Drive or a Chain; a protocol with properties would compute them to find out."""
-    return hasattr(type(given), "design_drive")
-
-
 @overload
 def simulate(
-    drive: Drive | Machine | str,
+    drive: Machine | str,
     controller: str | Controller | None,
     until: float | None = ...,
     *,
@@ -68,7 +40,7 @@ def simulate(
 ) -> Run: ...
 @overload
 def simulate(
-    drive: Sequence[Drive] | Sequence[Machine],
+    drive: Records | Sequence[Machine],
     controller: str | Controller | None,
     until: float | None = ...,
     *,
@@ -103,9 +75,9 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, Chain, sequence of them or str
-        A drive, one whose fields hold arrays, a chain, a list of drives or of chains (with the same number of
-        masses, their motors and loads on the same ones), or the name or file of a drive or chain.
+    drive : Drive, Chain, Records, sequence of machines or str
+        A drive, a chain, `records` of one, a list of drives or of chains (with the same number of masses,
+        their motors and loads on the same ones), or the name or file of a drive or chain.
     controller : str, Controller or None
         A name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
     until : float, optional
@@ -116,9 +88,10 @@ def simulate(
     fitted_to : Drive or Chain, optional
         The machine from which the controller's own defaults are derived, if not `drive`: what happens to a
         controller set up for one drive when the gap has worn or the load changed. Of a chain it is the modal
-        reduction to two masses, whatever its error; in a list of chains that takes longer than a start.
+        reduction to two masses, whatever its error; in a list of chains that takes longer than a start. For
+        records also records of the same shape.
     base : Drive or Chain, optional
-        The machine to whose mean torque K_dyn refers, if not `drive`.
+        The machine to whose mean torque K_dyn refers, if not `drive`; or records likewise.
     time_limit : float, optional
         Time after which a start that has not reached its target speed ends as not reached, s.
     max_events : int
@@ -128,13 +101,13 @@ def simulate(
         Periodic torques, N m, by the names (or indices) of the masses on which they act, each at the speed
         of its own shaft; of a single chain.
     workers : int, optional
-        How many threads compute a list. By default one for each processor.
+        How many threads compute many starts. By default one for each processor.
 
     Returns
     -------
     Run or xarray.Dataset
         A Run for one machine. For many a Dataset with one entry for each start:
-        dimension `start`, or `axis_0`, `axis_1`, ... for fields of more than one dimension; a start that
+        dimension `start`, or `axis_0`, `axis_1`, ... for records of more than one dimension; a start that
         cannot be finished has a status of its own and NaN in every figure.
 
     Raises
@@ -157,17 +130,14 @@ def simulate(
     event is missed, and accuracy: docs/theory/numerics.md.
     """
     if isinstance(drive, str):
-        from softstart.chain.model import load_machine
-
         drive = load_machine(drive)
     made = None if controller is None else make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
-    single = [getattr(one, "shape", ()) == () for one in drive] if isinstance(drive, list | tuple) else [True]
-    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive)) and all(single)):
+    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive))):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
-    if isinstance(drive, list | tuple) or (isinstance(drive, Drive) and drive.shape != ()):
+    if isinstance(drive, list | tuple | Records):
         if made is None:
             raise InputError("controller is missing: many starts need one.")
         if workers is not None and (
@@ -176,7 +146,9 @@ def simulate(
             raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
     if not is_machine(drive):
-        raise InputError("drive: give one Drive or Chain, a list of them, the path of a file, or a name.")
+        raise InputError(
+            "drive: give one Drive or Chain, records or a list of them, the path of a file, or a name."
+        )
     positions = drive.positions
     given = {name: rows_of(one, time_limit, max_events, excitation) for name, one in positions.items()}
     check_end(drive, made, until, next(iter(given.values())))
@@ -192,17 +164,16 @@ def simulate(
 
 
 def _check_other(name: str, other: object, drive: object) -> None:
-    """A machine given beside the simulated one: a single one, or one for each start of a batch."""
-    if other is None:
-        return
-    if not is_machine(other):
+    """A machine given beside the simulated one: a single one, or one for each of several starts."""
+    if isinstance(other, Records):
+        own = drive.shape if isinstance(drive, Records) else ()
+        if other.shape != own:
+            raise InputError(
+                f"{name}: records of shape {other.shape} do not go with starts of shape {own}; give a single "
+                "machine, or records of the same shape."
+            )
+    elif other is not None and not is_machine(other):
         raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
-    shape, own = getattr(other, "shape", ()), getattr(drive, "shape", ())
-    if shape not in {(), own}:
-        raise InputError(
-            f"{name}: a Drive with fields of shape {shape} does not go with starts of shape {own}; "
-            "give a single drive or one of the same shape."
-        )
 
 
 def check_end(machine: Any, controller: object, until: float | None, rows: Rows) -> None:

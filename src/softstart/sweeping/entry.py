@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import Machine
-from softstart.chain.model import Chain, load_machine
+from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
-from softstart.drive import Drive
+from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers, why_not_sendable
 from softstart.quantities import nearest, show
@@ -229,16 +229,14 @@ def _checked(
     wrong: list[str] = []
     axes: tuple[Axis, ...] = ()
     for name, other in (("drive", drive), ("fitted_to", fitted_to), ("base", base)):
-        one = isinstance(other, Chain) or (isinstance(other, Drive) and other.shape == ())
-        if not one and not (other is None and name != "drive"):
-            shown = f"a Drive with fields of shape {other.shape}" if isinstance(other, Drive) else show(other)
-            wrong.append(f"{name} = {shown}: give one single Drive; what varies goes into the grid.")
+        if not is_machine(other) and not (other is None and name != "drive"):
+            wrong.append(f"{name} = {show(other)}: give one Drive or Chain; what varies goes into the grid.")
     for name, value in (("until", until), ("time_limit", time_limit)):
         if value is not None and not (
             isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf
         ):
             wrong.append(f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out.")
-    machine = drive if isinstance(drive, Chain | Drive) else None
+    machine: Any = drive if is_machine(drive) else None
     wrong += _figure_mistakes(figures, machine)
     if not maker.given and not (isinstance(grid, Mapping) and "controller" in grid):
         wrong.append("controller = None: name a controller, or make several an axis of the grid.")
@@ -257,8 +255,8 @@ def _figures_kept(drive: Machine, figures: tuple[str, ...] | list[str] | None) -
     limited = has_margin(drive.limits)
     if figures is None:
         usual: tuple[str, ...] = FIGURES
-        if isinstance(drive, Chain):
-            usual = (*FIGURES[:3], *(f"k_dyn_{k + 1}" for k in range(len(drive.shafts))))
+        if (count := len(drive.shaft_names)) > 1:
+            usual = (*FIGURES[:3], *(f"k_dyn_{k + 1}" for k in range(count)))
         return usual + OF_LIMITS if limited else usual
     wrong = [name for name in figures if name in OF_LIMITS and not limited]
     if wrong:
@@ -274,7 +272,7 @@ def _figure_mistakes(figures: object, machine: Machine | None) -> list[str]:
         return []
     if isinstance(figures, str) or not isinstance(figures, tuple | list) or not figures:
         return [f"figures = {show(figures)}: name figures in a list, as ['k_dyn', 'start_time']."]
-    known = list(known_figures(machine if isinstance(machine, Chain) else None))
+    known = list(known_figures(("",) if machine is None else machine.shaft_names))
     wrong = []
     for name in figures:
         if name not in known:

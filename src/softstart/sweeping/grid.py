@@ -12,10 +12,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from softstart.chain.machines import BY_PATH, Machine, knob, knobs
-from softstart.chain.model import Chain
+from softstart.chain.machines import Machine
 from softstart.controller.finding import quantity
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
+from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
 from softstart.input.parameter_set import meant_by
 from softstart.input.parameters import Wording, read_value
@@ -139,7 +139,7 @@ def target_of(key: str, machine: Machine | None = None) -> tuple[Owner, str] | N
     if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
         return "parameter", key[len(PREFIX) + 1 :]
     if machine is not None:
-        found = knob(machine, key)
+        found = machine.knob(key)
         return None if found is None else ("drive", found.name)
     name = BY_PATH.get(key, key)
     return ("drive", name) if name in PARAMETERS else None
@@ -150,6 +150,7 @@ def read_column(
 ) -> Column:
     """One column; `parameters` are those of the controllers, None where these are not known.
 
+    >>> from softstart.chain import Chain
     >>> crane = Chain.load("crane-4-mass")
     >>> read_column("shaft[2].gap", ["0.5x", "2x"], None, crane).values.tolist()
     [0.1, 0.4]
@@ -202,7 +203,7 @@ def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: list[str]) -> Para
 
 
 def _of_drive(key: str, name: str, values: object, machine: Machine | None) -> Column:
-    found = None if machine is None else knob(machine, name)
+    found = None if machine is None else machine.knob(name)
     parameter = PARAMETERS[name] if found is None else found.parameter
     if found is not None and parameter.unit and not parameter.many:
         values = [_multiple(value, found.value) for value in values]  # type: ignore[attr-defined]
@@ -278,14 +279,14 @@ def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> l
 
 
 def _unknown(key: str, parameters: Parameters | None, machine: Machine | None = None) -> str:
-    of_drive = [] if isinstance(machine, Chain) else list(meant_by(key, PARAMETERS))
+    of_drive = [one for one in meant_by(key, PARAMETERS) if machine is None or machine.knob(one)]
     meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else of_drive
     if not meant:
         own = [f"{PREFIX}.{name}" for name in parameters or ()]
-        words = BY_PATH if machine is None else knobs(machine)
+        words = BY_PATH if machine is None else machine.knobs()
         close = nearest(key, [*words, *own, *(parameters or ()), PREFIX])
         meant = [f"{PREFIX}.{close}" if close in (parameters or ()) else close] if close else []
-    what = "chain" if isinstance(machine, Chain) else "drive"
+    what = "drive" if machine is None else machine.KIND
     hint = (
         f"did you mean {' or '.join(meant)}?"
         if meant

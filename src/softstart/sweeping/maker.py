@@ -14,7 +14,7 @@ import numpy as np
 from softstart.controller.base import Controller
 from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
 from softstart.controller.tuned import Tuned
-from softstart.drive import Drive
+from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
 from softstart.processes import why_not_sendable
 from softstart.quantities import show
@@ -153,8 +153,8 @@ def _digested(value: object) -> Any:
     if isinstance(value, str | Path):
         path = Path(value)
         return [path.name, _of_file(path)] if path.suffix and path.is_file() else str(value)
-    if isinstance(value, Drive):
-        return value.to_toml()
+    if is_machine(value):
+        return value.to_toml()  # type: ignore[attr-defined]
     if isinstance(value, np.ndarray):
         return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
     if isinstance(value, list | tuple):

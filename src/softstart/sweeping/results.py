@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.model import Chain
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.start.status import Status
@@ -47,7 +46,7 @@ def figure_variables(axes: tuple[Axis, ...], question: Question) -> list[Variabl
     """The figures, and at the end the status, whose chunk in a folder says that all the others are there."""
     dims = tuple(axis.name for axis in axes)
     found = []
-    known = known_figures(question.drive if isinstance(question.drive, Chain) else None)
+    known = known_figures(question.drive.shaft_names)
     for name in question.figures:
         if name != STATUS:
             unit, meaning = known[name]

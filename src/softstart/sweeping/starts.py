@@ -12,20 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine, with_values
-from softstart.chain.model import Chain
+from softstart.chain.machines import Machine, varied
 from softstart.controller.base import CompiledController
-from softstart.drive import Drive, Limits
 from softstart.errors import InputError, Mistakes
-from softstart.kernel import records as at
-from softstart.start.batch import (
-    Figures,
-    Notes,
-    array_starts,
-    figures,
-    limits_of_each,
-    prepared,
-)
+from softstart.start.batch import Figures, named, prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
 from softstart.sweeping.maker import Maker
@@ -35,22 +25,15 @@ CODES = {status.name: code for code, status in enumerate(Status)}
 
 
 @cache
-def known_figures(machine: Machine | None = None) -> dict[str, tuple[str, str]]:
-    """Names of the figures of a start, with unit and meaning; those of a chain tell each of its shafts.
+def known_figures(shafts: tuple[str, ...] = ("",)) -> dict[str, tuple[str, str]]:
+    """Names of the figures of a start, with unit and meaning; of several shafts each has its own.
 
     >>> known_figures()["start_time"]
     ('s', 'first instant at which the load has its target speed')
-    >>> known_figures(Chain.load("crane-4-mass"))["k_dyn_2"]
-    ('1', 'K_dyn of pinion - wheel shaft')
+    >>> known_figures(("rotor - pinion", "pinion - wheel"))["k_dyn_2"]
+    ('1', 'K_dyn of pinion - wheel')
     """
-    if isinstance(machine, Chain):
-        shafts = tuple(one.replace(permissible_torque=1.0) for one in machine.shafts)
-        found = prepared([replace(machine, shafts=shafts, position="mid-gap")]).named()
-    else:
-        notes = Notes(np.zeros(1, at.NOTES), np.zeros((1, 1), at.SHAFT_NOTES))
-        notes["release_time"][:] = np.nan
-        found = figures(notes, 1.0, limits=Limits(shaft_torque=1.0))
-    return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
+    return {name: (unit, meaning) for name, (_, unit, meaning) in named(shafts).items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +86,7 @@ def compute(task: Task) -> Block:
             parameters[column.field] = values
         else:
             controller = values
-    make = _of_chains if isinstance(question.drive, Chain) else _of_drives
-    found = make(question, changes, parameters, controller, math.prod(shape))
+    found = _figures(question, changes, parameters, controller, math.prod(shape))
     block: Block = {name: found[name][0].reshape(shape) for name in question.figures if name != "status"}
     names, which = np.unique(found["status"][0], return_inverse=True)
     codes = np.array([CODES[name] for name in names.tolist()], dtype=np.int8)
@@ -123,48 +105,19 @@ def _spread(axes: tuple[Axis, ...], shape: tuple[int, ...]) -> Iterator[tuple[Co
                 yield column, text
 
 
-def _of_drives(
+def _figures(
     question: Question, changes: Mapping[str, Any], parameters: Mapping[str, Any], controller: str, count: int
 ) -> Figures:
-    assert isinstance(question.drive, Drive)
-    own = {"gap": np.full(count, question.drive.gap)}  # every drive of a chunk is a batch
-    change = question.drive.with_gap if "gap" in changes else question.drive.replace
-    drive = change(**{**own, **changes})
-    base = question.base if question.base is not None else drive
-    each = np.broadcast_to(base.mean_torque, (count,))
-    notes = _notes(question, drive, parameters, controller)
-    return figures(notes, each, question.until, limits_of_each(drive))
-
-
-def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> Notes:
-    maker = question.maker
-    fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
-    made = maker.make(parameters, controller)
-    return array_starts(drive, made, question.until, fitted_to, question.time_limit)
-
-
-def _of_chains(
-    question: Question, changes: Mapping[str, Any], parameters: Mapping[str, Any], controller: str, count: int
-) -> Figures:
-    """One start after another where the controller's parameters differ, else one call for all."""
-    chains = [_chain_of(question.drive, changes, index) for index in range(count)]
-    starts = prepared(chains, question.time_limit)
-    base = np.array([(question.base or chain).mean_torque for chain in chains])
-    nominal = None if question.fitted_to is None else question.fitted_to.design_drive
+    """One start after another where a controller in plain Python needs it, else one call for all."""
+    gap = question.drive.gap_and_inertia[0]
+    own = {"gap": np.full(count, gap)}  # of every start, so that each chunk is a table
+    machines = varied(question.drive, {**own, **changes})
     made = question.maker.make(parameters, controller)
-    set_ups = made.set_ups(nominal or [chain.design_drive for chain in chains])
-    return starts.figures(np.arange(count), set_ups, base, until=question.until)
-
-
-def _chain_of(machine: Machine, changes: Mapping[str, Any], index: int) -> Chain:
-    """The chain of one place of a chunk."""
-    values = {
-        name: float(value[index]) if isinstance(value, np.ndarray) else value
-        for name, value in changes.items()
-    }
-    found = with_values(machine, values)
-    assert isinstance(found, Chain)
-    return found
+    fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
+    return prepared(machines, question.time_limit).figures(
+        made.set_ups(fitted_to or machines), (question.base or machines).mean_torque,
+        until=question.until,
+    )  # fmt: skip
 
 
 MOST_CORNERS = 4096
@@ -220,23 +173,16 @@ def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
     return [((column, value),) for value in dict.fromkeys((low, high))]
 
 
-def _possible(machine: Machine, values: Mapping[str, Any]) -> None:
-    """InputError for a drive or a chain that cannot be; samples of a chain are looked at one by one."""
-    if isinstance(machine, Drive):
-        machine.replace(**values)
-        return
-    arrays = [value.size for value in values.values() if isinstance(value, np.ndarray)]
-    for index in range(max(arrays, default=1)):
-        _chain_of(machine, values, index)
-
-
 def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
     drive: dict[str, Any] = {c.field: value for c, value in values if c.owner == "drive"}
     parameters = {c.field: value for c, value in values if c.owner == "parameter"}
     controller = next((value for c, value in values if c.owner == "controller"), "")
     wrong = Mistakes()
     with wrong.noted():
-        _possible(question.drive, drive)
+        if any(isinstance(value, np.ndarray) for value in drive.values()):
+            varied(question.drive, drive)
+        else:
+            question.drive.with_values(drive)
     with wrong.noted():
         question.maker.make(parameters, controller)
     wrong.settle()

@@ -13,21 +13,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import (
-    Knob,
-    Machine,
-    here,
-    knob,
-    knobs,
-    moved,
-    with_values,
-)
-from softstart.chain.model import Chain
+from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.controller.tuned import Tuned
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import Drive
+from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
+from softstart.input.parameters import Knob
 from softstart.optimal.problem import StartTime
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import nearest, to_si
@@ -108,11 +101,11 @@ class Question:
 
     def drive_of(self, cell: int) -> Machine:
         """The drive or chain of a cell, as it is."""
-        return moved(self.drive, *self.cells[cell])
+        return self.drive.moved(*self.cells[cell])
 
     def value_in(self, cell: int, name: str) -> float:
         """A quantity that has a tolerance, in a cell; of a chain each gap goes with all others."""
-        found = knob(self.drive_of(cell) if isinstance(self.drive, Chain) else self.drive, name)
+        found = self.drive_of(cell).knob(name)
         assert found is not None
         return float(found.value)
 
@@ -122,10 +115,8 @@ class Question:
 
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""
-        if not isinstance(self.drive, Chain):
-            return self.gaps, self.load_inertias
-        rows = [moved(self.drive, gap, self.load_inertias[0]).design_drive for gap in self.gaps]
-        columns = [moved(self.drive, self.gaps[0], one).design_drive for one in self.load_inertias]
+        rows = [self.drive.moved(gap, self.load_inertias[0]).design_drive for gap in self.gaps]
+        columns = [self.drive.moved(self.gaps[0], one).design_drive for one in self.load_inertias]
         return tuple(float(one.gap) for one in rows), tuple(float(one.load_inertia) for one in columns)
 
     def neighbours(self, cell: int) -> tuple[int, ...]:
@@ -232,7 +223,7 @@ def gaps_of(drive: Machine, given: Iterable[Any] | Any | None, name: str = "gaps
     >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
     (0.5, 0.5235987755982988, 1.0)
     """
-    own = here(drive)[0]
+    own = drive.gap_and_inertia[0]
     if given is None:
         if not own > 0.0:
             raise InputError(
@@ -252,15 +243,8 @@ def inertias_of(
     """
     if given is None:
         given = [f"{multiple}x" for multiple in INERTIA_MULTIPLES]
-    motor = float(drive.motor_inertia) if isinstance(drive, Drive) else _motor_at_load(drive)
-    units = {"x": here(drive)[1], "J1": motor}
+    units = {"x": drive.gap_and_inertia[1], "J1": drive.motor_at_load}
     return _axis(given, name, "kg*m^2", drive, units)
-
-
-def _motor_at_load(chain: Chain) -> float:
-    """The inertia of the motor's mass, brought to the shaft of the load."""
-    ratio = chain.speed_ratios("motor")[chain.load_index]
-    return chain.masses[chain.motor_index].inertia / ratio**2
 
 
 def _axis(
@@ -275,10 +259,10 @@ def _axis(
     for value in listed:
         with wrong.noted():
             found.append(_value(value, name, unit, units))
-    gap, inertia = here(drive)
+    gap, inertia = drive.gap_and_inertia
     for value in found:
         with wrong.noted(f"{name}: "):
-            moved(drive, *((value, inertia) if unit == "rad" else (gap, value)))
+            drive.moved(*((value, inertia) if unit == "rad" else (gap, value)))
     wrong.settle()
     return tuple(sorted(set(found)))
 
@@ -332,7 +316,7 @@ def scenarios_of(
             varied = _varied(drive, name)
             levels[varied.name] = _levels(varied, given)
             for level in levels[varied.name]:
-                with_values(drive, {varied.name: level.of(varied.value)})
+                drive.with_values({varied.name: level.of(varied.value)})
         except InputError as error:
             wrong += [s if s.startswith("tolerances") else f"tolerances: {s}" for s in error.sentences]
     if wrong:
@@ -346,42 +330,34 @@ def scenarios_of(
     return ({}, *combined)
 
 
-def scenarios_drawn(drive: Drive, drawn: Drive, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
+def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
     """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> scenarios_drawn(crane, crane.replace(gap=[0.4, 0.6]), ({},))
+    >>> from softstart import records
+    >>> scenarios_drawn(crane, records(crane, gap=[0.4, 0.6]), ({},))
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """
-    moved = {
-        name: np.asarray(value)
-        for name, value in vars(drawn).items()
-        if name in PARAMETERS and np.ndim(value)
-    }
-    moved = {name: values for name, values in moved.items() if np.any(values != vars(drive)[name])}
+    own = drive.values()
+    moved = {name: values for name, values in drawn.fields.items() if np.any(values != own[name])}
     if both := sorted(set(moved) & {name for one in scenarios for name in one}):
         raise InputError(f"tolerances: {both[0]} was identified, with an interval of its own; leave it out.")
     found: list[Scenario] = [{}]
-    for k in range(math.prod(drawn.shape)):
-        levels = {
-            name: Level(float(values[k]) / float(vars(drive)[name]), 0.0) for name, values in moved.items()
-        }
+    for k in range(len(drawn)):
+        levels = {name: Level(float(values[k]) / float(own[name]), 0.0) for name, values in moved.items()}
         found.append({**scenarios[k % len(scenarios)], **levels})
     return tuple(found)
 
 
 def _varied(drive: Machine, name: str) -> Knob:
     """The quantity of a drive or chain that has a tolerance."""
-    found = knob(drive, name)
+    found = drive.knob(name)
     if found is not None and found.parameter.unit:
         return found
-    what, example = ("drive", "a field of a Drive, as stiffness")
-    near = nearest(name, [p.name for p in PARAMETERS.values() if p.unit])
-    if isinstance(drive, Chain):
-        what, example = "chain", "one of its file, as shaft[1].gap, or gap for all"
-        near = nearest(name, [*knobs(drive)])
-    hint = f"did you mean {near}?" if near else f"name {example}."
-    raise InputError(f"tolerances: {name} is no quantity of a {what}; {hint}")
+    known = {path: one for path in drive.knobs() if (one := drive.knob(path)) and one.parameter.unit}
+    near = nearest(name, [*known, *(one.name for one in known.values())])
+    hint = f"did you mean {near}?" if near else f"name one of its file, as {next(iter(known))}."
+    raise InputError(f"tolerances: {name} is no quantity of a {drive.KIND}; {hint}")
 
 
 def _levels(varied: Knob, given: Any) -> list[Level]:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from softstart.chain.machines import Machine, one_machine
-from softstart.chain.model import Chain
 from softstart.controller import Controller
 from softstart.drive import Drive
+from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers
 from softstart.start.batch import has_margin
@@ -238,7 +238,7 @@ def _question(
     restarts: Any,
     population: Any,
     generations: Any,
-    drawn: Drive | None,
+    drawn: Any,
 ) -> Question:
     """All that was given, read; every mistake at once."""
     wrong: list[str] = []
@@ -265,17 +265,12 @@ def _question(
     scenarios = read(scenarios_of, drive, tolerances, first or 0)
     if drawn is not None and scenarios is not None:
         scenarios = read(scenarios_drawn, drive, drawn, scenarios)
-    if base is not None and not (isinstance(base, Chain) or (isinstance(base, Drive) and base.shape == ())):
-        wrong.append(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
+    if base is not None and not is_machine(base):
+        wrong.append(f"base = {base!r}: K_dyn refers to one Drive or Chain; Drive.load reads one.")
     if not isinstance(metric, str) and not callable(metric):
         wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
     if metric == MARGIN and not has_margin(drive.limits):
-        wrong.append(
-            "metric = margin: the drive has no limits; give limits.shaft_torque in its file, as "
-            '"175 N*m", or limits.start_time.'
-            if isinstance(drive, Drive)
-            else "metric = margin: no shaft of the chain has a limit; give permissible_torque in its file."
-        )
+        wrong.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
     if wrong or ranges is None or room is None:
         raise InputError(wrong)
     return Question(

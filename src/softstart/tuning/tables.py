@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softstart.chain.machines import Machine, with_values
+from softstart.chain.machines import Machine
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.errors import InputError
 from softstart.late import late
@@ -253,7 +253,7 @@ def optimum_of(asked: Asked) -> dict[str, Any]:
     Where the start position is unknown, that of the hardest one as if it were known: no gains beat it.
     """
     names = {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0, "torque_noise": 0.0}
-    ideal = with_values(asked.drive, names)
+    ideal = asked.drive.with_values(names)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
         each = [

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Starts, starts_of
-from softstart.chain.model import Chain
+from softstart.chain.machines import varied
 from softstart.controller import CompiledController, Controller, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.quantities import nearest
-from softstart.start.batch import Figures
+from softstart.start.batch import Batch, Figures, prepared
 from softstart.tuning.question import MARGIN, Question
 
 Cells = NDArray[np.int64]  # axes: candidate, cell
@@ -68,7 +67,7 @@ class Trials:
         bases = [(question.base or question.drive_of(i)).mean_torque for i in range(len(gaps))]
         self.base_torque = np.array(bases, dtype=np.float64)
         self.fitted = question.fitted()
-        self.nominal = question.drive if isinstance(question.drive, Drive) else question.drive.design_drive
+        self.nominal = question.drive.design_drive
         self.own_defaults = self._defaults(self.fitted)
         self.nominal_defaults = {
             name: float(value[0]) for name, value in self._defaults([self.nominal]).items()
@@ -79,7 +78,7 @@ class Trials:
         self.yardstick = self._measured() if yardstick is None else yardstick
         self.time_limit = self.yardstick.time_limit
 
-    def _starts(self) -> Starts:
+    def _starts(self) -> Batch:
         """The machines that start: of each cell, one after another, those of all scenarios."""
         question = self.question
         own: dict[str, Any] = {"gap": self.gap, "load_inertia": self.load_inertia}
@@ -90,7 +89,7 @@ class Trials:
                 value = np.array([question.value_in(cell, name) for cell in range(self.gap.size)])
             columns = [one[name].of(value) if name in one else value for one in question.scenarios]
             found[name] = np.stack(columns, axis=1).ravel()
-        return starts_of(question.drive, found)
+        return prepared(varied(question.drive, found))
 
     def _defaults(self, drives: Sequence[Drive]) -> dict[str, Vector]:
         """The tuned parameters as derived from the drives."""
@@ -122,9 +121,8 @@ class Trials:
     def _direct(self) -> Vector:
         """Start time of `direct` in every cell and scenario."""
         shape = (self.gap.size, len(self.question.scenarios))
-        every = np.arange(math.prod(shape))
         direct = make_controller("direct")
-        figured = self.starts.figures(every, [direct.set_up(one) for one in self.fitted], 1.0)
+        figured = self.starts.figures(direct.set_ups(self.fitted), 1.0)
         found: Vector = figured["start_time"][0].reshape(shape)
         if np.any(np.isnan(found)):
             gap, inertia = self.question.cells[int(np.argwhere(np.isnan(found))[0][0])]
@@ -139,10 +137,8 @@ class Trials:
     def to_the_end(self) -> Trials:
         """These trials for gains that are settled: their figures are those of `simulate` to the bit.
 
-        A chain flies through its gaps in spans that end with the time limit, and rounds by their length.
+        A start flies through its gaps in spans that end with the time limit, and rounds by their length.
         """
-        if not isinstance(self.question.drive, Chain):
-            return self
         whole = copy.copy(self)
         whole.time_limit = None
         return whole
@@ -193,7 +189,7 @@ class Trials:
             for k, cell in enumerate(which[:, 0].tolist())
         ]
         base = np.repeat(self.base_torque[which.ravel()], scenarios)
-        return self.starts.figures(starts, set_ups, base, self.time_limit)
+        return self.starts.figures(set_ups, base, starts, time_limit=self.time_limit)
 
     def _read(self, figured: Figures, which: Cells) -> Judged:
         shape = (*which.shape, len(self.question.scenarios))

@@ -92,11 +92,9 @@ def controllers_set_up(machine: Any, fitted_to: Any) -> str:
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
     'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
-    from softstart.chain.machines import values_of  # compiled code stands behind it
-
     found = []
-    here = {} if machine is None else values_of(machine)
-    there = values_of(fitted_to)
+    here = {} if machine is None else machine.by_path()
+    there = fitted_to.by_path()
     for path, (parameter, value) in here.items() if here.keys() == there.keys() else ():
         informative = parameter.name in ("name", "source", "assumed", "units")
         if not informative and parameter.table not in INFORMATIVE_TABLES and there[path][1] != value:

@@ -200,10 +200,8 @@ def figure_table(rows: Sequence[Sequence[str]]) -> str:
 
 def drive_table(machine: Any) -> str:
     """All parameters of a machine that are set."""
-    from softstart.chain.machines import values_of  # compiled code stands behind it
-
     rows = []
-    for path, (parameter, value) in values_of(machine).items():
+    for path, (parameter, value) in machine.by_path().items():
         if value is not None and value != "" and path != "name":
             values = value if isinstance(value, tuple) else (value,)
             shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)

@@ -7,7 +7,6 @@ from statistics import median
 
 import numpy as np
 
-from softstart.start import metrics
 from softstart_studies.benchmarks.host import Host
 from softstart_studies.benchmarks.problem import Problem, crane, gaps
 
@@ -57,7 +56,7 @@ def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> 
     for host in (peer, ours):
         host.forget()
     drive = crane(gaps(duel.peer_starts))
-    apart = np.abs(metrics.k_dyn(theirs[0].peaks, drive) - metrics.k_dyn(same.peaks, drive))
+    apart = np.abs(theirs[0].peaks - same.peaks) / drive.mean_torque
     return Outcome(
         duel,
         median(duel.peer_starts / one.cpu for one in theirs),

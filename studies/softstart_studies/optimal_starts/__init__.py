@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import ClassVar
 
 from softstart.optimal.front import Front
-from softstart.start.metrics import base_torque
 from softstart.study import Progress, Study, StudyResult
 from softstart_studies.optimal_starts import fronts, kinds, limits, profiles, sensor, smooth, terminals
 from softstart_studies.optimal_starts.crane import CRANE, TARGET, Extent
@@ -89,7 +88,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
 
     new, worn = found.fronts[0], found.fronts[-1]
     drawn = (
-        pictures.profiles_figure(found.profiles, float(base_torque(CRANE)), TARGET),
+        pictures.profiles_figure(found.profiles, CRANE.mean_torque, TARGET),
         front_figure(new),
         front_figure(worn),
         pictures.terminals_figure(found.endings),

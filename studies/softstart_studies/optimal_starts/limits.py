@@ -8,7 +8,6 @@ from softstart.optimal.front import Front
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 from softstart.optimal.solving import optimize
-from softstart.start.metrics import base_torque
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import crane, direct_time, rounded
 
@@ -34,7 +33,7 @@ def limit(gap: float) -> Limit:
     """
     drive = crane(gap)
     starts = PulseCoastHold.of(Problem(drive, 1.0))
-    P = float(base_torque(drive))
+    P = drive.mean_torque
     course = starts.course(P)
     at_peak = starts.load_speed(course, course.t_peak, P)
     time = course.t_peak + (float(drive.target_speed) - at_peak) * starts.J2 / (P - starts.Mc)

@@ -7,10 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from softstart import Drive, Run, formulas, simulate
+from softstart import Drive, Records, Run, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
-from softstart.start.metrics import base_torque
 
 Method = Literal[1, 2]
 
@@ -40,19 +39,22 @@ def base() -> float:
     >>> round(base(), 2)
     52.86
     """
-    return float(base_torque(CRANE))
+    return CRANE.mean_torque
 
 
-def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None) -> formulas.TwoStages:
+def closed_form(
+    drive: Drive, r: Any, method: Method, base: float | None = None, **changed: Any
+) -> formulas.TwoStages:
     """Stages 1 and 2 with M1 = r Ms by [G](3), (15), (17), (18); `base` in N m, else that of the drive.
+
+    `changed` are arrays of J2, c or gap, in SI.
 
     >>> round(closed_form(crane(), 0.25, 2).k_dyn, 4)
     1.2677
     """
-    J1, J2, c, gap, Ms, Mc = drive.J1, drive.J2, drive.c, drive.gap, drive.Ms, drive.Mc
-    low = np.asarray(r) * Ms
-    high = Ms if method == 1 else low
-    return formulas.two_stages(low, high, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, base=base)
+    values = {name: getattr(drive, name) for name in ("J1", "J2", "c", "gap", "Ms", "Mc")} | changed
+    low = np.asarray(r) * drive.Ms
+    return formulas.two_stages(low, drive.Ms if method == 1 else low, **values, base=base)
 
 
 def published(controller: str, **parameters: object) -> Controller:
@@ -75,10 +77,11 @@ def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None)
     return simulate(drive, published(CONTROLLERS[method], torque=r * float(drive.Ms)), base=base)
 
 
-def many(drives: Drive, controller: str | Controller, **parameters: float) -> tuple[Vector, Vector]:
+def many(drives: Records, controller: str | Controller, **parameters: float) -> tuple[Vector, Vector]:
     """K_dyn of first contact and of the whole start of a batch; controller and base of the new drive.
 
-    >>> [k.round(4).tolist() for k in many(CRANE.replace(gap=[0.5, 2.0]), "direct")]
+    >>> from softstart import records
+    >>> [k.round(4).tolist() for k in many(records(CRANE, gap=[0.5, 2.0]), "direct")]
     [[3.1179, 4.8654], [3.1179, 4.8654]]
     """
     ready = published(controller, **parameters) if isinstance(controller, str) else controller

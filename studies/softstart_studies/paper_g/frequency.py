@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from softstart import records
 from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
 from softstart_studies.paper_g.crane import CRANE, SHARE, base, closed_form, many
@@ -53,12 +54,12 @@ def detuned(cause: Cause) -> Detuned:
     else:
         c, deviations = CRANE.c * (1.0 + DEVIATIONS) ** 2, DEVIATIONS
         J2 = np.full(c.shape, float(CRANE.J2))
-    drives = CRANE.replace(load_inertia=J2, stiffness=c)
+    drives = records(CRANE, load_inertia=J2, stiffness=c)
     torque = SHARE * float(CRANE.Ms)
     half = 0.5 * float(closed_form(CRANE, SHARE, 2).contact_duration)
     first, whole = many(drives, "acceleration-delay", torque=torque)
     _, by_half = many(drives, "acceleration-delay", torque=torque, delay=half)
-    promised = np.asarray(closed_form(drives, SHARE, 2, base()).k_dyn)
+    promised = np.asarray(closed_form(CRANE, SHARE, 2, base(), J2=J2, c=c).k_dyn)
     return Detuned(cause, deviations, J2, c, promised, first, whole, by_half)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart import records
 from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
 from softstart_studies.paper_g.crane import CRANE, GAP_1, GAP_2, HEAVY, LIGHT, SHARE, closed_form, many
@@ -55,10 +56,10 @@ def spread(label: str, controller: str, parameters: dict[str, float]) -> Spread:
         grid.ravel() for grid in np.meshgrid(GAPS[::5], INERTIAS[::4], STIFFNESSES[::2], indexing="ij")
     )
     batches = (
-        CRANE.replace(gap=GAPS),
-        CRANE.replace(load_inertia=INERTIAS * CRANE.J1),
-        CRANE.replace(stiffness=STIFFNESSES * CRANE.c),
-        CRANE.replace(gap=gap, load_inertia=inertia * CRANE.J1, stiffness=stiffness * CRANE.c),
+        records(CRANE, gap=GAPS),
+        records(CRANE, load_inertia=INERTIAS * CRANE.J1),
+        records(CRANE, stiffness=STIFFNESSES * CRANE.c),
+        records(CRANE, gap=gap, load_inertia=inertia * CRANE.J1, stiffness=stiffness * CRANE.c),
     )
     return Spread(label, *(many(drives, controller, **parameters)[1] for drives in batches))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart import records
 from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
 from softstart_studies.paper_g.crane import CRANE, GAP_1, GAP_2, SHARE, closed_form, many
@@ -42,12 +43,12 @@ def wear() -> Wear:
     >>> bool(found.by_time.first_contact[-1] > 1.3 * found.promised[-1])
     True
     """
-    worn = CRANE.replace(gap=GAPS)
+    worn = records(CRANE, gap=GAPS)
     torque = SHARE * float(CRANE.Ms)
     half = 0.5 * float(closed_form(CRANE, SHARE, 2).contact_duration)
     return Wear(
         GAPS,
-        np.asarray(closed_form(worn, SHARE, 2).k_dyn),
+        np.asarray(closed_form(CRANE, SHARE, 2, gap=GAPS).k_dyn),
         Kept(*many(worn, SwitchAtInstant(torque=torque))),
         Kept(*many(worn, "acceleration-delay", torque=torque)),
         Kept(*many(worn, "acceleration-delay", torque=torque, delay=half)),

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import Drive
+from softstart import Drive, Records, records
 from softstart.controller import Controller
 from softstart.drive import LoadKind
 from softstart.optimal.result import OptimumError
 from softstart.optimal.solving import optimize
-from softstart.start.batch import array_starts, figures
-from softstart.start.metrics import base_torque
+from softstart.start.batch import prepared
 from softstart_studies.paper_g.crane import published
 
 TARGET = 60.0  # rad/s
@@ -45,13 +44,14 @@ def starts(
     ratios: Sequence[float],
     phases: int,
     **changed: Any,
-) -> Drive:
-    """A batch of drives over (gap, J2, encoder phase); J2 in J1 of the drive that the controllers are told.
+) -> Records:
+    """Drives over (gap, J2, encoder phase); J2 in J1 of the drive that the controllers are told.
 
     >>> starts("active", (0.5, 2.0), (2.0, 5.0), 4).shape
     (2, 2, 4)
     """
-    return TOLD.replace(
+    return records(
+        TOLD,
         load_kind=kind,
         gap=np.asarray(gaps)[:, None, None],
         load_inertia=float(TOLD.J1) * np.asarray(ratios)[None, :, None],
@@ -69,11 +69,10 @@ class Starts:
     contacts: NDArray[np.float64]
 
 
-def run(batch: Drive, controller: str | Controller, told: Drive) -> Starts:
+def run(batch: Records, controller: str | Controller, told: Drive) -> Starts:
     """Start all drives of the batch under a controller set up for the drive that it is told."""
     ready = published(controller) if isinstance(controller, str) else controller
-    notes = array_starts(batch, ready, fitted_to=told)
-    found = figures(notes, np.broadcast_to(base_torque(batch), batch.shape).ravel())
+    found = prepared(batch).figures(ready.set_ups(told), batch.mean_torque)
     return Starts(*(found[name][0].reshape(batch.shape) for name in ("k_dyn", "start_time", "contacts")))
 
 

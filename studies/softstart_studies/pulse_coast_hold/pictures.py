@@ -9,7 +9,6 @@ import numpy as np
 
 from softstart import simulate
 from softstart.drive import LoadKind
-from softstart.start.metrics import base_torque
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER, Cell
 from softstart_studies.pulse_coast_hold.crane import TOLD, Extent
@@ -40,7 +39,7 @@ def starts_figure(extent: Extent) -> Figure:
                 colour, dash = COLOURS[index], DASHES[index]
                 label = f"gap {gap:g} rad, $J_2$ = {ratio:g} $J_1$: {K_DYN} {run.k_dyn:.3f}"
                 motor.plot(run.t, run.u, color=colour, ls=dash, label=label)
-                shaft.plot(run.t, run.T / float(base_torque(drive)), color=colour, ls=dash)
+                shaft.plot(run.t, run.T / drive.mean_torque, color=colour, ls=dash)
                 speed.plot(run.t, run.w2, color=colour, ls=dash)
                 speed.plot(run.t, run.w1, color=colour, lw=0.7, alpha=0.8)
             motor.set_title(f"{kind} load", loc="left")

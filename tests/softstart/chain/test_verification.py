@@ -57,11 +57,6 @@ def test_the_summary_has_both_sides():
     assert told["chain"]["assumed"] == CHAIN.assumed
 
 
-def test_a_batch_is_refused():
-    with pytest.raises(InputError, match="give a single drive"):
-        verify_on_chain(CHAIN, DRIVE.replace(gap=[0.1, 0.2]), "direct")
-
-
 def test_a_chain_of_two_masses_is_its_own_drive():
     chain = chain_of(Drive.load("crane-4amtkf"))
     found = two_mass_error(chain, controllers=["direct", "ramp", "shaped"])

@@ -45,7 +45,10 @@ ONE_SENTENCE = {
     "unknown key": (["compare", "misspelt.toml"], ["stifness", "did you mean stiffness?"]),
     "missing key": (["compare", "missing.toml"], ["[shaft] gap is missing"]),
     "too weak": (["compare", "weak.toml"], ["starting_torque", "7.16"]),
-    "several drives": (["compare", "list.toml"], ["2 drives", "one at a time"]),
+    "several drives": (
+        ["compare", "list.toml"],
+        ["[shaft] gap = [0.5, 1.0]: a drive has one value", "use sweep"],
+    ),
     "several drives by --set": ([*START, "direct", "--set", "gap=[1, 2]"], ["gap"]),
     # --set
     "setting without value": (["compare", "--set", "load.inertia"], ['"load.inertia"', "equals sign"]),

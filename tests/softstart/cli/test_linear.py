@@ -57,7 +57,7 @@ def test_a_controller_of_ones_own(run):
     [
         (("linear", "--controller", "rampp"), "did you mean ramp?"),
         (("linear",), "--controller NAME is missing"),
-        (("linear", "list.toml", "--controller", "ramp"), "one at a time"),
+        (("linear", "list.toml", "--controller", "ramp"), "a drive has one value"),
         ((*LOOP, "--param", "dampng=1"), "no such parameter"),
         (("linear", "nosuch.toml", "--controller", "rampp", "--param", "x"), "write a key"),
         (("linear", "--controller", "own.py:Raises"), "failed"),

@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 
 from softstart.drive import Drive
 from softstart.drive.control_systems import initial_state, shaft_torque
-from softstart.errors import InputError
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "max_step": 1e-3}
 
@@ -196,10 +195,3 @@ def test_contact_laws(law, rate, expected):
     assert shaft_torque(1.0, rate, 40.0, 1.0, 1.0, law=law) == expected
     assert shaft_torque(-1.0, -rate, 40.0, 1.0, 1.0, law=law) == -expected
     assert shaft_torque(0.5, rate, 40.0, 1.0, 1.0, law=law) == 0.0
-
-
-def test_a_batch_is_refused(crane):
-    batch = crane.replace(gap=[0.5, 2])
-    for attempt in (batch.to_control, lambda: batch.to_control(nonlinear=True), lambda: initial_state(batch)):
-        with pytest.raises(InputError, match=r"a batch of shape \(2,\) is not one system"):
-            attempt()

@@ -1,4 +1,4 @@
-"""The drive as a value: defaults, changes, batches, equality, and what follows from the parameters."""
+"""The drive as a value: defaults, changes, equality, and what follows from the parameters."""
 
 import copy
 import dataclasses
@@ -92,51 +92,35 @@ def test_frozen(crane):
         crane.gap = 2.0
     with pytest.raises(AttributeError):
         del crane.gap
-    batch = crane.replace(gap=[1, 2])
-    with pytest.raises(ValueError, match="read-only"):
-        batch.gap[0] = 3.0
-    with pytest.raises(ValueError, match="read-only"):
-        pickle.loads(pickle.dumps(batch)).gap[0] = 3.0
-    assert copy.deepcopy(batch) is batch
-    assert copy.copy(batch) is batch
+    assert copy.deepcopy(crane) is crane
+    assert copy.copy(crane) is crane
 
 
-def test_an_array_given_stays_the_callers_own(crane):
-    gaps = np.array([1.0, 2.0])
-    batch = crane.replace(gap=gaps)
-    gaps[0] = 7.0
-    assert batch.gap[0] == 1.0
+def test_a_drive_has_one_value(crane):
+    several = "; for several starts write records(drive, gap="
+    for gap, again in (([0.5, 2.0], "[0.5, 2.0])."), (np.array([0.5, 2.0]), "[...]).")):
+        with pytest.raises(InputError) as caught:
+            crane.replace(gap=gap)
+        assert str(caught.value) == f"gap = [0.5, 2.0]: a drive has one value{several}{again}"
+    with pytest.raises(InputError, match=r"\[shaft\] gap = \[0.5, 2\]: a drive has one value; .* use sweep"):
+        Drive.from_toml(crane.to_toml().replace("gap = 0.5", "gap = [0.5, 2]"))
 
 
 def test_equality_and_hash(crane):
-    batch = crane.replace(gap=[0.5, 2])
-    assert batch == crane.replace(gap=np.array([0.5, 2.0]))
-    assert hash(batch) == hash(crane.replace(gap=(0.5, 2.0)))
-    assert batch != crane
-    assert batch != crane.replace(gap=[[0.5, 2]])
+    worn = crane.replace(gap=2)
+    assert worn == crane.replace(gap=np.float64(2.0))
+    assert hash(worn) == hash(crane.replace(gap="2 rad"))
+    assert worn != crane
     assert crane != crane.replace(name="other")
     assert crane != 5
     assert crane.replace(maximum_torque=62) == crane  # given or following: the same drive
-    assert crane.replace(start_position=[-0.0]) == crane.replace(start_position=[0.0])
-    assert len({crane, Drive(**CRANE), batch}) == 2
-    assert pickle.loads(pickle.dumps(batch)) == batch
+    assert crane.replace(start_position=-0.0) == crane.replace(start_position=0.0)
+    assert len({crane, Drive(**CRANE), worn}) == 2
+    assert pickle.loads(pickle.dumps(worn)) == worn
 
 
 def test_repr_can_be_evaluated(crane):
     assert eval(repr(crane), {"Drive": Drive}) == crane
-
-
-def test_batches(crane):
-    batch = crane.replace(gap=[0.5, 1, 2], load_inertia=[[0.07], [0.175]], target_speed=[90, 80, 70])
-    assert batch.shape == (2, 3)
-    assert np.shape(batch.Omega) == (2, 1)
-    singles = list(batch.elements())
-    assert len(singles) == 6
-    assert [d.gap for d in singles] == [0.5, 1, 2, 0.5, 1, 2]
-    assert singles[5] == crane.replace(gap=2, load_inertia=0.175, target_speed=70)
-    assert all(d.shape == () for d in singles)
-    assert list(crane.elements()) == [crane]
-    assert singles[4].replace(starting_torque=100).maximum_torque == 100
 
 
 def test_the_table_the_fields_and_the_keywords_agree():

@@ -15,7 +15,7 @@ from tests.oracle import integrate
 from tests.softstart.kernel.pieces import Pieces, TwoSteps
 from tests.softstart.kernel.test_against_oracle import KINDS, case, run_of
 
-from softstart import Drive, InputError, Status, simulate
+from softstart import Drive, InputError, Status, records, simulate
 
 HOIST = Drive(
     motor_inertia=0.19, starting_torque=250, stiffness=3200, gap="6 deg", load_inertia=0.065, load_torque=120,
@@ -102,7 +102,7 @@ def test_a_batch_and_a_plain_twin_have_the_same_bits() -> None:
     gaps = [0.05, 0.1, 0.4]
     for release in ("torque", 0.03):
         drive = HELD.replace(release=release)
-        many = simulate(drive.replace(gap=gaps), TwoSteps(first=90.0, switch=0.05, second=250.0))
+        many = simulate(records(drive, gap=gaps), TwoSteps(first=90.0, switch=0.05, second=250.0))
         for i, gap in enumerate(gaps):
             one = drive.replace(gap=gap)
             run = simulate(one, TwoSteps(first=90.0, switch=0.05, second=250.0))

@@ -13,7 +13,7 @@ from tests.softstart.kernel.pieces import Pieces, TwoSteps
 from tests.softstart.kernel.test_against_oracle import case, in_other_units, run_of
 from tests.twin import plain
 
-from softstart import Drive, TorqueProfile, controller, simulate
+from softstart import Drive, TorqueProfile, controller, records, simulate
 from softstart.kernel.records import BEYOND, OPEN
 
 SEEDS = st.integers(1_000, 100_000)
@@ -117,7 +117,7 @@ def test_batch_equals_single_exactly(strategy: Any) -> None:
     rng = np.random.default_rng(7)
     base = Drive.load("crane-4amtkf").replace(torque_lag=0.002, load_kind="reactive", damping=0.2)
     gaps, inertias = rng.uniform(0.05, 4.0, 25), rng.uniform(0.05, 0.4, 25)
-    many = simulate(base.replace(gap=gaps, load_inertia=inertias), strategy)
+    many = simulate(records(base, gap=gaps, load_inertia=inertias), strategy)
     listed = [base.replace(gap=g, load_inertia=j) for g, j in zip(gaps, inertias, strict=True)]
     again = simulate(listed, strategy)
     for i, drive in enumerate(listed):
@@ -136,8 +136,8 @@ def test_a_plain_controller_equals_its_compiled_twin(strategy: Any) -> None:
     drive = Drive.load("crane-4amtkf").replace(torque_lag=0.001)
     compiled = controller.make_controller(strategy)
     assert isinstance(compiled, controller.CompiledController)
-    fast = simulate(drive.replace(gap=gaps), compiled, fitted_to=drive)
-    slow = simulate(drive.replace(gap=gaps), plain(compiled, drive))
+    fast = simulate(records(drive, gap=gaps), compiled, fitted_to=drive)
+    slow = simulate(records(drive, gap=gaps), plain(compiled, drive))
     np.testing.assert_array_equal(fast.k_dyn, slow.k_dyn)
     np.testing.assert_array_equal(fast.start_time, slow.start_time)
     np.testing.assert_array_equal(fast.gap_events, slow.gap_events)

@@ -19,6 +19,7 @@ from softstart import (
     SimulationError,
     TorqueProfile,
     optimize,
+    records,
     simulate,
 )
 from softstart.controller import make_controller
@@ -92,15 +93,6 @@ def test_noise_lies_on_the_measured_torque_alone():
     assert error == pytest.approx([0.5 * gauss(3.0, float(i)) for i in range(error.size)], abs=1e-12)
 
 
-def test_a_batch_has_the_noise_of_its_single_starts():
-    seeds = [0.0, 1.0, 2.0]
-    drive = CRANE.replace(torque_noise=1.0, noise_seed=seeds, torque_lag=0.002)
-    batch = simulate(drive, "current-limit-feedback").k_dyn.values
-    single = [simulate(one, "current-limit-feedback").k_dyn for one in drive.elements()]
-    assert batch.tolist() == single
-    assert len(set(single)) == 3
-
-
 # dead time -----------------------------------------------------------------------------------------------
 
 
@@ -151,7 +143,7 @@ def test_a_dead_time_of_whole_samples_is_a_queue_of_answers(samples, name):
 
 
 def test_single_batch_and_plain_starts_agree_under_a_dead_time():
-    drive = LAGGING.replace(computing_delay=[0.0, 0.0007, 0.003], torque_noise=0.1)
+    drive = records(LAGGING, computing_delay=[0.0, 0.0007, 0.003], torque_noise=0.1)
     made = make_controller("current-limit-feedback")
     batch = simulate(drive, made).k_dyn.values.tolist()
     single = [simulate(one, made) for one in drive.elements()]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, Measured, PlainController, SimulationError, Status, simulate
+from softstart import Command, Drive, Measured, PlainController, SimulationError, Status, records, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -44,7 +44,7 @@ def test_events_do_not_fire_twice_at_one_instant() -> None:
 def test_the_cap_on_events_raises() -> None:
     with pytest.raises(SimulationError, match="control instants than max_events allows"):
         simulate(CRANE, "direct", until=10.0, max_events=10)
-    table = simulate(CRANE.replace(gap=[0.5, 2.0]), "direct", until=10.0, max_events=10)
+    table = simulate(records(CRANE, gap=[0.5, 2.0]), "direct", until=10.0, max_events=10)
     assert set(table.status.values) == {Status.TOO_MANY_EVENTS.name}
     assert np.isnan(table.k_dyn).all()
 

@@ -98,7 +98,6 @@ def test_too_short_a_start_time_names_the_slowest_and_the_shortest() -> None:
         ([], 0.3, None, "scenarios: the list is empty"),
         (CRANE, 0.3, None, "give a list of Drives"),
         ([CRANE, "crane"], 0.3, None, "scenario 2: drive = 'crane': give a Drive"),
-        ([CRANE.replace(gap=[0.5, 1.0])], 0.3, None, "scenario 1: drive: an optimum is for one drive"),
         ([CRANE], -0.3, None, "start_time = -0.3: give the time allowed in s, above 0"),
         ([CRANE], math.nan, None, "start_time = nan"),
         ([CRANE], True, None, "start_time = True"),

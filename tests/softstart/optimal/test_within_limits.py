@@ -18,7 +18,6 @@ from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 from softstart.optimal.result import InfeasibleError, Optimum
-from softstart.start import metrics
 from softstart.views.optima import bound_sentence, comparison, question
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -59,7 +58,7 @@ def test_where_a_formula_is_exact_the_bound_is_reached(torque: float) -> None:
 def test_it_is_the_least_start_time_that_collocation_finds() -> None:
     torque = 60.0
     best = quickest(CRANE.replace(permissible_torque=torque))
-    k_dyn = torque / float(metrics.base_torque(CRANE))
+    k_dyn = torque / CRANE.mean_torque
     other = optimize(CRANE, minimise="start_time", k_dyn=k_dyn, method="collocation")
     assert other.method == "collocation"
     assert best.end_time == pytest.approx(other.end_time, rel=2e-3)
@@ -74,7 +73,7 @@ def test_the_least_start_time_is_the_root_of_the_formula(k_dyn: float) -> None:
     assert best.minimised == best.end_time == best.summary()["start_time"]
     assert best.gap_percent == pytest.approx(100.0 * (best.end_time / best.kept.at_least - 1.0))
     formula = PulseCoastHold.of(best.problem).least_peak_for(60.0, best.end_time)
-    assert formula == pytest.approx(k_dyn * float(metrics.base_torque(CRANE)), rel=2e-5)
+    assert formula == pytest.approx(k_dyn * CRANE.mean_torque, rel=2e-5)
     assert momentum_bound(Problem(CRANE, 0.9999 * best.kept.at_least)).k_dyn > k_dyn
 
 
@@ -186,7 +185,7 @@ def test_an_unknown_position_keeps_the_limits_from_each(hasty_search: None) -> N
     assert 0.0 < best.kept.at_least <= best.end_time
     sooner = 0.999 * best.kept.at_least
     hardest = max(momentum_bound(Problem(one, sooner, "reached")).k_dyn for one in drive.positions.values())
-    assert hardest * float(metrics.base_torque(drive)) > 70.0
+    assert hardest * drive.mean_torque > 70.0
 
 
 def test_margins_are_those_of_compare() -> None:

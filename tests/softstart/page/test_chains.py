@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.chain import Chain
-from softstart.chain.machines import here, moved, values_of
 from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
@@ -91,12 +90,12 @@ def test_a_damping_ratio_that_was_not_given_is_taken_back():
 )
 def test_each_field_reads_what_it_writes(chain):
     """Every slider is set to its middle, every value written back as it is shown: nothing else changes."""
-    before = {path: values_of(chain)[path][1] for path in entries(chain)}
+    before = {path: chain.by_path()[path][1] for path in entries(chain)}
     for path, value in before.items():
         if isinstance(value, float):
-            assert values_of(changed(chain, {path: repr(value)}))[path][1] == value
+            assert changed(chain, {path: repr(value)}).by_path()[path][1] == value
     for path, scale in scales_about(chain).items():
-        there = values_of(changed(chain, {path: repr(scale.value(300))}))
+        there = changed(chain, {path: repr(scale.value(300))}).by_path()
         assert there[path][1] == scale.value(300)
         assert {key: there[key][1] for key in before if key != path} == {
             key: value for key, value in before.items() if key != path
@@ -165,12 +164,12 @@ def test_several_gaps_are_open_where_one_of_them_is(rows):
 
 def test_the_map_of_a_chain_is_made_of_its_starts():
     axes = axes_about(DAMPED, 3, 3)
-    assert here(DAMPED) == (pytest.approx(0.5), 69.2)
+    assert DAMPED.gap_and_inertia == (pytest.approx(0.5), 69.2)
     controller = make_controller("ramp")
     row = k_dyn_row(DAMPED, controller, axes.gaps, axes.inertias[2])
     for gap, k in zip(axes.gaps, row, strict=True):
-        there = moved(DAMPED, gap, axes.inertias[2])
-        assert here(there) == (pytest.approx(gap), pytest.approx(axes.inertias[2]))
+        there = DAMPED.moved(gap, axes.inertias[2])
+        assert there.gap_and_inertia == (pytest.approx(gap), pytest.approx(axes.inertias[2]))
         assert k == simulate(there, "ramp").k_dyn
 
 

@@ -21,7 +21,6 @@ from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
-from softstart.page.machines import here, values_of
 from softstart.page.session import Session
 from softstart.quantities import parse
 
@@ -259,7 +258,7 @@ def test_a_slider_sets_exactly_the_value_that_its_field_shows():
         controls.take({"what": "slide", "path": path, "position": 300})
         assert not screen.mistakes, path
         text, position, _, _ = screen.first()["fields"][path]
-        value, si = values_of(session.machine)[path][1], screen.si(path)
+        value, si = session.machine.by_path()[path][1], screen.si(path)
         assert parse(screen.units.typed(text, si), si) == value == pytest.approx(scale.value(300), rel=1e-3)
         assert position == pytest.approx(300, abs=1)
 
@@ -277,21 +276,21 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     frame = screen.first()
     rows = {row["path"]: row for group in frame["groups"] for row in group["rows"]}
     assert (rows[gap]["unit"], rows["start.target_speed"]["unit"]) == ("deg", "rad/s")
-    first = values_of(loaded)[gap][1]
+    first = loaded.by_path()[gap][1]
     assert float(frame["fields"][gap][0]) == pytest.approx(math.degrees(first), rel=1e-5)
-    assert values_of(session.machine)[gap][1] == first  # only what is typed changes
+    assert session.machine.by_path()[gap][1] == first  # only what is typed changes
     assert frame["traces"]["direct"]["units"]["angle"] == "deg"
-    assert frame["here"][0] == pytest.approx(math.degrees(here(loaded)[0]), rel=1e-12)
+    assert frame["here"][0] == pytest.approx(math.degrees(loaded.gap_and_inertia[0]), rel=1e-12)
 
     controls.take({"what": "edit", "path": gap, "text": "4"})
-    assert values_of(session.machine)[gap][1] == parse("4 deg", "rad")
+    assert session.machine.by_path()[gap][1] == parse("4 deg", "rad")
     controls.take({"what": "slide", "path": gap, "position": 77})
     text = screen.first()["fields"][gap][0]
     assert len(text) <= 5
     assert f'"{text} deg"' in session.machine.to_toml()
     assert f"{gap}={text}deg" in command_text(session.machine, {"direct": make_controller("direct")})
     assert links.bench_of(links.link_of(session), session.bench).drive == session.machine
-    controls.take({"what": "jump", "gap": 30.0, "inertia": here(loaded)[1]})
+    controls.take({"what": "jump", "gap": 30.0, "inertia": loaded.gap_and_inertia[1]})
     assert screen.first()["here"][0] == pytest.approx(30.0, rel=1e-6)
     session.undo()
     session.undo()
@@ -301,7 +300,7 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
 
     controls.take({"what": "edit", "path": "units", "text": "mm on 80 mm"})
     controls.take({"what": "edit", "path": gap, "text": "0.3"})
-    assert values_of(session.machine)[gap][1] == 0.0075
+    assert session.machine.by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
     assert 'write for example "deg, rpm"' in screen.mistakes["units"]
 

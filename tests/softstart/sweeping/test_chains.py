@@ -5,7 +5,6 @@ import pytest
 
 from softstart import InputError, Status, simulate, sweep
 from softstart.chain import Chain
-from softstart.chain.machines import with_values
 from softstart.sweeping.starts import known_figures
 
 CHAIN = Chain.from_toml(
@@ -30,7 +29,7 @@ def same(results, **options):
         controller = values.pop("controller", "s-curve")
         own = {k.removeprefix("controller_"): values.pop(k) for k in [*values] if k.startswith("controller_")}
         values.pop("sample", None)
-        run = simulate(with_values(CHAIN, values), controller, parameters=own, **options)
+        run = simulate(CHAIN.with_values(values), controller, parameters=own, **options)
         assert list(Status)[int(one.status)] is run.status
         expected = {"k_dyn": run.k_dyn, "start_time": run.start_time, "peak_torque": run.peak_torque}
         expected |= {f"k_dyn_{k + 1}": value for k, value in enumerate(run.k_dyns)}
@@ -94,7 +93,7 @@ def test_what_is_no_axis_of_a_chain(grid, said):
 
 
 def test_figures_of_a_chain_are_named():
-    known = known_figures(CHAIN)
+    known = known_figures(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)
     results = sweep(CHAIN, "direct", {"gap": ["1x"]}, figures=["peak_torque_2", "used_torque"], workers=1)
     run = simulate(CHAIN, "direct")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softstart import Command, Drive, InputError, PlainController, Status, simulate, sweep
+from softstart import Command, Drive, InputError, PlainController, Status, records, simulate, sweep
 from softstart.controller import make_controller, parameter, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.start.recommendation import Row
@@ -216,7 +216,7 @@ def test_labels():
 @pytest.mark.parametrize("wrong", [
     {"workers": 0}, {"workers": 1.5}, {"workers": "two"}, {"chunk": 0}, {"figures": "k_dyn"}, {"figures": []},
     {"figures": ["k_dyn", 3]}, {"until": 0.0}, {"time_limit": float("nan")}, {"base": "crane-4amtkf"},
-    {"fitted_to": CRANE.replace(gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
+    {"fitted_to": records(CRANE, gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
     {"netcdf": "no/such/folder/out.nc"}, {"netcdf": "."},
 ])  # fmt: skip
 def test_options_that_cannot_be_are_refused_in_one_sentence(wrong):
@@ -238,4 +238,4 @@ def test_a_grid_beyond_memory_needs_a_folder():
     with pytest.raises(InputError, match="controller = 7"):
         sweep(CRANE, 7, {"gap": [1.0]})
     with pytest.raises(InputError, match="drive"):
-        sweep(CRANE.replace(gap=[1.0, 2.0]), "direct", {"stiffness": [1.0]})
+        sweep(records(CRANE, gap=[1.0, 2.0]), "direct", {"stiffness": [1.0]})

@@ -8,7 +8,6 @@ from tests.softstart.tuning.test_trials import trials
 
 from softstart import InputError, simulate, tune
 from softstart.chain import Chain
-from softstart.chain.machines import knob, moved, with_values
 from softstart.controller import make_controller
 from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
 
@@ -21,7 +20,7 @@ QUICK = {"restarts": 1, "generations": 3, "workers": 1}
 @pytest.mark.parametrize("name", ["s-curve", "take-up", "acceleration-delay"])
 @pytest.mark.parametrize("position", ["mid-gap", "unknown"])
 def test_each_candidate_is_the_start_that_simulate_makes(name, position):
-    chain = with_values(CHAIN, {"start_position": position})
+    chain = CHAIN.with_values({"start_position": position})
     tried = trials(name, chain, OFF, gaps=(0.5, 1.0), load_inertias=(40.0, 69.2))
     cells = np.array([0, 3])
     places = np.random.default_rng(3).random((2, len(tried.question.ranges)))
@@ -34,7 +33,7 @@ def test_each_candidate_is_the_start_that_simulate_makes(name, position):
         one = tried.question.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
         for s, scenario in enumerate(tried.question.scenarios):
-            off = with_values(one, {key: level.of(knob(one, key).value) for key, level in scenario.items()})
+            off = one.with_values({key: level.of(one.knob(key).value) for key, level in scenario.items()})
             run = simulate(off, controller, fitted_to=one, base=one)
             assert judged.metric[k, s] == run.k_dyn
             assert judged.start_time[k, s] == run.start_time or np.isnan(run.start_time)
@@ -47,7 +46,7 @@ def test_the_margin_is_that_of_the_shaft_with_the_least():
     run = simulate(chain, found.scheduled)
     assert float(found.schedule.limit_share[0, 0]) == pytest.approx(np.nanmax(run.utilisation), rel=1e-12)
     assert found.robust.worst <= found.robust.worst_default
-    with pytest.raises(InputError, match="no shaft of the chain has a limit"):
+    with pytest.raises(InputError, match="the chain has no limits; give shafts their permissible_torque"):
         tune(DAMPED, "s-curve", metric="margin")
 
 
@@ -69,7 +68,7 @@ def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
     found.to_toml(schedule)
     found.to_toml(robust, "robust")
     for cell in np.ndindex(2, 2):
-        chain = moved(DAMPED, found.question.gaps[cell[0]], found.question.load_inertias[cell[1]])
+        chain = DAMPED.moved(found.question.gaps[cell[0]], found.question.load_inertias[cell[1]])
         assert float(found.schedule.k_dyn[cell]) == simulate(chain, str(schedule)).k_dyn
         assert float(found.robust.cells.k_dyn[cell]) == simulate(chain, str(robust), base=chain).k_dyn
     assert found.price is not None
@@ -100,12 +99,12 @@ def test_gaps_and_inertias_of_a_chain():
         gaps_of(CHAIN.changed(gaps=0.0), ["0.5"])
     with pytest.raises(InputError, match=r"did you mean shaft\[2\].gap"):
         scenarios_of(CHAIN, {"shaft[2].gaps": "10 %"})
-    two = moved(CHAIN, 1.0, 69.2).design_drive
+    two = CHAIN.moved(1.0, 69.2).design_drive
     assert two.gap == 1.0
 
 
 def test_an_optimum_stands_beside_the_gains_where_it_is_asked_for():
-    short = with_values(DAMPED, {"target_speed": 20.0})
+    short = DAMPED.with_values({"target_speed": 20.0})
     found = tune(
         short, "s-curve", ["1x"], ["1x"], free=["time"], certified=True, schedule=False, start_time="1.3x",
         **QUICK,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from softstart import Command, Drive, InputError, PlainController, formulas, optimize, simulate, tune
+from softstart import Command, Drive, InputError, PlainController, formulas, optimize, records, simulate, tune
 from softstart.controller import controller_class, controller_names, make_controller, parameter
 from softstart.processes import Pool
 from softstart.start.recommendation import Row
@@ -353,8 +353,8 @@ BAD = {
     "share": ({"tolerances": {"stiffness": "110 %"}}, ["below 100 %"]),
     "impossible": ({"tolerances": {"stiffness": [-3.0]}}, ["tolerances", "stiffness = -3"]),
     "nothing": ({"schedule": False, "robust": False}, ["nothing is asked for"]),
-    "base": ({"base": "crane-4amtkf"}, ["one single Drive"]),
-    "drive": ({"drive": CRANE.replace(gap=[0.5, 1.0])}, ["one Drive"]),
+    "base": ({"base": "crane-4amtkf"}, ["one Drive or Chain"]),
+    "drive": ({"drive": records(CRANE, gap=[0.5, 1.0])}, ["one Drive"]),
     "controller": ({"controller": "dirct"}, ["did you mean"]),
     "nothing to tune": ({"controller": "direct"}, ["no parameter to tune", "free="]),
 }

@@ -52,7 +52,7 @@ def scenarios_of(
     >>> len(scenarios_of(nominal, gaps=[0.3, 1.0], inertias=[0.07, 0.175]))
     5
     """
-    if not isinstance(drive, Drive) or drive.shape != ():
+    if not isinstance(drive, Drive):
         raise InputError(
             "drive: one profile for several gaps, load inertias or load torques is found for a Drive, not "
             "for a chain; leave these out, or reduce the chain to a drive."
@@ -96,7 +96,7 @@ def check_scenarios(scenarios: Sequence[Drive], start_time: Any, base: Any) -> t
         or not 0.0 < float(start_time) < math.inf
     ):
         raise InputError(f"start_time = {start_time!r}: give the time allowed in s, above 0.")
-    if base is not None and (not isinstance(base, Drive) or base.shape != ()):
+    if base is not None and not isinstance(base, Drive):
         raise InputError(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
     wrong: list[str] = []
     for i, drive in enumerate(drives):

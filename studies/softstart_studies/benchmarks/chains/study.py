@@ -263,13 +263,13 @@ def measured_batch(case: BatchCase, passes: int) -> tuple[Any, ...]:
     nominal = Case(chains[len(chains) // 2], case.ramp)
     controller = make_controller(case.feedback) if case.feedback else nominal.controller
     batch, told = prepared(chains), nominal.chain.design_drive
-    which, means = np.arange(len(chains)), np.array([chain.mean_torque for chain in chains])
+    means = np.array([chain.mean_torque for chain in chains])
     set_ups = [controller.set_up(told)]
-    batch.figures(which[:1], set_ups, means[:1])
+    batch.figures(set_ups, means[:1], np.zeros(1, dtype=np.int64))
     ours, theirs = [], []
     for _ in range(passes):
         begin = time.process_time()
-        found = batch.figures(which, set_ups, means)
+        found = batch.figures(set_ups, means)
         ours.append(len(chains) / (time.process_time() - begin))
     fresh = case.chains()
     simulate(case.chains()[:1], controller, fitted_to=told, workers=1)

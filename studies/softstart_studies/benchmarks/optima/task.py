@@ -60,11 +60,9 @@ def crane_task(start_time: float) -> Task:
     >>> task.c, task.gap, round(task.base, 3)
     (368.465, 0.5, 52.86)
     """
-    from softstart.start import metrics
-
     drive = crane()
     values = {name: float(getattr(drive, name)) for name in ("J1", "J2", "c", "gap", "Mc", "Ms")}
-    base = float(metrics.base_torque(drive))
+    base = drive.mean_torque
     return Task(start_time=start_time, target=float(drive.target_speed), base=base, **values)
 
 

@@ -214,7 +214,6 @@ class BenchmarkSweeps(Study):
 def _by_lsoda(results: xarray.Dataset, count: int) -> Peer:
     """A plain loop over some of the starts."""
     from softstart.drive import Drive
-    from softstart.start import metrics
 
     chosen = list(sample(results, count))
     begin = time.process_time()
@@ -224,7 +223,7 @@ def _by_lsoda(results: xarray.Dataset, count: int) -> Peer:
     crane = Drive.load("crane-4amtkf")
     for peak, (problem, gap, k_dyn) in zip(peaks, chosen, strict=True):
         own = crane.replace(gap=gap, load_inertia=problem.J2, stiffness=problem.c)
-        apart = max(apart, abs(float(metrics.k_dyn(peak, own)) - k_dyn))
+        apart = max(apart, abs(float(peak) / own.mean_torque - k_dyn))
     return Peer(len(chosen), cpu, apart)
 
 
