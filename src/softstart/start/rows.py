@@ -142,7 +142,7 @@ def blank(shape: tuple[int, ...], masses: int, curves: int = 0) -> Rows:
     )
 
 
-def _motor(named: Any, motor: Any, column: Any = lambda values: values) -> None:
+def _motor(named: Any, motor: Any, column: Any = np.float64) -> None:
     """What a drive and the motor of a chain have under the same names."""
     for name, values in (
         ("rate", motor.torque_rate),
@@ -162,11 +162,15 @@ def _motor(named: Any, motor: Any, column: Any = lambda values: values) -> None:
 
 def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
     """The rows of a drive or of columns of drives, and how long stiff ones take."""
-    made = blank(drive.shape if isinstance(drive, Columns) else (), 2)
-    column = partial(each_of, drive)
+    shape: tuple[int, ...] = ()
+    column: Any = np.float64
+    if isinstance(drive, Columns):
+        shape, column = drive.shape, partial(each_of, drive)
+    made = blank(shape, 2)
     named = made.machines.view(at.MACHINE)[:, 0]
     masses, shaft = made.masses.view(at.MASS)[..., 0], made.shafts.view(at.SHAFT)[:, 0, 0]
-    J1, J2, c, Mc, Ms = map(column, (drive.J1, drive.J2, drive.c, drive.Mc, drive.Ms))
+    J1, J2 = column(drive.motor_inertia), column(drive.load_inertia)
+    c, Mc, Ms = column(drive.stiffness), column(drive.load_torque), column(drive.starting_torque)
     friction, b1, b2 = map(column, drive.frictions)
     w1, w2 = column(drive.initial_motor_speed), column(drive.initial_load_speed)
     target = column(drive.target_speed)
@@ -174,17 +178,17 @@ def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
     _motor(named, drive, column)
     named["target"], named["release_at"] = target, column(drive.release_time)
     named["load"] = 1.0
-    masses["J"], masses["ground"] = np.stack([J1, J2], axis=1), np.stack([b1, b2], axis=1)
+    for i, (J, ground, w0) in enumerate(((J1, b1, w1), (J2, b2, w2))):
+        masses["J"][:, i], masses["ground"][:, i], masses["w0"][:, i] = J, ground, w0
     masses["friction"][:, 0] = friction
-    masses["w0"] = np.stack([w1, w2], axis=1)
     # a reactive load without torque never sticks: it is the same as an active one
     reactive = (Mc > 0.0) & (drive.load_kind == "reactive")
     masses["Mc"][:, 1], masses["active"][:, 1] = np.where(reactive, Mc, 0.0), np.where(reactive, 0.0, Mc)
-    shaft["c"], shaft["d"], shaft["half"] = c, column(drive.d), 0.5 * column(drive.gap)
+    shaft["c"], shaft["d"], shaft["half"] = c, column(drive.damping), 0.5 * column(drive.gap)
     shaft["law"], shaft["eta"] = LAWS[drive.contact_law], 1.0
     shaft["theta0"] = column(drive.theta0)
     net = np.maximum(Ms - Mc - (friction + (b1 + b2) * target), 1e-3 * (Ms - Mc))
-    return made, (J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net
+    return made, np.atleast_1d((J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net)
 
 
 def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, Vector]:
@@ -207,8 +211,9 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
         curve["mass"], curve["points"], curve["by_angle"] = i, len(at_points), by_angle
         curve["at"][: len(at_points)] = np.array(at_points) / ratio
         curve["torque"][: len(at_points)] = np.array(torques) * ratio
+    welded = _welded(arrays)
     for k in range(count - 1):
-        if _welded(arrays, k):  # one body has one speed, not two that differ by rounding
+        if welded[k]:  # one body has one speed, not two that differ by rounding
             masses["w0"][k + 1] = masses["w0"][k]
     shafts["c"] = np.where(arrays.rigid, 0.0, arrays.c)
     shafts["d"], shafts["half"], shafts["rigid"] = arrays.d, 0.5 * arrays.gap, arrays.rigid
@@ -240,20 +245,21 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     return made, np.array([stiff])
 
 
-def _welded(arrays: ChainArrays, k: int) -> bool:
-    """Whether shaft k joins its masses rigidly, without a gap."""
-    return bool(arrays.rigid[k] and arrays.gap[k] == 0.0)
+def _welded(arrays: ChainArrays) -> NDArray[np.bool_]:
+    """Which shafts join their masses rigidly, without a gap."""
+    welded: NDArray[np.bool_] = arrays.rigid & (arrays.gap == 0.0)
+    return welded
 
 
 def _refuse(chain: Chain, arrays: ChainArrays) -> None:
-    wrong = []
+    wrong, welded = [], _welded(arrays)
     for k, shaft in enumerate(chain.shafts):
         if shaft.efficiency != 1.0 and arrays.rigid[k]:
             wrong.append(
                 f"[shaft] {k + 1}, efficiency = {shaft.efficiency}: the loss of a gear goes with the torque "
                 "of a spring, and this shaft is rigid; give it a stiffness, or leave the efficiency out."
             )
-        if _welded(arrays, k) and not math.isclose(arrays.w0[k], arrays.w0[k + 1], rel_tol=SAME_SPEED):
+        if welded[k] and not math.isclose(arrays.w0[k], arrays.w0[k + 1], rel_tol=SAME_SPEED):
             wrong.append(
                 f"[shaft] {k + 1}: it is rigid, so the masses it joins start with one speed, and they have "
                 f"{arrays.w0[k]:.12g} and {arrays.w0[k + 1]:.12g} rad/s at the motor shaft; give both the "
