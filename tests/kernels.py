@@ -27,19 +27,9 @@ def steps() -> None:
         compile_now(import_module(one.name))
 
 
-def start() -> None:
-    """The loop of starts."""
-    compile_now(import_module("softstart.kernel.start"))
-
-
-def replay() -> None:
-    """What is read back of a recorded start."""
-    compile_now(import_module("softstart.kernel.replay"))
-
-
-def sensitivity() -> None:
-    """How a start answers to its demand."""
-    compile_now(import_module("softstart.kernel.sensitivity"))
+def kernel(name: str) -> Callable[[], None]:
+    """The entry points of a module of the kernel."""
+    return lambda: compile_now(import_module(f"softstart.kernel.{name}"))
 
 
 def controllers() -> None:
@@ -78,10 +68,10 @@ def robust() -> None:
 
 # what must be compiled before, and what compiles it; the longest are taken first
 PARTS: Parts = {
-    "start": ((), start),
+    "start": ((), kernel("start")),
     "steps": ((), steps),
-    "replay": (("start",), replay),
-    "sensitivity": (("replay",), sensitivity),
+    "replay": (("start",), kernel("replay")),
+    "sensitivity": (("replay",), kernel("sensitivity")),
     "controllers": (("replay", "steps"), controllers),
     "robust": (("controllers",), robust),
     "plain": (("controllers",), plain),
