@@ -27,6 +27,11 @@ def part(cell, restart=0, **known):
     return {"cell": cell, "restart": restart, **known}
 
 
+def refused(path, sentence):
+    with pytest.raises(InputError, match=sentence), records(path):
+        pass
+
+
 def test_parts_are_found_again(tmp_path):
     path = tmp_path / "deep" / "parts.jsonl"
     with records(path) as kept:
@@ -81,11 +86,7 @@ def test_other_inputs_are_named_and_their_file_left_alone(tmp_path):
 def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
     path = tmp_path / "notes"
     path.write_bytes(content)
-    with (
-        pytest.raises(InputError, match="this file holds something else than a tuning; name another file"),
-        records(path),
-    ):
-        pass
+    refused(path, "this file holds something else than a tuning; name another file")
     assert path.read_bytes() == content
 
 
@@ -98,11 +99,7 @@ def test_a_file_without_checksums_is_refused_and_left_alone(tmp_path):
         + "\n"
     )
     path.write_text(old)
-    with (
-        pytest.raises(InputError, match="or written by an older softstart; name another file"),
-        records(path),
-    ):
-        pass
+    refused(path, "or written by an older softstart; name another file")
     assert path.read_text() == old
 
 

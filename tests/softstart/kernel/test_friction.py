@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces
-from tests.softstart.kernel.test_against_oracle import case_with_friction, in_other_units, run_of
+from tests.softstart.kernel.test_against_oracle import case_with_friction, run_of
 
 from softstart import Drive, InputError, Run, optimize, simulate
 
@@ -139,19 +139,6 @@ def test_the_instants_of_asking_change_nothing(seed: int) -> None:
     whole, parts = run_of(drawn), run_of({**drawn, "torque_pieces": sorted(pieces.items())})
     assert [event.kind for event in whole.events] == [event.kind for event in parts.events]
     assert parts.peak_torque == pytest.approx(whole.peak_torque, rel=1e-9, abs=1e-12 * drawn["c"])
-
-
-@settings(max_examples=40, deadline=None)
-@given(SEEDS, st.floats(-4, 4), st.floats(-3, 3))
-def test_unit_changes(seed: int, mass: float, time: float) -> None:
-    """With inertias in other units and time in others, it is the same start."""
-    drawn = case_with_friction(seed)
-    m, s = 10.0**mass, 10.0**time
-    torque = m / s**2
-    scaled = in_other_units(drawn, m, s)
-    one, other = run_of(drawn), run_of(scaled)
-    assert other.peak_torque == pytest.approx(one.peak_torque * torque, rel=1e-8, abs=1e-12 * scaled["c"])
-    assert other.start_time == pytest.approx(one.start_time * s, rel=1e-8, nan_ok=True)
 
 
 def test_viscous_friction_that_vanishes_leaves_the_closed_form() -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces, TwoSteps
-from tests.softstart.kernel.test_against_oracle import case, in_other_units, run_of
+from tests.softstart.kernel.test_against_oracle import case, case_with_friction, in_other_units, run_of
 from tests.twin import plain
 
 from softstart import Drive, TorqueProfile, controller, records, simulate
@@ -67,11 +67,12 @@ def test_total_momentum(seed: int) -> None:
     assert change == pytest.approx(impulse, abs=1e-11 * size)
 
 
-@settings(max_examples=80, deadline=None)
-@given(SEEDS, st.floats(-4, 4), st.floats(-3, 3))
-def test_unit_changes(seed: int, mass: float, time: float) -> None:
+@pytest.mark.parametrize("make", [case, case_with_friction])
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS, mass=st.floats(-4, 4), time=st.floats(-3, 3))
+def test_unit_changes(make: Any, seed: int, mass: float, time: float) -> None:
     """With inertias in other units and time in others, all figures are the same starts."""
-    drawn = case(seed)
+    drawn = make(seed)
     m, s = 10.0**mass, 10.0**time
     torque = m / s**2
     scaled = in_other_units(drawn, m, s)
