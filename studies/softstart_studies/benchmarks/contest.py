@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 
 from softstart_studies.benchmarks.host import Host
-from softstart_studies.benchmarks.problem import Problem, crane, gaps
+from softstart_studies.benchmarks.problem import GAPS, Problem, crane
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,7 @@ def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> 
     same = ours.timed(duel.ours, problem, duel.peer_starts)
     for host in (peer, ours):
         host.forget()
-    drive = crane(gaps(duel.peer_starts))
-    apart = np.abs(theirs[0].peaks - same.peaks) / drive.mean_torque
+    apart = np.abs(theirs[0].peaks - same.peaks) / crane(GAPS[0]).mean_torque
     return Outcome(
         duel,
         median(duel.peer_starts / one.cpu for one in theirs),

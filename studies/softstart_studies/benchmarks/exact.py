@@ -6,17 +6,18 @@ from typing import Any, cast
 
 import numpy as np
 
-from softstart import simulate
+from softstart import records, simulate
 from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor
 from softstart.drive import Drive
+from softstart.drive.records import Records
 from softstart.formulas import DirectStarts
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
-from softstart.start.rows import rows_of
+from softstart.start.batch import prepared
 from softstart.start.run import Run
-from softstart_studies.benchmarks.problem import Problem, controller_of, crane
+from softstart_studies.benchmarks.problem import GAPS, Problem, controller_of, crane
 
 
 class Kernel:
@@ -27,10 +28,10 @@ class Kernel:
 
     def ready(self, gaps: Vector) -> tuple[Any, ...]:
         """All arguments of the kernel; those after the results are its scratch."""
-        drive, count = crane(gaps, self.problem.strategy), len(gaps)
+        drive, count = crane(GAPS[0], self.problem.strategy), len(gaps)
         controller = cast(CompiledController, controller_of(self.problem.strategy, drive))
         own = np.atleast_2d(np.ascontiguousarray(controller.vector(drive), dtype=np.float64))
-        size, rows = controller.state_size, rows_of(drive)
+        size, rows = controller.state_size, prepared(records(drive, gap=gaps)).rows
         return (
             type(controller).kernel, own, int(controller.sensors), bool(controller.sensors & Sensor.STAGE),
             np.inf, rows.machines, rows.masses, rows.shafts, rows.curves, np.zeros((count, at.N_NOTES)),
@@ -66,19 +67,19 @@ class Formula:
 
 
 class Batch:
-    """`simulate` of a Drive with arrays: the same kernel, and its figures as an xarray.Dataset."""
+    """`simulate` of records: the same kernel, and its figures as an xarray.Dataset."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-    def ready(self, gaps: Vector) -> tuple[Drive, Any]:
+    def ready(self, gaps: Vector) -> tuple[Records, Any]:
         """The batch and its controller."""
-        drive = crane(gaps, self.problem.strategy)
-        return drive, controller_of(self.problem.strategy, drive)
+        drive = crane(GAPS[0], self.problem.strategy)
+        return records(drive, gap=gaps), controller_of(self.problem.strategy, drive)
 
-    def solve(self, work: tuple[Drive, Any]) -> Vector:
+    def solve(self, work: tuple[Records, Any]) -> Vector:
         """Peak torques, N m."""
-        labelled = cast(Any, simulate(*work))  # an xarray.Dataset, since the drive holds arrays
+        labelled = cast(Any, simulate(*work))  # an xarray.Dataset, of many drives
         peaks: Vector = labelled.peak_torque.values
         return peaks
 

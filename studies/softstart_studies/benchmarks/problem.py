@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -58,8 +58,8 @@ def gaps(count: int) -> Vector:
     return middles
 
 
-def crane(gap: Any, strategy: str = "") -> Drive:
-    """The drive with this gap (rad), or with an array of gaps: a batch."""
+def crane(gap: float, strategy: str = "") -> Drive:
+    """The drive with this gap, rad."""
     from softstart.drive import Drive
 
     drive = Drive.load(DRIVE).replace(gap=gap)
