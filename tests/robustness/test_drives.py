@@ -38,7 +38,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # run by hand
 from tests.oracle import Start, integrate
 from tests.softstart.kernel.test_against_oracle import KINDS
 
-from softstart import Drive, InputError, Run, SimulationError, Status, TorqueProfile, simulate
+from softstart import Drive, InputError, Run, SimulationError, Status, TorqueProfile, records, simulate
 from softstart.controller import Command, Controller, PlainController, make_controller
 from softstart.controller.base import Measured
 from softstart.kernel import records as at
@@ -405,15 +405,14 @@ def events_located(count: int, seed: int) -> Counter[str]:
         lag = np.where(rng.random(size) < 0.5, decades(1e-42, 1e-3, size), decades(1e-3, 10.0, size))
         J1, J2, c = decades(1e-3, 0.1, size), decades(0.01, 1.0, size), decades(1e2, 1e4, size)
         critical = 2.0 * np.sqrt(c / (1.0 / J1 + 1.0 / J2))
-        drive = Drive(
-            motor_inertia=J1, load_inertia=J2, stiffness=c, gap=gap,
+        drives = records(
+            Drive.load("crane-4amtkf").replace(load_kind=kind, contact_law=law, minimum_torque=-64.0),
+            motor_inertia=J1, load_inertia=J2, stiffness=c, gap=gap, torque_lag=lag,
             damping=critical * decades(1e-3, 1e4, size), load_torque=decades(1e-3, 20.0, size),
-            load_kind=kind, contact_law=law, start_position=gap * rng.uniform(-0.5, 0.5, size),
-            torque_lag=lag, starting_torque=62.0, maximum_torque=64.0, minimum_torque=-64.0,
-            target_speed=92.15,
+            start_position=gap * rng.uniform(-0.5, 0.5, size),
         )  # fmt: skip
         profile = TorqueProfile([0.0, 0.15, 0.15, 0.3, 0.3], [40.0, 40.0, 15.0, 15.0, -25.0])
-        batch = simulate(drive, make_controller("profile", {"profile": profile}), 0.6)
+        batch = simulate(drives, make_controller("profile", {"profile": profile}), 0.6)
         ended.update(batch.status.values.tolist())
         finished = np.isin(batch.status.values, ["REACHED", "STOPPED_EARLY"])
         assert np.all(np.isfinite(batch.peak_torque.values[finished]))

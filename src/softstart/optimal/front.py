@@ -385,7 +385,7 @@ def default_start_times(
     """
     direct = simulate(drive, "direct").start_time
     shortest = shortest_known(drive, terminal, **options)
-    if math.isnan(shortest):
+    if shortest is None:
         shortest, count = direct * QUICKEST / SHORT, count // 2 if len(drive.positions) > 1 else count
     if not math.isfinite(shortest):
         shortest = direct
@@ -397,10 +397,10 @@ def default_start_times(
     return times
 
 
-def shortest_known(drive: Drive | Chain, terminal: Terminal, **options: Any) -> float:
-    """The shortest feasible start time, s; NaN of a chain and over several positions: nobody knows it."""
+def shortest_known(drive: Drive | Chain, terminal: Terminal, **options: Any) -> float | None:
+    """The shortest feasible start time, s; None of a chain and over several positions: nobody knows it."""
     if isinstance(drive, Chain) or len(drive.positions) > 1:
-        return math.nan
+        return None
     return shortest_start_time(Problem(drive, 1.0, terminal, **options))
 
 
