@@ -145,7 +145,7 @@ def curve(
         progress(done / total, "the shortest start time")
         least = front.shortest_known(drive, terminal)
         done += 1
-        if math.isfinite(least):
+        if least is not None and math.isfinite(least):
             first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
             through([first + share * (last - first) for share in SHORT_SHARES])
             through([one for one in own if least <= one < (easy[0] if easy else math.inf)])
