@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from softstart.kernel.jit import compiled, inner
+from softstart.kernel.jit import apart, compiled, inner
 from softstart.kernel.records import (
-    ASK, BAD_COMMAND, MEASURED, MOST_PENDING, QUEUE_FULL, Record, size,
+    ASK, BAD_COMMAND, MEASURED, MEASURED_TYPE, MOST_PENDING, QUEUE_FULL, WORK_TYPE, Record, size,
 )  # fmt: skip
 
 # indices of `command`: torque demand, when to be asked again, slope of the demand until then; the new state
@@ -167,7 +167,7 @@ def note_excess(s: Record) -> None:
     s.excess_time += length
 
 
-@inner
+@apart(types.void(WORK_TYPE, types.int64, MEASURED_TYPE))
 def sample(s: Record, sees: int, measured: Record) -> None:
     """What the controller sees now: the encoder rounds, and what it has not declared is NaN.
 
@@ -196,7 +196,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     measured.load_speed = s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
 
 
-@inner
+@apart(types.int64(WORK_TYPE, types.float64, types.float64, types.float64))
 def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken.
 
@@ -232,6 +232,18 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
 
 
 @inner
+def along_line(s: Record) -> None:
+    """Whether the realised torque is a line, and there the torque itself to the last digit."""
+    s.follows = 1.0
+    if s.lag == 0.0:
+        s.u = s.ref
+        return
+    line = s.ref - s.slope * s.lag
+    if abs(s.u - line) > DIED_AWAY * (abs(line) + abs(s.u)):
+        s.follows = 0.0
+
+
+@apart(types.void(WORK_TYPE))
 def begin_torque(s: Record) -> None:
     """The course of the torque from now on: ref' = slope up to `slew_end`, u' = (ref - u)/lag.
 
@@ -257,18 +269,6 @@ def begin_torque(s: Record) -> None:
         slope = math.copysign(s.rate, slope)
     s.slope = slope
     along_line(s)
-
-
-@inner
-def along_line(s: Record) -> None:
-    """Whether the realised torque is a line, and there the torque itself to the last digit."""
-    s.follows = 1.0
-    if s.lag == 0.0:
-        s.u = s.ref
-        return
-    line = s.ref - s.slope * s.lag
-    if abs(s.u - line) > DIED_AWAY * (abs(line) + abs(s.u)):
-        s.follows = 0.0
 
 
 @inner

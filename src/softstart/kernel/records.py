@@ -326,7 +326,10 @@ MEASURED, ANSWER = record(Measured), record(Answer)
 WORK = record(
     Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts()
 )
-WORK_TYPE: Any = from_dtype(WORK)  # for compiled functions
+# for compiled functions
+WORK_TYPE: Any = from_dtype(WORK)
+MEASURED_TYPE: Any = from_dtype(MEASURED)
+TONE_TYPE: Any = from_dtype(TONE)
 N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
 
 # a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and

@@ -37,6 +37,7 @@ from softstart.kernel.records import (
     ORDERS,
     PRESSED,
     TONE,
+    TONE_TYPE,
     WELDED,
     WORK_TYPE,
     Record,
@@ -233,6 +234,24 @@ def orders(reach: float) -> int:
 # the series -----------------------------------------------------------------------------------------
 
 
+@apart(types.void(WORK_TYPE, TONE_TYPE, types.float64, types.int64))
+def add_tone(s: Record, tone: Record, h: float, n: int) -> None:
+    """The coefficients of one harmonic of an exciting torque, added to those of its mass."""
+    i = int(tone.mass)
+    phase = tone.omega * s.time
+    cos = math.cos(phase)
+    sin = math.sin(phase)
+    turn = tone.omega * h
+    even = tone.cosine * cos + tone.sine * sin
+    odd = (tone.sine * cos - tone.cosine * sin) * turn
+    for o in range(0, n + 1, 2):
+        s.outside[i, o] += even
+        even *= -turn * turn / ((o + 1.0) * (o + 2.0))
+        if o < n:
+            s.outside[i, o + 1] += odd
+            odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
+
+
 @inner
 def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
     """The coefficients of the exciting torques."""
@@ -240,20 +259,7 @@ def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
         for o in range(n + 1):
             s.outside[i, o] = 0.0
     for row in range(tones.shape[0]):
-        tone = named(tones[row], TONE)
-        i = int(tone.mass)
-        phase = tone.omega * s.time
-        cos = math.cos(phase)
-        sin = math.sin(phase)
-        turn = tone.omega * h
-        even = tone.cosine * cos + tone.sine * sin
-        odd = (tone.sine * cos - tone.cosine * sin) * turn
-        for o in range(0, n + 1, 2):
-            s.outside[i, o] += even
-            even *= -turn * turn / ((o + 1.0) * (o + 2.0))
-            if o < n:
-                s.outside[i, o + 1] += odd
-                odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
+        add_tone(s, named(tones[row], TONE), h, n)
 
 
 @inner

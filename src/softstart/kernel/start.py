@@ -8,7 +8,7 @@ from numba import types
 
 from softstart.arrays import Matrix, Vector
 from softstart.kernel.events import next_event, peak_within, value
-from softstart.kernel.jit import compiled_as, inner, named
+from softstart.kernel.jit import apart, compiled_as, inner, named
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
     NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue,
@@ -19,7 +19,7 @@ from softstart.kernel.records import (
     NOT_FINITE,
     NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
     SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
-    UNSOLVED, UPPER, WELDED, WORK, Record,
+    UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
 )  # fmt: skip
 from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, find_piece, orders
 
@@ -127,10 +127,9 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
 
 
 @inner
-def note_span(s: Record, row: Vector, h: float) -> None:
-    """What is needed to evaluate any instant of this span again."""
+def note_span(s: Record, row: Vector) -> None:
+    """What is needed to evaluate any instant of this span again, but for its end."""
     row[S_START] = s.time
-    row[S_END] = s.time + h
     row[S_U] = s.u
     row[S_REF] = s.ref
     row[S_SLOPE] = s.slope
@@ -151,7 +150,7 @@ def note_span(s: Record, row: Vector, h: float) -> None:
         row[at + 3] = s.sign[k]
 
 
-@inner
+@apart(types.void(WORK_TYPE, types.int64, types.float64, types.float64))
 def move(s: Record, n: int, x: float, time: float) -> None:
     """The state after the share x of the span, `time` seconds later."""
     for i in range(s.n):
@@ -169,9 +168,10 @@ def move(s: Record, n: int, x: float, time: float) -> None:
     s.time += time
 
 
-@inner
-def pressing(twist: Vector, n: int, x: float, h: float, side: float) -> float:
-    """The relative acceleration towards the flank `side`, rad/s^2."""
+@apart(types.float64(WORK_TYPE, types.int64, types.int64, *[types.float64] * 3))
+def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> float:
+    """The relative acceleration of the masses beside shaft k towards the flank `side`, rad/s^2."""
+    twist = s.twist[k]
     total = 0.0
     for o in range(n, 1, -1):
         total = total * x + o * (o - 1.0) * twist[o]
@@ -287,9 +287,11 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
                 return NOT_LOCATED
         if x > 0.0:
             if spans.shape[0] > 0:
-                note_span(s, spans[int(s.n_spans)], x * h)
-                s.n_spans += 1.0
+                note_span(s, spans[int(s.n_spans)])
             move(s, n, x, x * h)
+            if spans.shape[0] > 0:
+                spans[int(s.n_spans), S_END] = s.time
+                s.n_spans += 1.0
         total = s.u
         for i in range(s.n):
             total += s.w[i]
@@ -302,7 +304,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         press = 0.0
         rest = 0.0
         if event in (UPPER, LOWER):
-            press = pressing(s.twist[where], n, x, h, 1.0 if event == UPPER else -1.0)
+            press = pressing(s, where, n, x, h, 1.0 if event == UPPER else -1.0)
         elif event == SETTLE and s.restitution[where] < 1.0:
             ratio = -s.twist[where, 1] / s.twist[where, 2]
             rest = h * ratio / (1.0 - s.restitution[where])
@@ -311,6 +313,12 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         note_events(s, events)
         if s.events > s.event_cap:
             return EVENT_LIMIT
+
+
+@apart(types.float64(WORK_TYPE, types.int64))
+def spring_torque(s: Record, k: int) -> float:
+    """The torque of a shaft whose spring acts."""
+    return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
 
 @inner
@@ -325,7 +333,7 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
         begin_torque(s)
         expand_all(s, tones, 0.0, orders(0.0))
         return float(s.torque[k, 0])
-    return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
+    return float(spring_torque(s, k))
 
 
 @compiled_as(types.void(_A, types.int64, _M, _A))
@@ -348,7 +356,9 @@ def answer(work: Vector, torque: float, ask_again: float, slope: float) -> int:
 @compiled_as(types.void(_A, _A))
 def note_state(work: Vector, row: Vector) -> None:
     """The present state, as a span of no length."""
-    note_span(named(work, WORK), row, 0.0)
+    s = named(work, WORK)
+    note_span(s, row)
+    row[S_END] = s.time
 
 
 @compiled_as(types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean))

@@ -49,14 +49,14 @@ def test_linear_programs_with_finer_torques_agree_within_a_thousandth(confirmed)
     chain = three_masses()
     first = optimize(chain, START_TIME, time_limit=0.0).profile
     times, torques, answers = first.time, first.torque, []
-    for finer in (2, 4):
+    for finer in (2, 4, 8):
         search = Search(ChainProblem(chain, START_TIME), Player(chain), finer=finer)
         found = search.finished(search.descended(np.interp(search.knots, times, torques), least=1e-5))
         times, torques = search.knots, found.torques
         assert found.miss.max() <= 1e-6
         answers.append(found.played.peak / search.problem.base_torque)
-    assert confirmed.tried[-1].value == pytest.approx(answers[0], rel=5e-3)
-    assert confirmed.tried[-1].value == pytest.approx(answers[1], rel=1e-3)
+    # where a descent on the coarsest grid ends hangs on rounding: 0.847 to 0.851
+    assert answers[1:] == pytest.approx([confirmed.tried[-1].value] * 2, rel=1e-3)
 
 
 def test_the_phases_are_those_of_the_record(confirmed):
