@@ -81,7 +81,7 @@ class Sleeper(PlainController):
 def spin(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Works for about a second."""
     x = 0.5
-    for _ in range(30_000_000):
+    for _ in range(100_000_000):
         x = math.sin(x) + 0.5
     command[0] = 62.0 + 1e-300 * x
     command[1] = math.inf
