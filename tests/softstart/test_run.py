@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -43,12 +44,13 @@ def test_equation_of_motion_holds_along_the_traces(run: Run) -> None:
 def test_shape_of_the_answer_is_that_of_the_question(run: Run) -> None:
     assert run.at(0.1)["T"].shape == ()
     assert run.at([[0.1, 0.2], [0.3, 0.35]])["w2"].shape == (2, 2)
-    with pytest.raises(ValueError, match="within the run"):
-        run.at(run.end_time + 1.0)
-    with pytest.raises(ValueError, match="within the run"):
-        run.at([0.1, -0.1])
-    with pytest.raises(ValueError, match="within the run"):
-        run.at(math.nan)
+    for beyond in (run.end_time + 1.0, [0.1, -0.1], math.nan):
+        with pytest.raises(ValueError, match="within the run"):
+            run.at(beyond)
+
+
+def test_a_run_goes_to_another_process_whole(run: Run) -> None:
+    assert repr(pickle.loads(pickle.dumps(run)).summary()) == repr(run.summary())
 
 
 def test_start_time_is_the_first_instant_at_the_target(run: Run) -> None:

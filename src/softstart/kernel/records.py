@@ -39,7 +39,9 @@ def record(*fields: type, whole: Sequence[str] = (), **parts: Any) -> Any:
         part, number = parts.get(name), np.int64 if name in whole else np.float64
         types.append((name, number, part) if isinstance(part, int | tuple) else (name, part or number))
     # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
-    scalar = type(fields[-1].__name__, (np.void,), {name: _field(name) for name, *_ in types})
+    known = f"{fields[-1].__module__}.{fields[-1].__qualname__}".replace(".", "_")
+    scalar = type(known, (np.void,), {name: _field(name) for name, *_ in types} | {"__module__": __name__})
+    globals()[known] = scalar  # where another process finds it
     return np.dtype((scalar, np.dtype(types)))
 
 

@@ -595,7 +595,7 @@ def drawn(
     picture: dict[str, Any] = {
         "channels": channels,
         "data": b64encode(rows.tobytes()).decode("ascii"),
-        "peak": [run.peak_time, float(traces["T"][peak])],
+        "peak": [run.peak_time, math.copysign(run.peak_torque, traces["T"][peak])],
     }
     if whole:
         machine = run.drive

@@ -20,7 +20,6 @@ from softstart.controller import Sensor
 from softstart.start.rows import rows_of
 
 CRANE = Drive.load("crane-4amtkf")
-# what can differ between a drive and another
 DRIVES = {
     "undamped": {},
     "reactive": {"load_kind": "reactive"},
@@ -40,10 +39,12 @@ def test_a_drive_is_a_chain_of_two_masses(changes):
     """To the kernel it is the same: all that it is given of both agrees to rounding."""
     drive = CRANE.replace(**changes)
     ours, theirs = rows_of(drive), rows_of(chain_of(drive))
-    np.testing.assert_allclose(theirs.machines, ours.machines, rtol=1e-14)
-    np.testing.assert_allclose(theirs.masses, ours.masses, rtol=1e-14)
-    # where the gear sits, the last column, is nothing to a shaft without losses
-    np.testing.assert_allclose(theirs.shafts[..., :-1], ours.shafts[..., :-1], rtol=1e-14)
+    shafts = (
+        theirs.shafts[..., :-1],
+        ours.shafts[..., :-1],
+    )  # the last says where the gear sits: there is none
+    for other, one in ((theirs.machines, ours.machines), (theirs.masses, ours.masses), shafts):
+        np.testing.assert_allclose(other, one, rtol=1e-14)
 
 
 def test_from_the_driving_flank_there_is_one_contact_however_often_it_is_grazed():
