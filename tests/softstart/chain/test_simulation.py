@@ -42,7 +42,7 @@ def test_a_drive_is_a_chain_of_two_masses(changes):
     shafts = (
         theirs.shafts[..., :-1],
         ours.shafts[..., :-1],
-    )  # the last says where the gear sits: there is none
+    )  # but for the place of the gear: none
     for other, one in ((theirs.machines, ours.machines), (theirs.masses, ours.masses), shafts):
         np.testing.assert_allclose(other, one, rtol=1e-14)
 
@@ -57,14 +57,12 @@ def test_from_the_driving_flank_there_is_one_contact_however_often_it_is_grazed(
 def test_the_reversals_of_a_shaft_far_from_the_motor_are_found():
     """Its torque begins with a high power of time; the reversals are those of a fine grid."""
     run = simulate(Chain.load("tractor-like"), "ramp", until=0.05)
-    times = np.linspace(0.0, run.end_time, 50_001)
-    still = 1e-6 * max(run.peak_torques)
+    still, grid = 1e-6 * max(run.peak_torques), run.at(np.linspace(0.0, run.end_time, 50_001))["T"]
     for k in range(run.T.shape[1]):
-        points = run.recorded.turning_points(k, still)
-        T = run.at(times)["T"][:, k]
-        assert points[:, 1].max() >= T.max() - still
-        assert points[:, 1].min() <= T.min() + still
-        assert np.all(np.abs(np.diff(points[:, 1]))[:-1] > still)
+        turned = run.recorded.turning_points(k, still)[:, 1]
+        assert turned.max() >= grid[:, k].max() - still
+        assert turned.min() <= grid[:, k].min() + still
+        assert np.all(np.abs(np.diff(turned))[:-1] > still)
 
 
 def test_no_bit_depends_on_the_time_limit():
