@@ -45,7 +45,8 @@ def test_shape_of_the_answer_is_that_of_the_question(run: Run) -> None:
     assert run.at(0.1)["T"].shape == ()
     assert run.at([[0.1, 0.2], [0.3, 0.35]])["w2"].shape == (2, 2)
     for beyond in (run.end_time + 1.0, [0.1, -0.1], math.nan):
-        pytest.raises(ValueError, run.at, beyond).match("within the run")
+        with pytest.raises(ValueError, match="within the run"):
+            run.at(beyond)
 
 
 def test_a_run_goes_to_another_process_whole(run: Run) -> None:

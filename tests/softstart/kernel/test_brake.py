@@ -74,9 +74,8 @@ def test_torque_proving_through_a_rate_limit() -> None:
 
 
 def test_a_torque_that_holds_the_load_from_the_beginning_releases_at_once() -> None:
-    for first in (120.0, 125.0):
-        run = simulate(HOIST.replace(brake="motor"), Pieces(((0.0, first), (0.01, 250.0))), until=0.1)
-        assert run.release_time == 0.0
+    for held in (Pieces(((0.0, 120.0), (0.01, 250.0))), Pieces(((0.0, 125.0),))):
+        assert simulate(HOIST.replace(brake="motor"), held, until=0.1).release_time == 0.0
 
 
 def test_a_load_on_the_flank_swings_between_nothing_and_twice_its_weight() -> None:
