@@ -58,14 +58,6 @@ def plain() -> None:
     simulate(records(crane, gap=[0.5, 2.0]), twin)
 
 
-def robust() -> None:
-    """Optima over several drives."""
-    from softstart import Drive, optimize_robust
-
-    crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-    assert optimize_robust([crane], 0.3).k_dyn < 1.0
-
-
 # what must be compiled before, and what compiles it; the longest are taken first
 PARTS: Parts = {
     "start": ((), kernel("start")),
@@ -73,7 +65,6 @@ PARTS: Parts = {
     "replay": (("start",), kernel("replay")),
     "sensitivity": (("replay",), kernel("sensitivity")),
     "controllers": (("replay", "steps"), controllers),
-    "robust": (("controllers",), robust),
     "plain": (("controllers",), plain),
 }
 

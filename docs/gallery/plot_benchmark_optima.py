@@ -2,7 +2,7 @@
 =================================
 
 The start with the lowest peak shaft torque within a given time, computed by the three methods of softstart:
-closed form, linear programs searched over the instant of contact, and collocation with CasADi. The torque
+closed form, successive linear programs on the exact start, and collocation with CasADi. The torque
 of each method is replayed on the exact plant.
 """
 
@@ -11,7 +11,7 @@ of each method is replayed on the exact plant.
 # GEKKO, if installed, and a shorter start time.
 from softstart_studies.benchmarks.optima.study import BenchmarkOptima
 
-methods = ("closed-form", "lp", "collocation")
+methods = ("closed-form", "descent", "collocation")
 study = BenchmarkOptima(methods, start_times=[0.2883], repetitions=0, guesses=())
 result = study.run(None, lambda doing: None)
 figure = result.figures["benchmark-optima-answers"]

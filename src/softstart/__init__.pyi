@@ -39,14 +39,12 @@ from softstart.linear.view import LinearView as LinearView
 from softstart.linear.view import linear_view as linear_view
 from softstart.optimal.front import Front as Front
 from softstart.optimal.front import pareto as pareto
+from softstart.optimal.optimize import optimize as optimize
+from softstart.optimal.optimize import scenarios_of as scenarios_of
 from softstart.optimal.problem import Problem as Problem
 from softstart.optimal.result import InfeasibleError as InfeasibleError
 from softstart.optimal.result import Optimum as Optimum
 from softstart.optimal.result import OptimumError as OptimumError
-from softstart.optimal.result import RobustOptimum as RobustOptimum
-from softstart.optimal.robust import optimize_robust as optimize_robust
-from softstart.optimal.robust import worth_of_contact_sensor as worth_of_contact_sensor
-from softstart.optimal.solving import optimize as optimize
 from softstart.profile import TorqueProfile as TorqueProfile
 from softstart.reporting.result import Report as Report
 from softstart.reporting.result import report as report

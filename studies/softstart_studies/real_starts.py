@@ -15,10 +15,10 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from softstart import Drive, Fatigue, Run, fatigue, optimize, optimize_robust, simulate
+from softstart import Drive, Fatigue, Run, fatigue, optimize, simulate
 from softstart.controller import ready_controller_names
 from softstart.errors import InputError
-from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, RobustOptimum
+from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.start.fatigue import damped, impacts, worst_damage
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, new_figure
@@ -91,7 +91,7 @@ class Findings:
     """All cases by drive and position, and the profiles for an unknown position by drive."""
 
     cases: Mapping[tuple[str, str], Case]
-    unknown: Mapping[str, RobustOptimum]
+    unknown: Mapping[str, Optimum]
 
     def of(self, drive: str) -> dict[str, Case]:
         """The cases of a drive, by position."""
@@ -118,7 +118,7 @@ def find(extent: Extent, progress: Progress) -> Findings:
             progress(f"{name}: one profile for an unknown position")
             latest = SLOWER * max(cases[name, one].direct.start_time for one in own if one != "hanging")
             there = drive.replace(start_position="unknown", brake="none")
-            unknown[name] = optimize_robust(list(there.positions.values()), latest)
+            unknown[name] = optimize(there, latest)
     return Findings(cases, unknown)
 
 
@@ -129,7 +129,7 @@ def _case(drive: Drive, names: Sequence[str], optimum: bool) -> Case:
     if optimum:
         try:
             best = optimize(drive, SLOWER * runs["direct"].start_time, terminal="reached")
-        except (InfeasibleError, OptimumError, NotConverged, InputError):
+        except (InfeasibleError, OptimumError, InputError):
             best = None
     return Case(drive, runs, lives, best, _seconds(drive, names, lives))
 
@@ -180,12 +180,12 @@ def _optima(found: Findings) -> Table:
     rows: list[tuple[object, ...]] = []
     for (name, where), case in found.cases.items():
         best, gentlest = case.optimum, case.gentlest()
-        known = (None, None) if best is None else (_round(best.k_dyn), _round(best.k_dyn_lower_bound))
+        known = (None, None) if best is None else (_round(best.k_dyn), _round(best.bound.k_dyn))
         rows.append(
             (name, where, *known, gentlest, _round(case.runs[gentlest].k_dyn), _round(case.direct.k_dyn))
         )
     for name, profile in found.unknown.items():
-        bound = _round(profile.lower_bound.k_dyn)
+        bound = _round(profile.bound.k_dyn)
         rows.append((name, "unknown: one profile for all", _round(profile.k_dyn), bound, None, None, None))
     return Table(
         f"Least K_dyn in {SLOWER} times the start time of direct",
@@ -299,7 +299,7 @@ def strategies_reach_the_optimum(found: Findings) -> Claim:
         if case.optimum is not None:
             run = case.runs[case.gentlest()]
             ratios[f"{name} {where}"] = run.k_dyn / case.optimum.k_dyn
-            gaps.append(case.optimum.k_dyn / case.optimum.k_dyn_lower_bound - 1.0)
+            gaps.append(case.optimum.k_dyn / case.optimum.bound.k_dyn - 1.0)
     least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
     return Claim(
         "From every position some strategy is within 10 % of the optimum in the same time.",

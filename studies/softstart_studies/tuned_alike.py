@@ -13,10 +13,9 @@ from scipy.interpolate import PchipInterpolator
 from softstart import Drive
 from softstart.arrays import Vector
 from softstart.controller import make_controller, ready_controller_names
+from softstart.optimal.optimize import optimize, shortest_start_time
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, OptimumError
-from softstart.optimal.shortest import shortest_start_time
-from softstart.optimal.solving import optimize
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
@@ -79,7 +78,7 @@ class Front:
 
 
 def front(drive: Drive, times: Sequence[float], points: int) -> Front:
-    """Optima from the quickest of these times that a start with one contact allows to the slowest.
+    """Optima from the quickest of these times at which there is a start to the slowest.
 
     The optimum is that of a torque without lag, terminal `reached`: a yardstick no controller can pass.
     """

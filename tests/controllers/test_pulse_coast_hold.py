@@ -20,7 +20,7 @@ from tests.twin import plain
 
 from softstart import Drive, InputError, Records, records, simulate
 from softstart.kernel.records import size
-from softstart.optimal.solving import optimize
+from softstart.optimal.optimize import optimize
 from softstart.start.batch import prepared
 from softstart_controllers import pulse_coast_hold_step as stepping
 from softstart_controllers import shaft_filter as sf

@@ -77,7 +77,7 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
     done(page, "optimum")
     shown = facts(page, "optimum")
     assert shown["Kdyn"] == f"{best.k_dyn:.4g}"
-    assert shown["lower bound"] == f"{best.k_dyn_lower_bound:.4g}"
+    assert shown["lower bound"] == f"{best.bound.k_dyn:.4g}"
     assert shown["start time"] == f"{best.end_time:.4g} s"
     assert shown["contacts"] == "1"
     label = f"optimum {best.end_time:.4g} s"

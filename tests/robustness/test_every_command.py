@@ -21,8 +21,6 @@ from softstart.cli import main
 from softstart.drive import library
 from softstart.drive.data_sheet import DataSheet
 from softstart.optimal import front
-from softstart.optimal.robust import guesses, solving
-from softstart.page import tasks
 from softstart.page.jobs import Jobs
 from softstart.page.session import Session
 
@@ -84,13 +82,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few points and rough searches: what is asked is whether there is an answer."""
-    monkeypatch.setattr(front.default_start_times, "__defaults__", ("reached", 4))
-    monkeypatch.setattr(tasks, "LONG_MULTIPLES", (1.2,))
-    monkeypatch.setattr(guesses, "ROUNDS", 40)
-    monkeypatch.setattr(guesses, "CELL_MEMBERS", 40)
-    for name, less in {"COARSE": 12, "FINE": 24, "DENSE": 8, "SPARSE": 3, "ROUNDS": 16, "PURSUED": 1}.items():
-        monkeypatch.setattr(solving, name, less)
+    """Few points: what is asked is whether there is an answer."""
+    monkeypatch.setattr(front.default_start_times, "__defaults__", ("reached", 2))
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
-from tests.softstart.optimal.test_from_positions import random_unknown
+from tests.softstart.optimal.drives import random_unknown
 
 from softstart import Drive, Identification, identify, plan_experiments, records, simulate
 from softstart.controller import make_controller

@@ -94,12 +94,11 @@ OPTIONS: dict[str, list[str]] = {
         "--json",
     ],
     "optimize": [
-        "--start-time", "--terminal", "--method", "--minimise", "--max-k-dyn", "--max-heat", "--torque-speed",
-        "--smoothness", "--tolerance", "--time-limit", "--gaps", "--inertias", "--load-torques", "--set",
-        "--json",
+        "--start-time", "--terminal", "--minimise", "--max-k-dyn", "--max-heat", "--torque-speed",
+        "--smoothness", "--gaps", "--inertias", "--load-torques", "--set", "--json",
     ],
     "pareto": [
-        "--start-times", "--terminal", "--method", "--torque-speed", "--controllers", "--workers", "--set",
+        "--start-times", "--terminal", "--torque-speed", "--controllers", "--workers", "--set",
     ],
     "tune": [
         "--gaps", "--inertias", "--free", "--param", "--metric", "--start-time", "--tolerance", "--quantile",

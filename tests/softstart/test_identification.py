@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
-from tests.softstart.optimal.test_from_positions import random_unknown
+from tests.softstart.optimal.drives import random_unknown
 
 from softstart import Drive, Identification, InputError, Log, Run, identify, plan_experiments, simulate
 from softstart.arrays import Vector

@@ -111,12 +111,16 @@ def test_lines_of_code_are_counted_without_comments_and_docstrings():
     assert count_lines("x = '''\n# in a string\n'''\n") == 3
     for name in ENTRIES:
         assert 5 < lines_of_code(name) < 120, name
-    assert lines_of_code("lp") == lines_of_code("collocation")  # one file
+    assert lines_of_code("descent") == lines_of_code("collocation")  # one file
 
 
 @pytest.mark.parametrize(
     ("name", "start_time", "k_dyn", "within"),
-    [("closed-form", LONG, 0.90924724, 1e-6), ("lp", LONG, 0.90924724, 1e-3), ("lp", SHORT, 1.4564, 1e-3)],
+    [
+        ("closed-form", LONG, 0.90924724, 1e-6),
+        ("descent", LONG, 0.90924724, 1e-3),
+        ("descent", SHORT, 1.4564, 1e-3),
+    ],
 )
 def test_softstart_answers_with_the_known_optima(name, start_time, k_dyn, within):
     task = crane_task(start_time)
@@ -151,8 +155,8 @@ def test_a_refusal_is_a_result(monkeypatch):
         raise RuntimeError("no\n solution")
 
     monkeypatch.setattr(worker, "solve", refuse)
-    monkeypatch.setitem(ENTRIES, "lp", replace(ENTRIES["lp"], imports=("json",)))
-    done = worker.work("lp", crane_task(LONG), 3, {})
+    monkeypatch.setitem(ENTRIES, "descent", replace(ENTRIES["descent"], imports=("json",)))
+    done = worker.work("descent", crane_task(LONG), 3, {})
     assert (done.answer, done.trouble, done.repeated) == (None, "RuntimeError: no solution", ())
 
 
@@ -164,8 +168,8 @@ def test_work_is_repeated_and_options_reach_the_contender(monkeypatch):
         return pulse_coast_hold(0.9)[0]
 
     monkeypatch.setattr(worker, "solve", solve)
-    monkeypatch.setitem(ENTRIES, "lp", replace(ENTRIES["lp"], imports=("json",)))
-    done = worker.work("lp", crane_task(LONG), 2, {"guess": 0.25})
+    monkeypatch.setitem(ENTRIES, "descent", replace(ENTRIES["descent"], imports=("json",)))
+    done = worker.work("descent", crane_task(LONG), 2, {"guess": 0.25})
     assert seen == [{"guess": 0.25}] * 3
     assert len(done.repeated) == 2
     assert min(cost.wall for cost in (done.first, *done.repeated)) > 0.0
@@ -188,10 +192,10 @@ def outcome(name, k_dyn, claimed=None, cpu=1.0, task=TASKS[LONG], broken=(), gue
 
 
 def test_claims_are_judged_by_the_numbers():
-    ours = [outcome("lp", 0.9093, cpu=0.01), outcome("closed-form", 0.90925, cpu=0.002)]
+    ours = [outcome("descent", 0.9093, cpu=0.01), outcome("closed-form", 0.90925, cpu=0.002)]
     assert least(ours, TASKS[LONG]) == 0.90925
     assert fastest(ours, TASKS[LONG]) == 0.002
-    assert fastest(ours, TASKS[LONG], "lp") == 0.01
+    assert fastest(ours, TASKS[LONG], "descent") == 0.01
     assert fastest(ours, TASKS[SHORT]) is None
     fair, off = outcome("rockit", 0.9095), outcome("dymos", 0.95, claimed=0.91)
     low, honest_time, honest_claim = claims([*ours, fair, off], [])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import simulate
-from softstart.optimal.solving import optimize
+from softstart.optimal.optimize import optimize
 from softstart.study import Verdict, find_study
 from softstart_studies.pulse_coast_hold import PulseCoastHoldStudy, present
 from softstart_studies.pulse_coast_hold.cells import Cell, grid, spread, spread_of_optimum

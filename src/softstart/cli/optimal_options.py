@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 else:  # no numba for a help, a wrong option or the Tab key
     result = late("softstart.optimal.result")
 
-METHODS = ("auto", "closed-form", "collocation", "lp")
-
 
 # reading them --------------------------------------------------------------------------------------------
 
@@ -112,12 +110,6 @@ def terminal_option(usual: str, default: str | None = None) -> Decorator:
     )
 
 
-method_option = click.option(
-    "--method",
-    metavar="|".join(METHODS),
-    type=choice(*METHODS),
-    help="Solution method. Default: auto, the fastest one that is valid.",
-)
 torque_speed_option = click.option(
     "--torque-speed",
     metavar="SPEED:TORQUE,...",
@@ -142,9 +134,7 @@ def no_solution_reported(as_json: bool) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        if isinstance(error, SimulationError | RecursionError | NotImplementedError):
-            raise
-        if not isinstance(error, result.InfeasibleError | result.OptimumError | result.NotConverged):
+        if not isinstance(error, result.InfeasibleError | result.OptimumError):
             raise
         if as_json and isinstance(error, result.InfeasibleError):
             print_json(error.verdict.summary())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,9 +11,8 @@ import click
 
 import softstart
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command, Reading, all_read
+from softstart.cli.commands import Command, Reading
 from softstart.cli.optimal_options import (
-    method_option,
     no_solution_reported,
     read_start_times,
     terminal_option,
@@ -36,31 +35,24 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
-from softstart.optimal.problem import StartTime, problem_of
+from softstart.optimal.problem import StartTime
 from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import present, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.optimal import shortest
+    from softstart.optimal import optimize as optima
     from softstart.views import optima as views
     from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
     starts, views = late("softstart.views.starts"), late("softstart.views.optima")
-    shortest = late("softstart.optimal.shortest")
+    optima = late("softstart.optimal.optimize")
 
 STATE = "pareto.jsonl"
 
 
-def _check(given: Mapping[str, Any]) -> None:
-    """What the front of this drive or chain does not take."""
-    if all_read(given):
-        with named_as_options():
-            problem_of(given["drive"], 1.0, given["terminal"], torque_speed=given["torque_speed"] or ())
-
-
-@click.command(cls=Command, checks=[_check])
+@click.command(cls=Command)
 @drive_argument(read_machine)
 @click.option(
     "--start-times",
@@ -70,7 +62,6 @@ def _check(given: Mapping[str, Any]) -> None:
     "of that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.",
 )
 @terminal_option("reached", "reached")
-@method_option
 @torque_speed_option
 @controller_option(
     "--controllers", "A,B,...", "Controllers to compare with the curve. Default: all that need no parameter."
@@ -138,7 +129,7 @@ def _computed(
         made = make_controllers(names, {}, prefix=True)
         times = None
         if asked is not None:
-            direct = cache(lambda: shortest.start_time_of_direct(drive))
+            direct = cache(lambda: optima.start_time_of_direct(drive))
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)

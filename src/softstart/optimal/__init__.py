@@ -1,14 +1,8 @@
-"""The gentlest start within a given time: torque profiles, their exact check, and how good they provably are.
+"""The gentlest start within a given time: the torque over time, its exact check, and how good it provably is.
 
-`optimize` (solving.py) picks a method for a `Problem`, re-simulates its answer with the exact plant and puts
-a lower bound beside it. The methods:
-
-- pulse_coast_hold.py: closed form, undamped drives with an active load;
-- lp/: linear programs, where nothing but the instants of contact, breakaway and end is not linear;
-- collocation/: CasADi, phases of free duration, everything else;
-- chains/: the least peak of all shafts of a chain, by successive linear programs on its exact start.
-
-momentum.py and certificate.py prove bounds, exact.py replays and checks an answer, shortest.py has the
-shortest start time and verdicts, robust/ one profile for several drives, front.py the curve of K_dyn over
-start time.
+`optimize` (optimize.py) answers a `Problem` (problem.py). Where it holds, the closed form of
+pulse_coast_hold.py is the answer; else the descent of descent.py, successive linear programs on the exact
+start (starts.py), from the first demands of seeds.py. check.py runs each answer again; bounds.py and
+certificate.py say how much better any start could be. statement.py is the same problem as one program of
+CasADi, front.py the curve of K_dyn over the start time.
 """

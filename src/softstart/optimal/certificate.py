@@ -8,17 +8,24 @@ speed v and goes on for tau under a torque u(s) from 0 to Ms has
        = k(te, tau) + a(tau) v + integral q(s) u(s) ds
       >= k(te, tau) + min over v of a(tau) v + Ms integral min(q(s), 0) ds  =: D(te, tau),
 
-with the kinks s_j at fixed shares of tau. The linear program gives good numbers for one (te, tau); D is then
+with the kinks s_j at fixed shares of tau. A linear program gives good numbers for one (te, tau); D is then
 a bound for all u at any (te, tau), and is bounded from below over whole cells:
 
 - over te: k is linear in te, the least v at te falls with te, so the ends of a cell decide;
-- over tau: at fixed v and u(s/tau) the right side is a function of tau with |second derivative| <= M, so over
-  a cell of width w it is nowhere less than the lesser of its ends, minus M w^2/8;
-- the integral of min(q, 0) by trapezoids is too high by at most max|q''| h^2/8 per unit of length.
+- over tau: at fixed v and u(s/tau) the right side is a function of tau with |second derivative| <= M, so
+  over a cell of width w it is nowhere less than the lesser of its ends, minus M w^2/8;
+- q is, up to a constant, a free motion backward in time that is kicked at the kinks. So |q''| <= B in each
+  step h of a grid, and the integral of min(q, 0) over it is at least the trapezoid minus B h^3/12.
 
-Cells whose bound is too low are split; where that does not help, a linear program there gives new numbers.
+M and B are enclosures: the energy y'^2 + Omega^2 y^2 of a free motion y never rises, whatever the damping, so
+that its value at one instant bounds y' at all later ones, and the energy of y' bounds y'' (`Contact.swing`).
+
+Cells whose bound is too low are split; where D itself is too low, a linear program there gives new numbers.
 Two plain bounds help: momentum, J2 (target - w2(te)) <= (P - Mc) tau, where the contact comes too late, and
 the peak that coasting from the least v brings where there is time in plenty.
+
+Arithmetic is floating point: for its rounding 1e-10 of the sum of the absolute terms of D is taken off, and
+the start time is stretched by 1e-10. D sums a few thousand terms, each rounded by about 1e-16.
 """
 
 from __future__ import annotations
@@ -26,30 +33,36 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_banded
 
-from softstart.arrays import Indices, Vector
-from softstart.optimal.lp.ideal import ContactProgram, Multipliers
-from softstart.optimal.lp.motion import Contact, Entry, ThroughStandstill, entry_of, no_ideal
-from softstart.optimal.lp.rows import HALVES
+from softstart.arrays import Indices, Matrix, Vector
+from softstart.optimal.contact_motion import Contact, Entries, entries, no_ideal
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
 
-ENTRY_CELLS = 3000
-FIRST_CELLS = 24  # of tau
-PROGRAM_STEPS = 80  # of the coarse program, at least, and at least three quarters a radian
-MOST_STEPS = 160
-ATOM = 0.03  # share of all multipliers from which an instant counts by itself
-TRAPEZOIDS = 2000  # at least, and at least 150 a radian of the elastic oscillation
-PRICE = 40.0  # of missing the terminal condition by as much as the target speed, in Ms
-MOST_PROGRAMS = 60
-FEW, LITTLE = 4, 1e-5  # the work ends when so many programs raise the bound by less than this share
-MOST_CELLS = 3000
-KEPT = 4  # sets of multipliers that another start time begins with
+ROUNDING = 1e-10
+FIRST_CELLS, MOST_CELLS = 24, 3000  # of tau
 NARROWEST = 1e-6  # cell of tau, as a share of the longest
+FLAT = 1e-4  # of what is proved at a point, by which the bound of a cell there may be less
+STEPS, MOST_STEPS = 80, 160  # of the coarse program: at least, and at least three quarters a radian
+FINER = 4  # times as many steps of the fine program
+ATOM = 0.03  # share of all multipliers from which an instant counts by itself
+TAIL = 120  # instants of coasting at which T is checked
+PRICE = 40.0  # of missing the terminal condition by as much as the target speed, in Ms
+FINE = 0.02  # radians of the elastic oscillation, at most, in a step of the integral of q
+MOST_PROGRAMS = 60
+CLOSE, AGAIN = 0.01, 3  # so many programs within this share of the longest contact, each finer
+
+ENDINGS = {
+    "synchronous": "both masses have the target speed",
+    "steady": "both masses have the target speed and the shaft has the load torque",
+    "reached": "the target speed is reached",
+}
 
 
 def not_certified(problem: Problem) -> str:
@@ -64,38 +77,13 @@ def not_certified(problem: Problem) -> str:
     return no_ideal(problem)
 
 
-ENDINGS = {
-    "synchronous": "both masses have the target speed",
-    "steady": "both masses have the target speed and the shaft has the load torque",
-    "reached": "the target speed is reached",
-}
-
-
-def _covers(problem: Problem, entry: Entry) -> str:
-    """The class of starts for which the bound is proved."""
-    low, high = problem.lowest_torque, problem.highest_torque
-    open_at_first = getattr(entry, "travel", 0.0) > 0.0
-    closing = "whose gap closes once and stays closed" if open_at_first else "whose gap stays closed"
-    moving = ", the load moving on once it moves," if isinstance(entry, ThroughStandstill) else ""
-    return (
-        f"every torque from {low:g} to {high:g} N m over time, by whatever controller, {closing}{moving} "
-        f"until {ENDINGS[problem.terminal]}"
-    )
-
-
 def certified_bound(
-    problem: Problem,
-    k_dyn: float,
-    *,
-    entry_near: float | None = None,
-    within: float = 5e-4,
-    proof: Sequence[Any] = (),
-) -> LowerBound:
+    problem: Problem, k_dyn: float, *, entry_near: float | None = None, within: float = 5e-4,
+) -> LowerBound:  # fmt: skip
     """The largest lower bound found on K_dyn of a problem for which `not_certified` has nothing to say.
 
     `k_dyn` is what is to be judged: the work ends once the bound is within that share of it. `entry_near` in
-    s, the instant at which both masses begin to move in contact in the best start known, makes it quicker;
-    so does the `proof` of another start time of the drive.
+    s, when both masses begin to move in contact in the best start known, makes it quicker.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -103,371 +91,341 @@ def certified_bound(
     >>> 0.9085 < bound.k_dyn <= 0.90924724
     True
     """
+    assert problem.start_time is not None
+    cells = entries(problem, problem.start_time * (1.0 + ROUNDING), entry_near)
     goal = k_dyn * problem.base_torque * (1.0 - within)
-    search = _Search(problem, goal, entry_near)
-    known = [one for one in proof if isinstance(one, tuple)]
-    peak = search.bound(known)
-    duals = sorted(search.duals, key=lambda dual: -dual.worth)[:KEPT]
-    return LowerBound(
-        peak / problem.base_torque,
-        "certificate",
-        _covers(problem, entry_of(problem)),
-        proof=tuple((dual.by, dual.tau) for dual in duals),
+    peak = _Search(problem, cells, goal, entry_near).least() if cells.te[0] < problem.start_time else math.inf
+    closing = "whose gap closes once and stays closed" if cells.opens else "whose gap stays closed"
+    moving = ", the load moving on once it moves," if cells.rests else ""
+    covers = (
+        f"every torque from {problem.lowest_torque:g} to {problem.highest_torque:g} N m over time, by "
+        f"whatever controller, {closing}{moving} until {ENDINGS[problem.terminal]}"
     )
+    return LowerBound(peak / problem.base_torque, "certificate", covers)
 
 
-@dataclass
-class _Envelope:
-    """Largest absolute values over a contact of given length of the kernels and their derivatives."""
+# what given multipliers prove -------------------------------------------------------------------------------
 
-    contact: Contact
-    longest: float
-    kernels: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        contact = self.contact
-        J1, J2, c, d = contact.J1, contact.J2, contact.c, contact.d
-        rate = max(contact.Omega, 2.0 * contact.zeta)
-        first = np.geomspace(1e-3 / rate, self.longest, 2000)
-        r = np.unique(np.concatenate([[0.0], first, np.linspace(0.0, self.longest, 4000)]))
-        h, h1 = contact.h(r), contact.dh(r)
-        h2 = -2.0 * contact.zeta * h1 - contact.Omega**2 * h
-        h3 = -2.0 * contact.zeta * h2 - contact.Omega**2 * h1
-        margin = 1.1  # between the samples, at most 1/150 of a radian apart for what matters
+@dataclass(frozen=True, eq=False)
+class _Multipliers:
+    """The numbers of the sum above, as weights in it, for the terminal equations as p_w, p_r, p_T.
 
-        def most(*values: Vector) -> tuple[float, float, float]:
-            a, b, c_ = (margin * float(np.max(np.abs(v))) for v in values)
-            return a, b, c_
+    `of_T` (m less n) and `of_z` (a dead zone, whose damper pulls, has T >= -P and c z >= 0) are those at the
+    ends of even steps of the contact, `tail` those of T while coasting after t_f (terminal `reached`).
+    """
 
-        self.kernels = {
-            "T": most((c * h + d * h1) / J1, (c * h1 + d * h2) / J1, (c * h2 + d * h3) / J1),
-            "z": most(c * h / J1, c * h1 / J1, c * h2 / J1),
-            "rate": most(h1 / J1, h2 / J1, h3 / J1),
-            "w2": most((1.0 - h1) / (J1 + J2), h2 / (J1 + J2), h3 / (J1 + J2)),
-        }
-        push = contact.Mc / J2
-        z0 = contact.Omega**2
-        # second derivatives in time of what v, the load and the first overlap contribute
-        self.by_v = {
-            "T": margin * float(np.max(np.abs(c * h2 + d * h3))),
-            "z": margin * float(np.max(np.abs(c * h2))),
-            "rate": margin * float(np.max(np.abs(h3))),
-            "w2": margin * float(np.max(np.abs(h3))) * J1 / (J1 + J2),
-        }
-        self.by_load = {
-            "T": margin * push * float(np.max(np.abs(c * h1 + d * h2))),
-            "z": margin * push * float(np.max(np.abs(c * h1))),
-            "rate": margin * push * float(np.max(np.abs(h2))),
-            "w2": margin * push * float(np.max(np.abs(h2))) * J1 / (J1 + J2),
-        }
-        self.by_overlap = {
-            "T": margin * z0 * float(np.max(np.abs(c * h1 + d * h2))),
-            "z": margin * z0 * float(np.max(np.abs(c * h1))),
-            "rate": margin * z0 * float(np.max(np.abs(h2))),
-            "w2": margin * z0 * float(np.max(np.abs(h2))) * J1 / (J1 + J2),
-        }
-
-    def curvature(self, kind: str, tau: float, Ms: float, v: float, z0: float) -> float:
-        """Bound of |d^2/dtau^2| at any share of a contact of length <= tau, u(s/tau) fixed."""
-        _, g1, g2 = self.kernels[kind]
-        return (
-            Ms * (g1 + tau * g2 / 3.0) + v * self.by_v[kind] + self.by_load[kind] + z0 * self.by_overlap[kind]
-        )
+    of_T: Vector
+    of_z: Vector
+    tail: Vector
+    speed: float
+    rate: float
+    torque: float
 
 
 class _Dual:
-    """One set of multipliers: D without its part in te, at any tau; they are best for one."""
+    """What one set of multipliers, best for one tau, proves at any tau: D without its part in te."""
 
-    def __init__(
-        self, problem: Problem, entry: Entry, by: Multipliers, envelope: _Envelope, v: float, tau: float
-    ) -> None:
-        self.problem, self.entry, self.by, self.envelope = problem, entry, by, envelope
-        self.tau = tau  # that they are best for
-        self.worth = 0  # cells whose bound they raised
-        self.contact = envelope.contact
-        self.v = v
-        self.pulls = problem.drive.contact_law == "dead-zone" and problem.drive.d > 0.0
-        net = by.peak - by.trough - (0.0 if self.pulls else by.closed)
-        used = (net != 0.0) | (by.closed != 0.0)
-        self.share, self.net = by.share[used], net[used]
-        self.open = by.closed[used] if self.pulls else np.zeros(self.share.size)
-        self._weigh()
-        self.grids: dict[int, tuple[Vector, Vector, tuple[Indices, Indices]]] = {}
-        self.known: dict[float, tuple[float, float]] = {}
-        self.bends: dict[float, float] = {}
+    def __init__(self, problem: Problem, cells: Entries, by: _Multipliers, tau: float) -> None:
+        self.by, self.tau, self.Ms = by, tau, problem.highest_torque
+        self.contact = contact = Contact.of(problem.drive)
+        self.momentum = by.speed / (contact.J1 + contact.J2)  # q is a free motion less this
+        self.of_rate = contact.J1 * self.momentum - by.rate  # weight of z'(tau)
+        self.rest = contact.c * contact.Mc / (contact.J2 * contact.Omega**2)  # T about which coasting swings
+        self.z0 = cells.z0 - self.rest / contact.c  # first overlap, from there
+        self.still, self.growing = self._bent(float(np.max(cells.fastest)))
+        self.values: dict[float, tuple[float, float]] = {}
 
     def at(self, tau: float) -> tuple[float, float]:
         """(what does not depend on v and te, coefficient of v), N m and N m s/rad."""
-        if tau not in self.known:
-            self.known[tau] = self._evaluate(tau)
-        return self.known[tau]
-
-    def _evaluate(self, tau: float) -> tuple[float, float]:
-        by, contact, problem = self.by, self.contact, self.problem
-        z0, c, d = self.entry.z0, contact.c, contact.d
-        n = self.share.size
-        # at the checked instants, while coasting afterwards, and at the end
-        z, rate = contact.coasting(np.concatenate([self.share * tau, tau + by.tail_at, [tau]]))
-        T_v, a_0, a_z = (c * one + d * other for one, other in zip(z, rate, strict=True))
-        T_0 = a_0 + a_z * z0
-        z_v, z_0, r_v, r_0 = z[0], z[1] + z[2] * z0, rate[0][-1], rate[1][-1] + rate[2][-1] * z0
-        # momentum: J1 w1 + J2 w2 is what the torques brought
-        total = contact.J1 + contact.J2
-        w_v = contact.J1 * (1.0 - rate[0][-1]) / total
-        w_0 = (-contact.Mc * tau - contact.J1 * rate[1][-1]) / total + -contact.J1 * rate[2][-1] / total * z0
-        a_v = self.net @ T_v[:n] - c * (self.open @ z_v[:n]) + by.tail @ T_v[n:-1]
-        a_v = a_v - by.speed * w_v - by.rate * r_v - by.torque * T_v[-1]
-        fixed = self.net @ T_0[:n] - c * (self.open @ z_0[:n]) + by.tail @ T_0[n:-1]
-        fixed = fixed - by.speed * w_0 - by.rate * r_0 - by.torque * (T_0[-1] - problem.drive.Mc)
-        fixed += self._by_torque(tau)
-        return float(fixed), float(a_v)
-
-    def _by_torque(self, tau: float) -> float:
-        """Ms times the integral of min(q, 0), from below."""
-        if tau <= 0.0:
-            return 0.0
-        wanted = max(TRAPEZOIDS, int(150.0 * self.contact.Omega * tau))
-        shares, widths, first = self._grid(wanted)
-        Ms, step = self.problem.highest_torque, tau / wanted
-        # q jumps at the kinks of a damped shaft, and at tau: each interval has its own values at its ends
-        after, before = (np.minimum(q, 0.0) for q in self._weights(shares * tau, tau, first))
-        area = 0.5 * tau * float(widths @ (after[:-1] + before[1:]))
-        return Ms * (area - self._bend() * step * step / 8.0 * tau)
-
-    def _grid(self, wanted: int) -> tuple[Vector, Vector, tuple[Indices, Indices]]:
-        """Instants as shares of tau, even ones and the kinks; their distances; the first kinks there."""
-        if wanted not in self.grids:
-            shares = np.unique(np.concatenate([np.linspace(0.0, 1.0, wanted + 1), self.share]))
-            self.grids[wanted] = shares, np.diff(shares), self._first(shares)
-        return self.grids[wanted]
-
-    def _first(self, shares: Vector) -> tuple[Indices, Indices]:
-        """For each instant, a share of tau, the first kink after it, and not before it."""
-        kinks = np.where(self.later > 0.0, np.inf, self.kinks)
-        return np.searchsorted(kinks, shares, side="right"), np.searchsorted(kinks, shares)
-
-    def _bend(self) -> float:
-        """Bound of |q''| between the kinks."""
-        by, k = self.by, self.envelope.kernels
-        T = float(np.abs(self.net).sum() + by.tail.sum()) + abs(by.torque)
-        return (
-            T * k["T"][2]
-            + float(self.open.sum()) * k["z"][2]
-            + abs(by.rate) * k["rate"][2]
-            + abs(by.speed) * k["w2"][2]
+        if tau in self.values:
+            return self.values[tau]
+        by, contact, Ms = self.by, self.contact, self.Ms
+        twice, square = 2.0 * contact.zeta, contact.Omega**2
+        y, rate = self.weights(tau)
+        step = tau / y.size
+        _, h, dh = (float(one) for one in contact.responses(step))
+        first, first_rate = (dh + twice * h) * y + h * rate, dh * rate[0] - square * h * y[0]
+        bent = np.hypot(twice * rate + square * y, contact.Omega * rate)  # bounds q'' in the step
+        q = np.minimum(y - self.momentum, 0.0) + np.minimum(first - self.momentum, 0.0)
+        terms = (
+            self.rest * float(by.of_T.sum() + by.of_z.sum() + by.tail.sum()),
+            by.torque * (contact.Mc - self.rest),
+            self.momentum * contact.Mc * tau,
+            self.z0 * contact.J1 * (first_rate + twice * float(first[0])),
+            Ms * step * float(np.sum(0.5 * q - bent * (step * step / 12.0))),
         )
+        rounded = sum(map(abs, terms)) + Ms * tau * float(np.abs(y).max() + abs(self.momentum))
+        by_v = contact.J1 * (float(first[0]) - self.momentum)
+        self.values[tau] = sum(terms) - ROUNDING * rounded, by_v
+        return self.values[tau]
 
-    def _weigh(self) -> None:
-        """q(s) as a sum over rising instants `kinks` tau + `later`: the weights of h and of h' there."""
+    def weights(self, tau: float) -> tuple[Vector, Vector]:
+        """(y, y') at the end of each step: y = q but for a constant, y' its rate, both backward in time.
+
+        Through the step y moves freely; before the next one it is kicked by what ends there.
+        """
         by, contact = self.by, self.contact
-        J1, J2, c, d = contact.J1, contact.J2, contact.c, contact.d
-        kinks = np.concatenate([self.share, np.ones(1 + by.tail_at.size)])
-        later = np.concatenate([np.zeros(self.share.size + 1), by.tail_at])
-        of_h = np.concatenate([c * (self.net - self.open), [-c * by.torque], c * by.tail]) / J1
-        of_dh = np.concatenate([d * self.net, [-d * by.torque], d * by.tail]) / J1
-        of_dh[self.share.size] += by.speed / (J1 + J2) - by.rate / J1
-        order = np.lexsort((later, kinks))
-        order = order[(of_h[order] != 0.0) | (of_dh[order] != 0.0)]
-        self.kinks, self.later, self.of_h, self.of_dh = (one[order] for one in (kinks, later, of_h, of_dh))
+        c, d, twice, square = contact.c, contact.d, 2.0 * contact.zeta, contact.Omega**2
+        part = max(1, math.ceil(max(contact.Omega, contact.zeta) * tau / (FINE * by.of_T.size)))
+        n = part * by.of_T.size
+        kicks = np.zeros((n, 2))
+        kicks[part - 1 :: part, 0] = d * by.of_T
+        kicks[part - 1 :: part, 1] = (c - twice * d) * by.of_T + c * by.of_z
+        kicks[-1] += self.of_rate - d * by.torque, -twice * self.of_rate - (c - twice * d) * by.torque
+        _, x, y = (float(by.tail @ one) for one in contact.responses(_after(contact)))
+        kicks[-1] += c * x + d * y, c * y - d * (twice * y + square * x)
+        _, h, dh = (float(one) for one in contact.responses(tau / n))
+        band = np.zeros((4, 2 * n))  # of y_k - (what y_k+1 leads to) = kick_k, from the last step on
+        band[0, 1::2], band[1, 1::2], band[1, 0::2], band[2, 0::2] = -h, -dh, -dh - twice * h, square * h
+        band[3] = 1.0
+        states = solve_banded((0, 3), band, kicks.ravel() / contact.J1, check_finite=False)
+        return states[0::2], states[1::2]
 
-    def _weights(self, s: Vector, tau: float, first: tuple[Indices, Indices]) -> tuple[Vector, Vector]:
-        """q(s): what a torque impulse just after s, and just before it, adds."""
-        after, before = self.contact.sums(s, self.kinks * tau + self.later, self.of_h, self.of_dh, first)
-        end = self.by.speed / (self.contact.J1 + self.contact.J2)
-        return after - end, before - end
+    def _bent(self, fastest: float) -> tuple[float, float]:
+        """At a share x of the contact the second derivative of T, c z or z' is no more than
 
-    def curvature(self, tau: float) -> float:
-        """M: bound of the second derivative in tau, for a contact of length <= tau."""
-        if tau not in self.bends:
-            self.bends[tau] = self._curvature(tau)
-        return self.bends[tau]
+            x^2 (v |f_v''| + |z0 f_z''| + Ms |g'|) + tau x^3 Ms |g''|/3,    g = f_v/J1,
 
-    def _curvature(self, tau: float) -> float:
-        by, e = self.by, self.envelope
-        Ms, v, z0 = self.problem.highest_torque, self.v, self.entry.z0
-
-        def of(kind: str) -> float:
-            return e.curvature(kind, tau, Ms, v, z0)
-
-        return (
-            float(np.abs(self.net).sum() + by.tail.sum()) * of("T")
-            + float(self.open.sum()) * of("z")
-            + abs(by.speed) * of("w2")
-            + abs(by.rate) * of("rate")
-            + abs(by.torque) * of("T")
-        )
+        with f_v and f_z its responses to a step of v and of z; the parts without and with tau, summed.
+        """
+        by, contact, push = self.by, self.contact, self.Ms / self.contact.J1
+        c, d, twice, square = contact.c, contact.d, 2.0 * contact.zeta, contact.Omega**2
+        x = np.arange(1, by.of_T.size + 1) / by.of_T.size
+        still, growing = 0.0, 0.0
+        for inner, outer, f_v, f_z in (  # weights at the shares and at the end, (f, f') at 0
+            (by.of_T, float(by.tail.sum()) + abs(by.torque), (d, c - twice * d), (c, -d * square)),
+            (by.of_z, 0.0, (0.0, c), (c, 0.0)),
+            (0.0 * x, abs(self.of_rate), (1.0, -twice), (0.0, -square)),
+        ):
+            rate, bent = contact.swing(*f_v)
+            moved = fastest * bent + abs(self.z0) * contact.swing(*f_z)[1] + push * rate
+            still += float(np.abs(inner) @ x**2 + outer) * moved
+            growing += float(np.abs(inner) @ x**3 + outer) * push * bent / 3.0
+        return still, growing
 
 
-def _entry_cells(first: float, last: float, near: float | None) -> Vector:
-    """Edges of the cells of te: finest at the first instant, where the least v falls steepest, and `near`."""
-    if last <= first:
-        return np.array([first, first])
-    x = np.linspace(0.0, 1.0, ENTRY_CELLS + 1)
-    edges = [first + (last - first) * x * x]
-    if near is not None and first < near < last:
-        edges += [near + (last - near) * x**3, near - (near - first) * x**3]
-    return np.unique(np.concatenate(edges))
+def _after(contact: Contact) -> Vector:
+    """Times from now on, at which no torque of 0 or more makes T lower than coasting does."""
+    return np.linspace(0.0, min(contact.half_period, math.pi / contact.Omega), TAIL + 1)[1:]
+
+
+# good multipliers: linear programs --------------------------------------------------------------------------
+
+
+class _Program:
+    """A contact of duration tau, entered in the cell k of te, with u constant in each of n even steps:
+
+        minimise P   subject to   T(s_j) <= P, T(s_j) >= 0          (dead zone: -P <= T(s_j), z(s_j) >= 0)
+                                  w2(tau) = target, and             (synchronous) z'(tau) = 0
+                                                                    (steady) also T(tau) = Mc
+                                                                    (reached) T of the coasting tail <= P
+                                  slowest <= v <= fastest,  0 <= u <= Ms
+
+    Variables without dimension: u/Ms, v c/(Omega Ms), P/Ms; s_j: the ends of `parts` equal parts of a step.
+    """
+
+    def __init__(self, problem: Problem, cells: Entries, k: int, tau: float, n: int, parts: int) -> None:
+        self.n, self.reached = n, problem.terminal == "reached"
+        contact, Ms, W = Contact.of(problem.drive), problem.highest_torque, problem.target
+        c, Omega, twice, z0 = contact.c, contact.Omega, 2.0 * contact.zeta, cells.z0
+        damped, scale, push = contact.d * Omega / c, Ms * Omega / c, contact.Mc / contact.J2
+        s = tau / (n * parts) * np.arange(n * parts + 1)
+        H, h, dh = contact.responses(s)
+        lag = np.arange(1, s.size)[:, None] - parts * np.arange(n)[None, :]
+
+        def rows(by_z: Vector, by_v: Vector, by_u: Vector) -> tuple[Matrix, Vector]:
+            """(matrix of the variables, constant), from the responses to z0, to v and to a step of u/J1."""
+            u = (by_u[np.maximum(lag, 0)] - by_u[np.maximum(lag - parts, 0)]) / contact.J1
+            matrix = np.column_stack([u, by_v[1:] * scale / Ms, np.zeros(n * parts)])
+            return matrix, (by_z[1:] * z0 + by_u[1:] * push) / Ms
+
+        self.z = z = rows(c * (dh + twice * h), c * h, c * H)  # c z/Ms
+        rate = rows(-c * Omega * h, c / Omega * dh, c / Omega * h)  # c z'/(Omega Ms)
+        self.T = z[0] + damped * rate[0], z[1] + damped * rate[1]
+        self.pulls = problem.drive.contact_law == "dead-zone" and contact.d > 0.0
+        A, by_v, by_load, by_z = contact.torque(tau + _after(contact), np.linspace(0.0, tau, n + 1))
+        self.tail = np.column_stack([A, by_v * scale / Ms, np.zeros(TAIL)]), (by_load + by_z * z0) / Ms
+        # w2 by momentum: J1 w1 + J2 w2 is what the torques brought
+        total, own = (contact.J1 + contact.J2) * W, contact.J1 * scale
+        w2 = (np.append(np.full(n, Ms * tau / n), [own, 0.0]) - own * rate[0][-1]) / total
+        rest = float(cells.load_speed[k + 1]) / W - (contact.Mc * tau + own * rate[1][-1]) / total
+        equations = [
+            (w2, 1.0 - rest, Ms / W),
+            (rate[0][-1], -rate[1][-1], c / Omega),
+            (self.T[0][-1], contact.Mc / Ms - self.T[1][-1], 1.0),
+        ][: {"reached": 1, "synchronous": 2, "steady": 3}[problem.terminal]]
+        self.equal, self.value, self.units = (np.array(one) for one in zip(*equations, strict=True))
+        self.box = np.tile([0.0, 1.0], (n + 2, 1))
+        self.box[n:] = np.sort([cells.slowest[k], cells.fastest[k]]) / scale, (0.0, np.inf)  # rounding
+
+    def solve(self, spans: int = 1, kept: Indices | None = None) -> _Multipliers | None:
+        """The best multipliers, of means of T over so many instants each, and of T at the instants `kept`."""
+        single = np.zeros(0, dtype=np.int64) if kept is None else kept
+
+        def chosen(rows: Matrix) -> Matrix:
+            return np.concatenate([rows.reshape(-1, spans, *rows.shape[1:]).mean(axis=1), rows[single]])
+
+        def spread(worth: Vector) -> Vector:
+            count = worth.size - single.size
+            at = np.repeat(worth[:count] / spans, spans)
+            at[single] += worth[count:]
+            return at
+
+        P, (T, T0), (z, z0) = np.append(np.zeros(self.n + 1), 1.0), map(chosen, self.T), map(chosen, self.z)
+        limits = [(T - P, -T0), (-T - self.pulls * P, T0)]
+        limits += [(-z, z0)] if self.pulls else []
+        limits += [(self.tail[0] - P, -self.tail[1])] if self.reached else []
+        found = _worth(P, limits, self.equal, self.value, self.box)
+        if found is None:
+            return None
+        worth, equal = found
+        peak, low = spread(worth[0]), spread(worth[1])
+        of_z = -spread(worth[2]) if self.pulls else np.zeros(low.size)
+        tail = worth[-1] if self.reached else np.zeros(TAIL)
+        total = float(peak.sum() + self.pulls * low.sum() + tail.sum())
+        if not total > 0.0:
+            return None
+        ends = np.append(equal * self.units / total, [0.0, 0.0])[:3]
+        return _Multipliers((peak - low) / total, of_z / total, tail / total, *ends.tolist())
+
+
+def _worth(
+    cost: Vector, blocks: list[tuple[Matrix, Vector]], equal: Matrix, value: Vector, box: Matrix
+) -> tuple[list[Vector], Vector] | None:
+    """What the limits A x <= b of each block, and the equations, are worth at the least cost in the box.
+
+    The equations may be missed at a price, so that there always is an answer.
+    """
+    import casadi
+
+    missed, right = value.size, np.concatenate([b for _, b in blocks])
+    slack = np.hstack([np.eye(missed), -np.eye(missed)])
+    above = [np.vstack([A for A, _ in blocks]), np.zeros((right.size, 2 * missed))]
+    rows = np.block([above, [equal, slack]])
+    sparse = casadi.sparsify(casadi.DM(rows))
+    least, most = np.vstack([box, np.tile([0.0, np.inf], (2 * missed, 1))]).T
+    program: dict[str, Any] = {"a": sparse.sparsity(), "h": casadi.Sparsity(rows.shape[1], rows.shape[1])}
+    quiet: dict[str, Any] = {"highs": {"output_flag": False, "presolve": "off"}, "error_on_fail": False}
+    solver = casadi.conic("program", "highs", program, quiet)
+    out = solver(
+        g=np.append(cost, np.full(2 * missed, PRICE)), a=sparse, lbx=least, ubx=most,
+        lba=np.append(np.full(right.size, -np.inf), value), uba=np.append(right, value),
+    )  # fmt: skip
+    if not solver.stats()["success"]:
+        return None
+    worth = np.asarray(out["lam_a"], dtype=np.float64).ravel()
+    sizes = np.cumsum([b.size for _, b in blocks])
+    return np.split(np.maximum(worth[: right.size], 0.0), sizes[:-1]), -worth[right.size :]
+
+
+# all entries and durations ----------------------------------------------------------------------------------
 
 
 class _Search:
     """Cells of tau (splitting) times cells of te (fixed), and the sets of multipliers found so far."""
 
-    def __init__(self, problem: Problem, goal: float, entry_near: float | None = None) -> None:
-        assert problem.start_time is not None
-        self.problem, self.goal, self.end = problem, goal, float(problem.start_time)
-        self.near = entry_near
-        self.entry = entry_of(problem)
-        self.first = self.entry.earliest
-        last = min(self.entry.latest, self.end)
-        self.edges = _entry_cells(self.first, last, entry_near)
-        starts, ends = self.edges[:-1], self.edges[1:]
-        self.low = self.entry.slowest(ends)
-        self.high = self.entry.fastest_between(starts, ends)
-        self.missing = problem.target - self.entry.load_speed(self.edges)
-        self.fastest = float(np.max(self.high))
-        contact = Contact.of(problem.drive)
-        coasting = min(contact.half_period, math.pi / contact.Omega)  # after t_f
-        self.envelope = _Envelope(contact, self.end + coasting)
-        self.impact = self._impact()
+    def __init__(self, problem: Problem, cells: Entries, goal: float, near: float | None = None) -> None:
+        self.problem, self.cells, self.goal = problem, cells, goal
+        self.end = (problem.start_time or 0.0) * (1.0 + ROUNDING)
+        self.longest = self.end - float(cells.te[0])
+        self.near = float(cells.te[0]) + 0.1 * self.longest if near is None else near
+        self.missing = problem.target - cells.load_speed
+        self.contact = contact = Contact.of(problem.drive)
+        # the peak that the entry alone brings: T is nowhere below that of coasting from the least v
+        _, by_v, by_load, by_z = contact.torque(np.append(0.0, _after(contact)), np.zeros(2))
+        self.coasting = np.max(np.outer(cells.slowest, by_v) + by_load + by_z * cells.z0, axis=1)
         self.duals: list[_Dual] = []
-        # of each cell the bounds so far, and the sets of multipliers that they are from
+        self.low: list[tuple[float, float]] = []  # (te, tau) of programs that came no further than the goal
+        # for each cell of tau: the bounds so far in the cells of te, the multipliers tried
         self.seen: dict[tuple[float, float], tuple[Vector, set[int]]] = {}
 
-    def _impact(self) -> Vector:
-        """The peak that the entry alone brings, N m: T is nowhere below that of coasting from the least v."""
-        contact = self.envelope.contact
-        s = np.linspace(0.0, min(contact.half_period, math.pi / contact.Omega), 201)
-        _, a_v, a_0, a_z = contact.torque(s, np.array([0.0, 1.0]))
-        rest = a_0 + a_z * self.entry.z0
-        worst = np.max(self.low[:, None] * a_v[None, :] + rest[None, :], axis=1)
-        return np.asarray(worst)
-
-    def bound(self, known: Sequence[tuple[Multipliers, float]] = ()) -> float:
-        """The least bound over all cells, N m; it begins with `known` multipliers, with their contacts."""
-        if self.first >= self.end:
-            return math.inf
-        longest = self.end - self.first
-        near = self.near if self.near is not None else self.first + 0.1 * longest
-        self.duals = [
-            _Dual(self.problem, self.entry, by, self.envelope, self.fastest, tau) for by, tau in known
-        ]
-        if not known:
-            self._program(near, self.end - near)
-        heap: list[tuple[float, float, float]] = []
-        for a, b in zip(*self._cells(longest), strict=True):
-            self._push(heap, a, b)
-        done = math.inf
-        splits, before = 0, list[float]()
-        while splits < MOST_CELLS:
+    def least(self) -> float:
+        """The least bound over all cells, N m."""
+        k = int(np.clip(np.searchsorted(self.cells.te, self.near) - 1, 0, self.cells.slowest.size - 1))
+        self._program(k, self.end - self.near)
+        edges = self.longest * (1.0 - np.linspace(1.0, 0.0, FIRST_CELLS + 1) ** 2)  # finer at the end
+        heap = sorted((self._cell(a, b)[0], a, b) for a, b in pairwise(edges.tolist()))
+        for _ in range(MOST_CELLS):
             value, a, b = heapq.heappop(heap)
-            if value >= done:
-                return done
-            if value >= self.goal:  # enough; as much as all multipliers prove is said
-                most = self._cell(a, b, all_of_them=True)[0]
-                if most == value:
-                    return value
-                heapq.heappush(heap, (most, a, b))
-                continue
-            splits += 1
+            if value >= self.goal:
+                return value
             value, k = self._cell(a, b)  # multipliers may have come since
-            if value < self.goal and not self._loose(a, b, k) and len(self.duals) < MOST_PROGRAMS:
-                if len(before) >= FEW and value - before[-FEW] < LITTLE * self.goal:
-                    return min(value, done, *(lowest for lowest, _, _ in heap[:1]))
-                before.append(value)
-                self._program(float(self.edges[k + 1]), b)
-                value, k = self._cell(a, b)
+            narrow = b - a <= NARROWEST * self.longest
+            on_time = narrow or float(self.cells.te[k]) + b <= self.end * (1.0 + NARROWEST)
+            if value < self.goal and on_time and self._best(self.duals, k, b) < self.goal:
+                if self._program(k, b):
+                    value, k = self._cell(a, b)
+                else:  # as good as it gets here
+                    self.goal = min(self.goal, self._best(self.duals, k, b) * (1.0 - FLAT))
+            if narrow:
+                self.goal = min(self.goal, value)
             if value >= self.goal:
                 heapq.heappush(heap, (value, a, b))
-            elif b - a > NARROWEST * longest:
-                middle = 0.5 * (a + b)
-                self._push(heap, a, middle)
-                self._push(heap, middle, b)
             else:
-                done = min(done, value)  # as good as it gets here
-            if not heap:
-                return done
-        return min(done, heap[0][0])
+                for half in ((a, 0.5 * (a + b)), (0.5 * (a + b), b)):
+                    heapq.heappush(heap, (self._cell(*half)[0], *half))
+        return heap[0][0]
 
-    def _cells(self, longest: float) -> tuple[list[float], list[float]]:
-        """First cells of tau, finer towards the longest."""
-        edges = longest * (1.0 - (1.0 - np.linspace(0.0, 1.0, FIRST_CELLS + 1)) ** 2)
-        return edges[:-1].tolist(), edges[1:].tolist()
+    def _best(self, duals: Sequence[_Dual], k: int, tau: float) -> float:
+        """The most that some multipliers prove of the cell k of te with this very tau."""
+        values = [float(self._proved(one, tau, tau, slice(k, k + 1))[0]) for one in duals]
+        return max(values, default=-math.inf)
 
-    def _push(self, heap: list[tuple[float, float, float]], a: float, b: float) -> None:
-        heapq.heappush(heap, (self._cell(a, b)[0], a, b))
-
-    def _loose(self, a: float, b: float, k: int) -> bool:
-        """Whether the cell's width costs too much: by curvature, or by reaching past the start time."""
-        if b - a <= NARROWEST * self.end:
-            return False
-        if float(self.edges[k]) + b > self.end + 1e-6 * self.end:
-            return True
-        bend = min((dual.curvature(b) for dual in self.duals), default=0.0)
-        return bend * (b - a) ** 2 / 8.0 > 1e-4 * self.goal
-
-    def _cell(self, a: float, b: float, all_of_them: bool = False) -> tuple[float, int]:
+    def _cell(self, a: float, b: float) -> tuple[float, int]:
         """Bound over tau from a to b and all te that leave that much time; the te cell where it is least.
 
-        Multipliers are tried, the nearest first, until the bound is enough, or `all_of_them`.
+        Multipliers are tried, the nearest first, until the bound is enough.
         """
-        count = int(np.searchsorted(self.edges[:-1], self.end - a, side="right"))
-        count = max(min(count, self.low.size), 1)
+        count = max(int(np.searchsorted(self.cells.te[:-1], self.end - a, side="right")), 1)
         if (a, b) not in self.seen:
             need = np.minimum(self.missing[:-1], self.missing[1:])[:count]
-            plain = self.problem.drive.Mc + self.problem.drive.J2 * need / b
-            self.seen[a, b] = np.maximum(plain, self.impact[:count]), set()
+            plain = self.contact.Mc + self.contact.J2 * need / b
+            self.seen[a, b] = np.maximum(plain, self.coasting[:count]) * (1.0 - ROUNDING), set()
         best, tried = self.seen[a, b]
-        if tried or float(best.min()) < self.goal:  # else no multipliers are needed here
-            left = [k for k in range(len(self.duals)) if k not in tried]
-            for k in sorted(left, key=lambda k: abs(self.duals[k].tau - b)):
-                if not all_of_them and float(best.min()) >= self.goal:
-                    break
-                found = self._dual(self.duals[k], a, b, count)
-                self.duals[k].worth += bool(np.any(found > best))
-                best = np.maximum(best, found)
-                tried.add(k)
+        left = [k for k in range(len(self.duals)) if k not in tried]
+        for k in sorted(left, key=lambda k: abs(self.duals[k].tau - b)):
+            if float(best.min()) >= self.goal:
+                break
+            best = np.maximum(best, self._proved(self.duals[k], a, b, slice(count)))
+            tried.add(k)
         self.seen[a, b] = best, tried
         k = int(np.argmin(best))
         return float(best[k]), k
 
-    def _dual(self, dual: _Dual, a: float, b: float, count: int) -> Vector:
-        speed = dual.by.speed
-        by_te = np.minimum(speed * self.missing[:-1], speed * self.missing[1:])[:count]
-        ends = []
-        for tau in (a, b):
-            fixed, a_v = dual.at(tau)
-            by_v = np.minimum(a_v * self.low[:count], a_v * self.high[:count])
-            ends.append(fixed + by_v)
-        lowest: Vector = np.minimum(*ends) + by_te - dual.curvature(b) * (b - a) ** 2 / 8.0
+    def _proved(self, dual: _Dual, a: float, b: float, cells: slice) -> Vector:
+        """The bound over tau from a to b of some of the cells of te, by one set of multipliers."""
+        low, high = self.cells.slowest[cells], self.cells.fastest[cells]
+        ends = [fixed + np.minimum(by_v * low, by_v * high) for fixed, by_v in (dual.at(a), dual.at(b))]
+        by_te = np.minimum(dual.by.speed * self.missing[:-1][cells], dual.by.speed * self.missing[1:][cells])
+        lowest: Vector = np.minimum(*ends) + by_te - (dual.still + dual.growing * b) * (b - a) ** 2 / 8.0
         return np.where(np.isfinite(lowest), lowest, -math.inf)  # numbers that overflow prove nothing
 
-    def _program(self, te: float, tau: float) -> None:
-        """New multipliers from linear programs at (te, tau).
+    def _program(self, k: int, tau: float) -> bool:
+        """New multipliers by linear programs at the end of the cell k of te; False where there are no better.
 
-        A coarse one shows at which instants the limits are worth much; a fine one, with means of T over
-        spans instead of T at instants elsewhere, gives multipliers without the ripple of the coarse grid.
+        A coarse one shows at which instants the limits are worth much; a fine one, with means of T over its
+        steps instead of T at instants elsewhere, gives multipliers without the ripple of the coarse grid.
+        Where that is not enough the next one has more steps; for a damped shaft, as q jumps, more instants.
         """
+        te = float(self.cells.te[k + 1])
         tau = min(tau, self.end - te)
-        if tau <= 0.0:
-            return
-        coarse = max(PROGRAM_STEPS, int(0.75 * self.envelope.contact.Omega * tau))
-        if coarse > MOST_STEPS:
-            return  # so many elastic periods that momentum alone is as good
-        answer = ContactProgram(self.problem, tau, coarse, None, HALVES, 0.0).solve(te, elastic=PRICE)
-        if answer is None:
-            return
-        by = answer.multipliers
-        grid = np.linspace(0.0, 1.0, 4 * coarse + 1)
-        shares = (grid[:-1, None] + np.diff(grid)[:, None] * np.array(HALVES)).ravel()
-        spans = np.kron(np.eye(coarse), np.full((1, shares.size // coarse), coarse / shares.size))
-        kept = np.zeros(shares.size, dtype=bool)
-        for worth in (by.peak, by.trough, by.closed):
-            if worth.sum() > 0.0:
-                for share in by.share[worth > ATOM * worth.sum()]:
-                    kept |= np.abs(shares - share) < 1.01 / coarse
-        mix = np.vstack([spans, np.eye(shares.size)[kept]])
-        fine = ContactProgram(self.problem, tau, grid, mix, HALVES, 0.0).solve(te, elastic=PRICE)
-        if fine is not None:
-            by = fine.multipliers
-        if math.isclose(float(by.peak.sum() + by.trough.sum() + by.tail.sum()), 1.0, rel_tol=1e-9):
-            self.duals.append(_Dual(self.problem, self.entry, by, self.envelope, self.fastest, tau))
+        again = sum(abs(te - one) + abs(tau - other) < CLOSE * self.longest for one, other in self.low)
+        n = max(STEPS, int(0.75 * self.contact.Omega * tau))
+        if tau <= 0.0 or n > MOST_STEPS or again >= AGAIN or len(self.duals) >= MOST_PROGRAMS:
+            return False  # of so many elastic periods momentum alone is as good
+        more = (1.0, 2**again) if self.contact.d > 0.0 else (1.5**again, 1)
+        n, parts = min(int(n * more[0]), MOST_STEPS), 2 * more[1]
+        by = _Program(self.problem, self.cells, k, tau, n, 2).solve()
+        if by is None:
+            return False
+        parted = np.maximum([by.of_T, -by.of_T, -by.of_z], 0.0)
+        atoms = np.flatnonzero(np.any(parted > ATOM * parted.sum(axis=1)[:, None], axis=0))
+        part = FINER * parts // 2  # instants of the fine program for each of the coarse one
+        kept = np.unique(np.add.outer(part * atoms, np.arange(-part - 1, 3 * part)))
+        kept = kept[(kept >= 0) & (kept < 2 * n * part)]
+        fine = _Program(self.problem, self.cells, k, tau, FINER * n, parts).solve(FINER * parts, kept)
+        self.duals.append(_Dual(self.problem, self.cells, fine or by, tau))
+        if self._best(self.duals[-1:], k, tau) < (1.0 + CLOSE) * self.goal:
+            self.low.append((te, tau))
+        return True

@@ -13,32 +13,29 @@ from typing import IO, Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.model import Chain
+from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller, ready_controller_names
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.optimal.problem import Problem, Terminal, problem_of
-from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
-from softstart.optimal.shortest import shortest_start_time
-from softstart.optimal.solving import optimize
+from softstart.optimal.optimize import optimize, shortest_start_time
+from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.result import InfeasibleError, Optimum, OptimumError, Verdict
 from softstart.processes import Pool, checked_workers
+from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
 
 notebook = late("softstart.views.notebook")
 optima = late("softstart.views.optima")  # it draws results of this module
-chains = late("softstart.optimal.chains.problem")
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
 
 YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
 SHORT, LONG, COUNT = 1.02, 1.6, 12
-QUICKEST = 1.08  # first start time of a chain, or of an unknown position, over that of direct: what is
-# shortest is not known there
+CHUNKS = 2  # stretches of start times for each worker
 
 
 @dataclass(frozen=True)
@@ -106,15 +103,6 @@ class FrontPoint:
     def not_found(cls, why: str, start_time: float, terminal: str) -> FrontPoint:
         """The point of a start time for which the method failed."""
         return cls(start_time, terminal, "NOT_FOUND", why)
-
-    def proved_by(self, other: FrontPoint) -> FrontPoint:
-        """The same point with the lower bound of another one, whose starts include those of this one."""
-        return replace(
-            self,
-            k_dyn_lower_bound=other.k_dyn_lower_bound,
-            bound_kind=other.bound_kind,
-            bound_covers=other.bound_covers,
-        )
 
     def for_shorter(self, start_time: float) -> FrontPoint:
         """The point of a start time shorter than this one, where this one is infeasible already."""
@@ -205,7 +193,7 @@ class Front:
     docs/optimal-starts.md; the optimum at each start time: docs/theory/optimum.md.
     """
 
-    drive: Any  # Drive or Chain
+    drive: Machine
     terminal: Terminal
     points: tuple[FrontPoint, ...]
     controllers: tuple[ControllerPoint, ...]
@@ -263,15 +251,14 @@ class Front:
 
 
 def pareto(
-    drive: Drive | Chain,
+    drive: Machine,
     start_times: Sequence[float] | None = None,
     *,
     terminal: Terminal = "reached",
     controllers: Sequence[str | Controller] | None = None,
-    method: str = "auto",
     torque_speed: tuple[tuple[float, float], ...] = (),
     smoothness: float = 0.0,
-    base: Drive | Chain | None = None,
+    base: Machine | None = None,
     save_to: str | Path | None = None,
     progress: Progress | None = None,
     each: Callable[[FrontPoint], object] | None = None,
@@ -280,16 +267,15 @@ def pareto(
 ) -> Front:
     """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
-    The sweep goes from long start times to short ones, on a chain from short to long ones. An optimum by
-    collocation, or of a chain, starts from the one before, so such points are computed one after another; all
-    others at once. The results do not depend on who computes them. Start times too short for any start are
-    marked infeasible, no error.
+    The sweep goes from long start times to short ones; each optimum is one more first demand for the next
+    one. Several workers have a stretch of start times each. No point is left above one of a shorter start
+    time, as a start may arrive early, and no bound below that of a longer one. Start times too short for any
+    start are marked infeasible, no error.
 
     Parameters
     ----------
     drive : Drive or Chain
-        The drive, or the chain: of its local optima each starts from that of the next shorter start time and
-        from the strategies, the best of these.
+        The machine.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
     terminal : {"synchronous", "steady", "reached"}
@@ -298,14 +284,12 @@ def pareto(
         What to put beside the curve; by default all installed controllers that run without being given a
         parameter, none for an empty list. Each is simulated, and judged by the optimum at its own start time
         with terminal `reached`: the fair yardstick.
-    method : {"auto", "closed-form", "lp", "collocation"}
-        As in `optimize`.
     torque_speed : sequence of (float, float)
         Corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
     smoothness : float
         Weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
-    base : Drive, optional
-        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
+    base : Drive or Chain, optional
+        The machine to whose mean shaft torque K_dyn refers, if not `drive`.
     save_to : str or path, optional
         A file in which each finished point is kept at once. A second call with the same inputs takes them
         from there; other inputs are refused.
@@ -344,166 +328,136 @@ def pareto(
     ----------
     docs/optimal-starts.md; each point: `optimize`.
     """
-    asked_for: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
-    problem_of(drive, 1.0, terminal, method=method, **asked_for)
+    options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    Problem(drive, 1.0, terminal, **options)
     times = None if start_times is None else _checked(start_times)
     made = [
         make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
     ]
-    inputs = _inputs(drive, base, terminal, method, torque_speed, smoothness)
+    inputs = _inputs(drive, base, terminal, torque_speed, smoothness)
     count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
-    start: Any = simulate  # of drives and of chains
-    runs = [start(drive, one, base=base) for one in made]
+    runs = [simulate(drive, one, base=base) for one in made]
     if times is None:
         _tell(progress, "looking for the shortest start time")
         times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
-    options = {"method": method, **asked_for}
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
-    asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
+    found: dict[tuple[Terminal, float], FrontPoint] = {}
     with (
         Records(target, inputs, ["terminal", "start_time_bound"]) as saved,
-        Pool(
-            count, scheduler=scheduler, describe=PointAsked.__str__, kept="Finished points are kept."
-        ) as pool,
+        Pool(count, scheduler=scheduler, describe=Stretch.__str__, kept="Finished points are kept.") as pool,
     ):
-        found = _Sweep(drive, options, saved, progress, each, pool).through(asked)
-    points = tuple(found[terminal, t] for t in times)
-    if not any(point.found for point in points) and any(point.status == "NOT_FOUND" for point in points):
-        raise OptimumError(next(point.status_text for point in points if point.status == "NOT_FOUND"))
-    return Front(drive, terminal, points, tuple(_beside(run, found) for run in runs))
+        for ending in dict.fromkeys([terminal, YARDSTICK]):
+            asked = {*(times if ending == terminal else ()), *(own if ending == YARDSTICK else ())}
+            points = list(
+                _swept(
+                    drive, options, ending, sorted(asked, reverse=True), saved, pool, count, progress, each
+                )
+            )
+            found |= {(ending, t): point for t, point in _monotone(points)}
+    curve = tuple(found[terminal, t] for t in times)
+    if not any(point.found for point in curve) and any(point.status == "NOT_FOUND" for point in curve):
+        raise OptimumError(next(point.status_text for point in curve if point.status == "NOT_FOUND"))
+    return Front(drive, terminal, curve, tuple(_beside(run, found) for run in runs))
 
 
 def default_start_times(
-    drive: Drive | Chain, terminal: Terminal = "reached", count: int = COUNT, **options: Any
+    drive: Machine, terminal: Terminal = "reached", count: int = COUNT, **options: Any
 ) -> list[float]:
-    """`count` start times in s, from 1.02 of the shortest feasible one to 1.6 of that of `direct`.
+    """`count` start times in s, from 1.02 of the shortest found to 1.6 of that of `direct`.
 
-    Where the shortest one cannot be found, that of `direct` stands for it; on a chain 1.08 of that, and where
-    the start position is unknown, with half as many times. Closer together towards the short end, where the
-    curve is steep. `options` go to `Problem`.
+    Closer together towards the short end, where the curve is steep. `options` go to `Problem`.
     """
-    direct = simulate(drive, "direct").start_time
-    shortest = shortest_known(drive, terminal, **options)
-    if shortest is None:
-        shortest, count = direct * QUICKEST / SHORT, count // 2 if len(drive.positions) > 1 else count
-    if not math.isfinite(shortest):
-        shortest = direct
+    shortest = shortest_start_time(Problem(drive, 1.0, terminal, **options))
     if not math.isfinite(shortest):
         raise OptimumError("No start time was found at which there is an optimum; name some to be tried.")
+    direct = simulate(drive, "direct").start_time
     longest = LONG * (direct if LONG * direct > 1.2 * shortest else shortest)  # direct may never get there
     share = np.linspace(0.0, 1.0, count) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
     return times
 
 
-def shortest_known(drive: Drive | Chain, terminal: Terminal, **options: Any) -> float | None:
-    """The shortest feasible start time, s; None of a chain and over several positions: nobody knows it."""
-    if isinstance(drive, Chain) or len(drive.positions) > 1:
-        return None
-    return shortest_start_time(Problem(drive, 1.0, terminal, **options))
+class Stretch(NamedTuple):
+    """Start times that follow each other, long ones first, and a demand to begin with."""
 
-
-class PointAsked(NamedTuple):
-    """A point to be computed, what another one left to start from, and for how long (s) to go on.
-
-    Without a time limit a chain is looked for from all its seeds, a drive until there is an optimum.
-    """
-
-    drive: Drive | Chain
+    drive: Machine
     options: dict[str, Any]
     terminal: Terminal
-    start_time: float
-    warm: Any = None
-    time_limit: float | None = None
+    start_times: tuple[float, ...]
+    near: TorqueProfile | None
 
     def __str__(self) -> str:
-        return f"the optimum for a start time of {self.start_time:.5g} s"
+        return f"the optima for start times of {self.start_times[-1]:.5g} s to {self.start_times[0]:.5g} s"
 
 
-def computed(asked: PointAsked) -> tuple[FrontPoint, Any]:
-    """The point, and what the next one can start from."""
-    terminal, start_time, warm = asked.terminal, asked.start_time, asked.warm
-    why = ""
-    for start in (warm, None) if warm is not None else (None,):
-        from_seeds = start is None and isinstance(asked.drive, Chain)
-        seconds = asked.time_limit if asked.time_limit is not None else math.inf if from_seeds else 0.0
+def computed(asked: Stretch) -> list[FrontPoint]:
+    """The points of a stretch; what is infeasible makes all shorter ones so."""
+    points: list[FrontPoint] = []
+    near = asked.near
+    for start_time in asked.start_times:
+        if points and points[-1].status == "INFEASIBLE":
+            points.append(points[-1].for_shorter(start_time))
+            continue
         try:
-            best = optimize(
-                asked.drive, start_time, terminal=terminal, warm=start, time_limit=seconds, **asked.options
-            )
+            best = optimize(asked.drive, start_time, terminal=asked.terminal, near=near, **asked.options)
         except InfeasibleError as error:
-            return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
-        except (OptimumError, NotConverged) as error:
-            why = str(error)
-            continue  # where the warm start failed, it is tried without
-        return FrontPoint.of_optimum(best, start_time), best.warm
-    return FrontPoint.not_found(why, start_time, terminal), None
+            points.append(FrontPoint.of_verdict(error.verdict, start_time, asked.terminal))
+        except OptimumError as error:
+            points.append(FrontPoint.not_found(str(error), start_time, asked.terminal))
+        else:
+            points.append(FrontPoint.of_optimum(best, start_time))
+            near = best.profile
+    return points
 
 
-@dataclass(frozen=True)
-class _Sweep:
-    """Optima for many start times: of drives the longest first, of chains the shortest.
-
-    An answer of a chain, stretched over more time, leads to a good local optimum; pressed into less time it
-    misses the target. Of a drive, what is impossible in a long time needs no search in a shorter one.
-    """
-
-    drive: Drive | Chain
-    options: dict[str, Any]
-    saved: Records
-    progress: Progress | None
-    each: Callable[[FrontPoint], object] | None
-    pool: Pool
-
-    def through(self, asked: set[tuple[Terminal, float]]) -> dict[tuple[Terminal, float], FrontPoint]:
-        """All points asked for."""
-        found: dict[tuple[Terminal, float], FrontPoint] = {}
-        first = 1.0 if isinstance(self.drive, Chain) else -1.0
-        order = sorted(asked, key=lambda one: (one[0], first * one[1]))
-        for terminal in dict.fromkeys(terminal for terminal, _ in order):
-            chain = _Chain(self, terminal, [t for other, t in order if other == terminal])
-            too_short: FrontPoint | None = None
-            for start_time in chain.start_times:
-                record = self.saved.find(terminal, start_time)
-                if record is not None:
-                    point = FrontPoint.of_record(record)
-                elif too_short is not None:  # what no longer start time allowed, no shorter one does
-                    point = too_short.for_shorter(start_time)
-                else:
-                    number = order.index((terminal, start_time)) + 1
-                    _tell(
-                        self.progress, f"start time {number} of {len(order)}: {start_time:.5g} s, {terminal}"
-                    )
-                    point = chain.computed(start_time)
-                    if point.status != "NOT_FOUND":  # another attempt may find it
-                        self.saved.add(point.record())
-                if point.status == "INFEASIBLE" and first < 0.0:
-                    too_short = point
-                    chain.stopped = True
-                found[terminal, start_time] = point
-                if self.each is not None:
-                    self.each(point)
-            longest_first = sorted(chain.start_times, reverse=True)
-            found |= {(terminal, t): point for t, point in _monotone(found, terminal, longest_first)}
-        return found
+def _swept(
+    drive: Machine, options: dict[str, Any], terminal: Terminal, times: list[float], saved: Records,
+    pool: Pool, workers: int, progress: Progress | None, each: Callable[[FrontPoint], object] | None,
+) -> Iterator[FrontPoint]:  # fmt: skip
+    """The points of one terminal condition, those kept before first."""
+    known = {t: FrontPoint.of_record(one) for t in times if (one := saved.find(terminal, t)) is not None}
+    for point in known.values():
+        _told(each, point)
+        yield point
+    missing = [t for t in times if t not in known]
+    if workers == 1:
+        near: TorqueProfile | None = None
+        too_short = next((one for one in known.values() if one.status == "INFEASIBLE"), None)
+        for number, t in enumerate(missing, start=1):
+            _tell(progress, f"start time {number} of {len(missing)}: {t:.5g} s, {terminal}")
+            if too_short is not None and t < too_short.start_time_bound:
+                point = too_short.for_shorter(t)
+            else:
+                (point,) = computed(Stretch(drive, options, terminal, (t,), near))
+            near = TorqueProfile(point.time, point.torque) if point.found else near
+            too_short = point if point.status == "INFEASIBLE" else too_short
+            if point.status != "NOT_FOUND":  # another attempt may find it
+                saved.add(point.record())
+            _told(each, point)
+            yield point
+        return
+    size = max(1, math.ceil(len(missing) / (CHUNKS * workers)))
+    chunks = [tuple(missing[i : i + size]) for i in range(0, len(missing), size)]
+    asked = [Stretch(drive, options, terminal, one, None) for one in chunks]
+    for stretch, points in pool.results(computed, asked):
+        _tell(progress, str(stretch))
+        for point in points:
+            if point.status != "NOT_FOUND":
+                saved.add(point.record())
+            _told(each, point)
+            yield point
 
 
-def _monotone(
-    found: dict[tuple[Terminal, float], FrontPoint], terminal: Terminal, start_times: list[float]
-) -> Iterator[tuple[float, FrontPoint]]:
-    """The points: none above one of a shorter start time, no bound below that of a longer one.
+def _told(each: Callable[[FrontPoint], object] | None, point: FrontPoint) -> None:
+    if each is not None:
+        each(point)
 
-    A start may arrive early, so that it counts for every longer time as well; and what no start of a longer
-    time can do, none of a shorter one can.
-    """
-    proof, proved = FrontPoint(math.inf, terminal, "NOT_FOUND", ""), []
-    for point in (found[terminal, t] for t in start_times):
-        if point.found and (point.k_dyn_lower_bound or 0.0) >= (proof.k_dyn_lower_bound or 0.0):
-            proof = point
-        proved.append(point if point.status == "INFEASIBLE" else point.proved_by(proof))
+
+def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]]:
+    """The points, none above one of a shorter start time: a start may arrive early."""
     gentlest: FrontPoint | None = None
-    for point in reversed(proved):
+    for point in sorted(points, key=lambda one: one.start_time_bound):
         known = math.inf if point.k_dyn is None else point.k_dyn
         if gentlest is None or gentlest.k_dyn is None or known <= gentlest.k_dyn:
             gentlest = point if point.found else gentlest
@@ -515,49 +469,8 @@ def _monotone(
                 why=f"the start for {gentlest.start_time_bound:.6g} s is gentler, and may arrive early",
                 seconds=point.seconds,
             )
-            yield point.start_time_bound, early.proved_by(point)
-
-
-class _Chain:
-    """Points of one terminal condition, in the order of the sweep.
-
-    A point of the collocation, and of a chain, leaves something for the next one to start from: these are
-    computed one after another. Where the first point leaves nothing, the others are computed in advance.
-    """
-
-    def __init__(self, sweep: _Sweep, terminal: Terminal, start_times: list[float]) -> None:
-        self.sweep, self.terminal, self.start_times = sweep, terminal, start_times
-        self.stopped = False  # the last point was infeasible, and so are all shorter ones
-        self._warm: Any = None
-        self._ahead: Iterator[tuple[PointAsked, tuple[FrontPoint, Any]]] | None = None
-        self._done: dict[float, tuple[FrontPoint, Any]] = {}
-
-    def computed(self, start_time: float) -> FrontPoint:
-        """The point of a start time."""
-        results = self.sweep.pool.results
-        if self._warm is None and self._ahead is not None:
-            while start_time not in self._done:
-                asked, answer = next(self._ahead, (None, None))
-                if asked is None or answer is None:
-                    break  # it was not computed in advance
-                self._done[asked.start_time] = answer
-        if self._warm is not None or start_time not in self._done:
-            ((_, answer),) = results(computed, [self._point(start_time, self._warm)])
-            self._done[start_time] = answer
-        point, self._warm = self._done[start_time]
-        if self._ahead is None and self._warm is None:
-            self._ahead = results(computed, self._shorter_than(start_time))
-        return point
-
-    def _shorter_than(self, start_time: float) -> Iterator[PointAsked]:
-        for other in self.start_times:
-            if self.stopped or self._warm is not None:
-                return
-            if other < start_time and self.sweep.saved.find(self.terminal, other) is None:
-                yield self._point(other)
-
-    def _point(self, start_time: float, warm: Any = None) -> PointAsked:
-        return PointAsked(self.sweep.drive, self.sweep.options, self.terminal, start_time, warm)
+            bounds = ("k_dyn_lower_bound", "bound_kind", "bound_covers")
+            yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
 
 
 def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:
@@ -568,10 +481,9 @@ def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> Contro
 
 
 def _inputs(
-    drive: Drive | Chain,
-    base: Drive | Chain | None,
+    drive: Machine,
+    base: Machine | None,
     terminal: str,
-    method: str,
     corners: Any,
     smoothness: float,
 ) -> dict[str, Any]:
@@ -581,7 +493,6 @@ def _inputs(
         "drive": drive.to_toml(),
         "base drive": base.to_toml() if base else "",
         "terminal": terminal,
-        "method": method,
         "torque-speed limit": [[float(speed), float(torque)] for speed, torque in corners],
         "smoothness": float(smoothness),
     }

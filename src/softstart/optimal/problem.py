@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from numbers import Real
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from softstart.drive import Drive
+import numpy as np
+
+from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.quantities import to_si
 
-_collocation = late("softstart.optimal.collocation.search")  # a module above this one
+if TYPE_CHECKING:
+    from softstart.start.run import Run
 
 Terminal = Literal["synchronous", "steady", "reached"]
 Objective = Literal["k_dyn", "heat", "start_time"]
@@ -64,13 +67,15 @@ class StartTime:
         return f"{self.value:g}x" if self.multiple else f"{self.value:g} s"
 
 
-def usual_terminal(drive: Drive) -> Terminal:
-    """How an optimal start ends if nobody says: `reached` where one profile serves several positions.
+def usual_terminal(machine: Any, several: bool = False) -> Terminal:
+    """How an optimal start ends if nobody says: `synchronous` for one start of two masses, else `reached`.
 
+    >>> from softstart import Drive
     >>> usual_terminal(Drive.load("crane-4amtkf"))
     'synchronous'
     """
-    return "reached" if len(drive.positions) > 1 else "synchronous"
+    two = len(machine.mass_names) == 2 and len(machine.positions) == 1 and not several
+    return "synchronous" if two else "reached"
 
 
 USUAL = StartTime(1.2, multiple=True)  # where a bound is needed and none is given
@@ -83,6 +88,7 @@ REACTS = (  # what is to be said beside a best fixed profile
 def best_start(machine: Any) -> str:
     """What the best torque over time is called: no optimum where the position is unknown, as feedback reacts.
 
+    >>> from softstart import Drive
     >>> best_start(Drive.load("crane-4amtkf")), best_start(Drive.load("long-travel-3kw"))
     ('optimum', 'best fixed profile')
     """
@@ -98,24 +104,30 @@ def best_k_dyn(machine: Any) -> str:
 class Problem:
     """What an optimal start minimises, within which bounds, and how it ends.
 
-        minimise   K_dyn = peak |T| over the whole run / M12avg_base, or heat, or the start time
-        subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
+        minimise   K_dyn = peak |T| over the whole run / base torque, or heat, or the start time
+                   over the motor torque u(t)
+        subject to J_i w_i' = T_(i-1) - T_i - M_i (+ u at the motor's mass), everything at the motor shaft,
+                   T_k = the contact law of shaft k of its twist and its rate w_k - w_(k+1),
+                   lowest_torque <= u <= highest_torque, u <= torque_speed(w_motor), lag and rate limit of u,
                    t_f <= start_time, K_dyn <= k_dyn, heat <= heat
-        and at t_f synchronous: w1 = w2 = target_speed, from then on the shaft torque is held
-                   steady:      also T = Mc; without load torque T = 0, the flanks just touch
-                   reached:     only w2 = target_speed for the first time; the motor coasts until T peaks
+        and at t_f reached:     w_load >= target_speed
+                   synchronous: all w_i = target_speed
+                   steady:      also T_k = the load torques behind shaft k; without load torque T = 0
 
-    The drive's computing_delay is left out: a profile that is known beforehand is sent that much earlier.
-    Where the start position is unknown, one profile serves all: terminal `reached`, K_dyn the worst.
+    The peak is that of all shafts from 0 to one elastic period after t_f; the torque after t_f belongs to the
+    answer. How often and in which order gaps close is left free. The computing delay of a drive is left out:
+    a profile that is known beforehand is sent that much earlier. One torque serves all `scenarios`, and
+    every start position of a machine whose position is unknown; then only `reached` can be asked for, and
+    K_dyn is the largest.
 
     Parameters
     ----------
-    drive : Drive
-        The drive, a single one.
+    drive : Drive or Chain
+        The machine, a single one.
     start_time : float, optional
         Bound on t_f, s; None only where the start time is minimised.
-    terminal : {"synchronous", "steady", "reached"}
-        What holds at t_f.
+    terminal : {"synchronous", "steady", "reached"}, optional
+        What holds at t_f; by default `usual_terminal`.
     minimise : {"k_dyn", "heat", "start_time"}
         `heat` is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque.
     k_dyn, heat : float, optional
@@ -123,11 +135,11 @@ class Problem:
     torque_speed : sequence of (float, float)
         Corners (rad/s, N m) of a concave limit of the motor's torque over its speed.
     smoothness : float
-        Weight in s of integral (du/dt)^2 dt / Ms^2 against K_dyn: makes the demand continuous from 0 on.
-    base : Drive, optional
-        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
-    first_torque, first_demand : float
-        Motor torque at t = 0 and the demand that it follows, N m: not 0 where a brake held the motor before.
+        Weight in s of integral (du/dt)^2 dt / Ms^2 against what is minimised; the demand is continuous.
+    base : Drive or Chain, optional
+        The machine to whose mean shaft torque K_dyn refers, if not `drive`.
+    scenarios : sequence of Drive or Chain
+        Other machines that the same torque is to serve.
 
     Raises
     ------
@@ -136,6 +148,7 @@ class Problem:
 
     Examples
     --------
+    >>> from softstart import Drive
     >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
     >>> problem.terminal, problem.highest_torque, round(problem.base_torque, 2)
     ('synchronous', 62.0, 52.86)
@@ -145,33 +158,27 @@ class Problem:
     The mathematics: docs/theory/optimum.md.
     """
 
-    drive: Drive
+    drive: Any
     start_time: float | None = None
-    terminal: Terminal = "synchronous"
+    terminal: Any = None
     minimise: Objective = "k_dyn"
     k_dyn: float | None = None
     heat: float | None = None
     torque_speed: tuple[tuple[float, float], ...] = ()
     smoothness: float = 0.0
-    base: Drive | None = None
-    first_torque: float = 0.0
-    first_demand: float = 0.0
+    base: Any = None
+    scenarios: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         wrong: list[str] = []
-        drive = self.drive
-        if not isinstance(drive, Drive):
-            raise InputError(f"drive = {drive!r}: give a Drive; Drive.load reads one from a file or by name.")
-        if drive.computing_delay != 0.0:
-            object.__setattr__(self, "drive", drive := drive.replace(computing_delay=0.0))
-        wrong += drive.without_friction("optimal starts and bounds are known without this friction only")
-        if drive.Mc < 0.0:
-            wrong.append(
-                f"load_torque = {drive.Mc:g} N m: this load drives instead of braking; an optimal start "
-                "needs a load torque of 0 or more."
+        if not is_machine(self.drive):
+            raise InputError(
+                f"drive = {self.drive!r}: give a Drive or a Chain; Drive.load reads one from a file."
             )
+        object.__setattr__(self, "drive", _without_delay(self.drive))
+        object.__setattr__(self, "scenarios", tuple(map(_without_delay, self.scenarios)))
         for name, choices in (("terminal", TERMINALS), ("minimise", OBJECTIVES)):
-            if getattr(self, name) not in choices:
+            if getattr(self, name) not in (*choices, None):
                 wrong.append(f"{name} = {getattr(self, name)!r}: choose one of {', '.join(choices)}.")
         for name, unit in (("start_time", "s"), ("k_dyn", "1"), ("heat", "s")):
             value = getattr(self, name)
@@ -193,40 +200,61 @@ class Problem:
         if not _number(self.smoothness) or not 0.0 <= float(self.smoothness) < math.inf:
             wrong.append(f"smoothness = {self.smoothness!r}: a weight in s, 0 or more.")
         wrong += _check_corners(self.torque_speed)
-        if len(drive.positions) > 1:
-            wrong += self._not_over_positions()
-        if drive.initial_load_speed >= drive.target_speed:
-            wrong.append(
-                f"initial_load_speed = {drive.initial_load_speed:g} rad/s: the load has its target speed of "
-                f"{drive.target_speed:g} rad/s already; there is nothing to optimise."
-            )
+        several = len(self.scenarios) > 0
+        for number, machine in enumerate((self.drive, *self.scenarios), start=1):
+            about = f"scenario {number}: " if several else ""
+            wrong += [about + sentence for sentence in _wrong_with(machine)]
+        if not wrong:
+            object.__setattr__(self, "terminal", self.terminal or usual_terminal(self.drive, several))
+            wrong += self._wrong_together()
         if wrong:
             raise InputError(wrong)
 
-    def _not_over_positions(self) -> Iterator[str]:
-        """What cannot be asked of one profile for all positions."""
-        asked = {
-            "terminal": self.terminal if self.terminal != "reached" else "",
-            "minimise": self.minimise if self.minimise != "k_dyn" else "",
-            "k_dyn": self.k_dyn, "heat": self.heat, "torque_speed": self.torque_speed,
-            "smoothness": self.smoothness,
-        }  # fmt: skip
-        for name, value in asked.items():
-            if value:
+    def _wrong_together(self) -> Iterator[str]:
+        """What does not go together."""
+        if len(self.machines) > 1 and self.terminal != "reached":
+            yield (
+                f"terminal = {self.terminal}: one torque over time for several machines or start positions "
+                'ends with the load at its speed, "reached"; leave terminal out, or give one position.'
+            )
+        if self.lowest_torque >= self.highest_torque:
+            yield (
+                f"scenarios: one needs a torque of at least {self.lowest_torque:g} N m, another allows "
+                f"{self.highest_torque:g} N m at most; leave one of them out."
+            )
+        for machine in self.machines:
+            given, masses = _rows(machine)
+            taken = float((masses["Mc"] + masses["active"])[int(given.machine.load)])
+            if len(self.machines) > 1 and taken >= self.highest_torque:
                 yield (
-                    f"{name} = {value}: the start position is unknown, and one profile for all positions has "
-                    'the least largest K_dyn with terminal "reached"; leave it out, or give a position.'
+                    f"scenarios: a load torque of {taken:g} N m is not below the motor torque of "
+                    f"{self.highest_torque:g} N m that all allow; leave that one out."
                 )
+            if self.terminal != "reached" and np.isinf(masses["J"]).any():
+                yield f"terminal = {self.terminal}: a mass stays at rest; ask for reached."
+            if self.terminal == "steady" and given.curves.size:
+                yield "terminal = steady: load curves leave no steady torque; ask for reached or synchronous."
+
+    @cached_property
+    def machines(self) -> tuple[Any, ...]:
+        """The machine at each of its start positions, then the scenarios at theirs."""
+        every = (one for each in (self.drive, *self.scenarios) for one in each.positions.values())
+        return tuple(dict.fromkeys(every))
 
     @property
     def lowest_torque(self) -> float:
-        """Smallest motor torque, N m: the drive's minimum_torque (0 unless the motor may brake)."""
-        return float(self.drive.minimum_torque)
+        """Smallest motor torque that all machines allow, N m: 0 unless the motor may brake."""
+        return max(float(one.motor.minimum_torque) for one in self.machines)
 
     @property
     def highest_torque(self) -> float:
-        """Largest motor torque, N m: the starting torque Ms, or maximum_torque where that is less."""
-        return float(min(self.drive.Ms, self.drive.maximum_torque))
+        """Largest motor torque that all allow, N m: starting torque or maximum_torque."""
+        return min(float(min(one.motor.starting_torque, one.motor.maximum_torque)) for one in self.machines)
+
+    @property
+    def starting_torque(self) -> float:
+        """Ms in N m, to which the heat refers."""
+        return float(self.drive.motor.starting_torque)
 
     @property
     def target(self) -> float:
@@ -235,79 +263,94 @@ class Problem:
 
     @property
     def base_torque(self) -> float:
-        """M12avg_base in N m, the torque to which K_dyn refers."""
+        """The mean shaft torque in N m to which K_dyn refers."""
         return float((self.base or self.drive).mean_torque)
 
     def lower_bound(self) -> Any:
-        """The momentum bound on K_dyn of every start; see `softstart.optimal.momentum.momentum_bound`."""
-        from softstart.optimal.momentum import momentum_bound
+        """The momentum bound on K_dyn of every start; see `softstart.optimal.bounds.momentum_bound`."""
+        from softstart.optimal.bounds import momentum_bound
 
         return momentum_bound(self)
 
-    def casadi(self) -> Any:
+    def casadi(self, run: Run | None = None) -> Any:
         """The problem as one nonlinear program of CasADi, for your own solver, options or sensitivities.
 
-        minimise P / M12avg_base (or heat, or t_f) over x = (P, durations, demands, states), subject to
-        Legendre collocation of x' = f(x, u) in the phases of the likeliest order, |T| <= P, the limits of
-        the motor and the terminal conditions. Sparsity and scaling: `CasadiProblem`, which it returns. Raises
-        InputError for a problem of no class known to the collocation. Source: docs/theory/optimum.md.
+        minimise P / base torque (or heat, or t_f) over x = (P, durations, demands, states), subject to
+        collocation of x' = f(x, u) in the phases of one order of contacts, |T| <= P, the limits of the motor
+        and the terminal condition. The order is that of `run`, a start that lasts to one elastic period after
+        the start time; by default that of the answer of `optimize`. The first guess has straight lines
+        between the ends of the phases. Raises InputError for gears with losses, load curves, contact_law
+        modelica and starts of too many phases. Source: docs/theory/optimum.md.
 
         >>> import casadi
+        >>> from softstart import Drive
         >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
         >>> nlp = problem.casadi()
         >>> quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
         >>> solver = casadi.nlpsol("s", "ipopt", nlp.nlp, quiet)
         >>> out = solver(x0=nlp.x0, p=nlp.p, lbx=nlp.lbx, ubx=nlp.ubx, lbg=nlp.lbg, ubg=nlp.ubg)
-        >>> round(nlp.k_dyn(out["x"]), 3), round(nlp.profile(out["x"]).torque.max(), 1).item()
-        (0.909, 62.0)
+        >>> round(nlp.k_dyn(out["x"]), 2)
+        0.91
         """
-        return _collocation.as_casadi(self)
+        from softstart.optimal.optimize import solve, whole_run
+        from softstart.optimal.statement import as_casadi
+
+        return as_casadi(self, run or whole_run(solve(self)), straight=True)
 
     @property
     def ideal_torque(self) -> bool:
         """True where any measurable torque within the limits can be had: no lag, rate, curve or smoothing."""
-        drive = self.drive
-        return (
-            drive.torque_lag == 0.0
-            and math.isinf(drive.torque_rate)
-            and not self.torque_speed
-            and self.smoothness == 0.0
+        given = _rows(self.machines[0])[0].machine
+        slow = given.lag > 0.0 or math.isfinite(given.rate)
+        return not (slow or self.torque_speed or self.smoothness > 0.0)
+
+
+def _rows(machine: Any) -> tuple[Any, Any]:
+    """The machine as rows of the kernel, and its masses by names."""
+    from softstart.kernel.records import MASS
+    from softstart.start.rows import rows_of
+
+    given = rows_of(machine)
+    return given, given.masses[0].view(MASS)[:, 0]
+
+
+def _without_delay(machine: Any) -> Any:
+    """A profile that is known beforehand is sent earlier by the computing delay."""
+    if not is_machine(machine) or machine.motor is None or machine.motor.computing_delay == 0.0:
+        return machine
+    if machine.motor is machine:
+        return machine.replace(computing_delay=0.0)
+    return replace(machine, motor=machine.motor.replace(computing_delay=0.0))
+
+
+def _wrong_with(machine: Any) -> Iterator[str]:
+    """What about a machine is in the way of an optimum."""
+    if machine.motor is None or machine.target_speed is None:
+        missing = "[motor]" if machine.motor is None else "target_speed"
+        yield f"{missing} is missing: an optimal start needs one; add it to the chain."
+        return
+    from softstart.kernel.records import CURVE, SHAFT
+
+    given, masses = _rows(next(iter(machine.positions.values())))
+    if given.shafts.view(SHAFT)["rigid"].any():
+        yield (
+            "[shaft] rigid: the torque of a rigid shaft in an impact is infinite, and no start has a least "
+            "peak; give it a stiffness."
         )
-
-
-def problem_of(
-    machine: Any, start_time: float | None, terminal: Terminal | None = None, *, method: str = "auto",
-    limits: bool = False, **asked: Any,
-) -> Problem:  # fmt: skip
-    """The problem of a drive or a chain, its terminal condition the usual one if none is given.
-
-    InputError for what cannot be asked of it, by which method and whether for the least time within limits.
-
-    >>> problem_of(Drive.load("crane-4amtkf"), 0.5).terminal
-    'synchronous'
-    """
-    from softstart.drive.records import is_machine
-
-    if isinstance(machine, Drive) or not is_machine(machine):
-        return Problem(machine, start_time, terminal or usual_terminal(machine), **asked)
-    from softstart.optimal.chains.problem import ChainProblem
-
-    refuse_for_chain(method, limits)
-    return ChainProblem(machine, start_time, terminal or "reached", **asked)
-
-
-def refuse_for_chain(method: str, limits: bool) -> None:
-    """What cannot be asked of an optimum of a chain."""
-    wrong = []
-    if method != "auto":
-        wrong.append(
-            f"method = {method}: on a chain the optimum is found by successive linear programs on its exact "
-            "start; use method = auto."
+        return
+    target = float(given.machine.target)
+    if masses["w0"][int(given.machine.load)] >= target:
+        yield (
+            f"initial speed: the load has its target speed of {target:g} rad/s already; there is nothing to "
+            "optimise."
         )
-    if limits:
-        wrong.append("limits: this is for drives; leave it out, or reduce the chain to a drive.")
-    if wrong:
-        raise InputError(wrong)
+    if (masses["Mc"] + masses["active"] < 0.0).any():
+        yield (
+            f"load torque = {float((masses['Mc'] + masses['active']).min()):g} N m: this load drives instead "
+            "of braking; an optimal start needs a load torque of 0 or more."
+        )
+    if (given.curves.view(CURVE)["by_angle"] != 0.0).any():
+        yield "curve_angle: an optimum is not found where load torques depend on angles; give speeds."
 
 
 def _number(value: Any) -> bool:

@@ -28,8 +28,8 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
+from softstart.drive import Drive
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import Candidate
 from softstart.profile import TorqueProfile
 
 AIM = 1.0 + 1e-9  # a little above the target, so that the exact plant finds it reached
@@ -77,13 +77,17 @@ class PulseCoastHold:
     @classmethod
     def of(cls, problem: Problem) -> PulseCoastHold:
         """Those of a problem; damping is left out."""
-        drive = problem.drive
+        return cls.of_drive(problem.drive.two_masses, problem.highest_torque)
+
+    @classmethod
+    def of_drive(cls, drive: Drive, Ms: float) -> PulseCoastHold:
+        """Those of a drive under at most Ms N m; damping is left out."""
         return cls(
             float(drive.J1),
             float(drive.J2),
             float(drive.c),
             float(drive.Mc),
-            problem.highest_torque,
+            Ms,
             float(drive.theta0 - 0.5 * drive.gap),
             float(drive.initial_motor_speed - drive.initial_load_speed),
             float(drive.initial_load_speed),
@@ -222,7 +226,13 @@ def applies(problem: Problem) -> str:
     >>> applies(Problem(crane, 0.5)), applies(Problem(crane.replace(damping=1), 0.5))
     ('', 'the shaft is damped')
     """
+    if len(problem.machines) > 1:
+        return "one torque serves several starts"
     drive = problem.drive
+    if len(drive.mass_names) != 2 or drive.motor is not drive:
+        return "it is for a drive of two masses"
+    if next(drive.without_friction(""), ""):
+        return "the drive has friction"
     if problem.minimise != "k_dyn":
         return f"what is asked for is the least {problem.minimise}, and this form has the least K_dyn"
     if problem.heat is not None:
@@ -260,16 +270,17 @@ def off_course(problem: Problem) -> str:
     return ""
 
 
-def solve(problem: Problem) -> Candidate:
+def solve(problem: Problem) -> tuple[TorqueProfile, float, float]:
     """The gentlest start of the form Ms, 0, u_eq(P); raises NotApplicable where there is none.
 
     u_eq(P) = (P (J1 + J2) - Mc J1)/J2 holds T = P. t_f is the bound on the start time, or earlier where even
-    the least peak, the load coming back through the gap by itself, is soon enough.
+    the least peak, the load coming back through the gap by itself, is soon enough. Returns the demand, t_f in
+    s and K_dyn.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
-    >>> best = solve(Problem(drive, start_time=0.2883042))
-    >>> round(best.claimed, 8), best.profile.torque.round(3).tolist()
+    >>> profile, end, k_dyn = solve(Problem(drive, start_time=0.2883042))
+    >>> round(k_dyn, 8), profile.torque.round(3).tolist()
     (0.90924722, [62.0, 62.0, 0.0, 0.0, 56.243])
     """
     reason = applies(problem)
@@ -305,9 +316,7 @@ def solve(problem: Problem) -> Candidate:
         if until > edges[-1]:
             edges.append(until)
             levels.append(torque)
-    profile = TorqueProfile.steps(edges, levels)
-    note = f"Ms to {course.t1:.6g} s, none to {min(course.t_peak, end):.6g} s, then held"
-    return Candidate(profile, end, course.peak / problem.base_torque, "closed-form", note)
+    return TorqueProfile.steps(edges, levels), end, course.peak / problem.base_torque
 
 
 def _end(starts: PulseCoastHold, course: Course, P: float, target: float, latest: float) -> float:

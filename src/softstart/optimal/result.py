@@ -9,8 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from softstart.arrays import Matrix, Vector
-from softstart.drive import Drive
 from softstart.kernel import records as at
 from softstart.late import late
 from softstart.optimal.problem import Problem
@@ -20,9 +18,8 @@ from softstart.start.run import Run
 
 notebook = late("softstart.views.notebook")
 
-Method = Literal["closed-form", "lp", "collocation", "robust", "slp", "trace"]
+Method = Literal["closed-form", "descent", "collocation"]
 BoundKind = Literal["certificate", "momentum", "none"]
-DemandShape = Literal["steps", "ramps", "continuous"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
@@ -34,47 +31,16 @@ def heat_of(run: Run, until: float) -> float:
     times = start[:, None] + half[:, None] * (nodes + 1.0)
     index = np.repeat(np.arange(half.size), nodes.size)
     u = run.recorded.at(times.ravel(), index)["u"].reshape(times.shape)
-    return float(half @ (u * u @ weights)) / float(run.drive.Ms) ** 2
-
-
-def demanded(shape: DemandShape, edges: Vector, levels: Matrix) -> TorqueProfile:
-    """The demand over steps between `edges` (s), from its torque (N m) at the beginning and end of each."""
-    if shape == "steps":
-        return TorqueProfile.steps(edges, levels[:, 0])
-    if shape == "ramps":
-        return TorqueProfile(np.repeat(edges, 2)[1:-1], levels.ravel()).simplified()
-    return TorqueProfile(edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """What a method offers: a demand up to `end_time`, and the figure it claims for it.
-
-    `end_time` is t_f in s, at which the terminal condition holds; `claimed` is the value of what is minimised
-    as the method computed it; `warm` is whatever the method can start its next, similar problem from.
-    """
-
-    profile: TorqueProfile
-    end_time: float
-    claimed: float
-    method: Method
-    note: str = ""
-    warm: Any = field(default=None, repr=False)
+    return float(half @ (u * u @ weights)) / float(run.drive.motor.starting_torque) ** 2
 
 
 @dataclass(frozen=True)
 class LowerBound:
-    """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`.
-
-    `near`: whether the optimum lies near a certificate of this kind, so that what is far above is none;
-    `proof`: what proves it, with which the bound of another start time of the drive may begin.
-    """
+    """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`."""
 
     k_dyn: float
     kind: BoundKind
     covers: str
-    near: bool = True
-    proof: tuple[Any, ...] = field(default=(), repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -142,23 +108,22 @@ class Optimum:
         What was minimised, within which bounds.
     profile : TorqueProfile
         The demand over time, with what follows t_f.
-    run : Run
-        The exact re-simulation to one elastic period after t_f; all figures are taken from it.
+    runs : tuple of Run
+        The exact re-simulation of the machine and of each scenario to one elastic period after t_f; all
+        figures are taken from them. Where the start position is unknown, that of the worst one.
     bound : LowerBound
         What no other start can go below, and for which starts that is proved.
     method, why : str
-        The method, and why it was chosen.
+        The method, and where its answer comes from.
     claimed : float
         The minimised figure as the method computed it, before the re-simulation.
     end_time : float
-        t_f, s.
+        t_f, s; the latest of all machines.
     seconds : float
         Computing time, s.
-    warm : object
-        What `optimize` can start a similar problem from.
     alone : mapping of str to Optimum
-        Where the start position is unknown: the optimum of each position by itself, as a drive could have it
-        that measures where it stands. Without those that have no start that quick.
+        Where one torque serves several positions or scenarios: the optimum of each by itself, as a drive
+        could have it that knows where it stands. Without those that have no start that quick.
     tried : tuple of Trial
         All searches in their order; the answer is that of the best one.
     kept : Kept or None
@@ -180,33 +145,53 @@ class Optimum:
 
     problem: Problem
     profile: TorqueProfile
-    run: Run
+    runs: tuple[Run, ...]
     bound: LowerBound
     method: Method
     why: str
     claimed: float
     end_time: float
     seconds: float
-    warm: Any = field(default=None, repr=False)
     alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
     tried: tuple[Trial, ...] = ()
     kept: Kept | None = None
     heat_at_least: float = 0.0
 
     @property
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the whole run, re-simulated."""
-        return self.run.k_dyn
+    def k_dyn_each(self) -> tuple[float, ...]:
+        """Dynamic coefficient of each machine's whole run."""
+        base = self.problem.base_torque
+        return tuple(run.peak_torque / base for run in self.runs)
 
     @property
-    def minimised(self) -> float:
-        """The figure that was minimised, of the run."""
-        return {"k_dyn": self.k_dyn, "heat": self.heat, "start_time": self.end_time}[self.problem.minimise]
+    def worst(self) -> int:
+        """Index of the machine with the largest peak."""
+        return int(np.argmax(self.k_dyn_each))
+
+    @property
+    def run(self) -> Run:
+        """The run with the largest peak."""
+        return self.runs[self.worst]
+
+    @property
+    def start_times(self) -> tuple[float, ...]:
+        """Start time of each machine, s."""
+        return tuple(run.start_time for run in self.runs)
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, re-simulated; the largest of all machines."""
+        return max(self.k_dyn_each)
 
     @property
     def k_dyn_lower_bound(self) -> float:
         """No start of the class that the bound covers has a smaller K_dyn."""
         return self.bound.k_dyn
+
+    @property
+    def minimised(self) -> float:
+        """The figure that was minimised, of the run."""
+        return {"k_dyn": self.k_dyn, "heat": self.heat, "start_time": self.end_time}[self.problem.minimise]
 
     @property
     def gap_percent(self) -> float:
@@ -221,7 +206,7 @@ class Optimum:
     @property
     def heat(self) -> float:
         """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
-        return heat_of(self.run, self.end_time)
+        return heat_of(self.runs[0], self.end_time)
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
@@ -236,11 +221,10 @@ class Optimum:
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
-        problem = self.problem
-        known = {at: one.k_dyn for at, one in self.alone.items()}
+        problem, run = self.problem, self.run
         bounded = self.kept is not None or self.bound.kind != "none"
         limits = self.kept is not None and problem.minimise == "k_dyn"
-        return {
+        found: dict[str, Any] = {
             "drive": problem.drive.name,
             "minimise": "start_time" if limits else problem.minimise,
             "terminal": problem.terminal,
@@ -258,173 +242,26 @@ class Optimum:
             "bound_kind": self.bound.kind,
             "bound_covers": self.bound.covers,
             "gap_percent": self.gap_percent if bounded and math.isfinite(self.gap_percent) else None,
-            "peak_torque": self.run.peak_torque,
+            "peak_torque": run.peak_torque,
             "start_time": self.end_time,
             "start_time_lower_bound": None if self.kept is None else self.kept.at_least,
             "heat": self.heat,
             "heat_lower_bound": self.heat_at_least or None,
-            "contacts": self.run.contacts,
-            "first_contact": self.run.first_contact,
+            "contacts": run.contacts,
+            "first_contact": run.first_contact,
             "seconds": self.seconds,
-            **({"k_dyn_if_position_known": known} if known else {}),
-            **({"limits": self.kept.summary()} if limits and self.kept is not None else {}),
-            "profile": _knots(self.profile),
+            "profile": {"time": self.profile.time.tolist(), "torque": self.profile.torque.tolist()},
         }
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RobustOptimum:
-    """One torque profile for several drives, as the exact plant runs it on each of them.
-
-    Parameters
-    ----------
-    scenarios : tuple of Drive
-        The drives, in the order given.
-    start_time : float
-        The time allowed, s.
-    base : Drive
-        The drive to whose mean shaft torque all K_dyn refer.
-    react_to_contact : bool
-        Whether a second part of the profile may start with the first contact.
-    profile : TorqueProfile
-        The demand over time.
-    runs : tuple of Run
-        One for each scenario, to one elastic period after its own start time.
-    lower_bound : LowerBound
-        The largest bound of a scenario by itself: no profile, reacting or not, does better on all of them.
-    seconds : float
-        Computing time, s.
-    note : str
-        Says so where a contact sensor is left unused.
-
-    Examples
-    --------
-    >>> from softstart import Drive, optimize_robust
-    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
-    >>> best = optimize_robust([drive], start_time=0.2883042)
-    >>> best.worst, best.k_dyn == best.k_dyn_each[0]
-    (0, True)
-
-    References
-    ----------
-    docs/optimal-starts.md; the momentum bound: docs/theory/optimum.md.
-    """
-
-    scenarios: tuple[Drive, ...]
-    start_time: float
-    base: Drive
-    react_to_contact: bool
-    profile: TorqueProfile
-    runs: tuple[Run, ...]
-    lower_bound: LowerBound
-    seconds: float
-    note: str = ""
-
-    @property
-    def k_dyn_each(self) -> tuple[float, ...]:
-        """Dynamic coefficient of each scenario's whole run."""
-        return tuple(run.k_dyn for run in self.runs)
-
-    @property
-    def k_dyn(self) -> float:
-        """The worst of them, which was minimised."""
-        return max(self.k_dyn_each)
-
-    @property
-    def worst(self) -> int:
-        """Index of the scenario with the worst K_dyn."""
-        return int(np.argmax(self.k_dyn_each))
-
-    @property
-    def start_times(self) -> tuple[float, ...]:
-        """Start time of each scenario, s."""
-        return tuple(run.start_time for run in self.runs)
-
-    @property
-    def gap_percent(self) -> float:
-        """How far the worst K_dyn lies above the bound, in per cent."""
-        return 100.0 * (self.k_dyn / self.lower_bound.k_dyn - 1.0)
-
-    def __repr__(self) -> str:
-        """One line with the main figures."""
-        what = "reacting to the contact" if self.react_to_contact else "one profile"
-        return (
-            f"<RobustOptimum: worst K_dyn {self.k_dyn:.5f} over {len(self.scenarios)} scenarios, {what}, "
-            f"latest start {max(self.start_times):.5f} s>"
-        )
-
-    def summary(self) -> dict[str, Any]:
-        """All figures under the names used everywhere (JSON, tables, docs)."""
-        bound = self.lower_bound
-        after = self.profile.after_contact
-        profile: dict[str, Any] = _knots(self.profile)
-        if after is not None:
-            profile["after_contact"] = _knots(after)
-        return {
-            "drive": self.base.name,
-            "terminal": "reached",
-            "react_to_contact": self.react_to_contact,
-            "note": self.note,
-            "start_time_bound": self.start_time,
-            "k_dyn": self.k_dyn,
-            "k_dyn_each": list(self.k_dyn_each),
-            "k_dyn_lower_bound": bound.k_dyn if bound.kind != "none" else None,
-            "bound_kind": bound.kind,
-            "bound_covers": bound.covers,
-            "start_times": list(self.start_times),
-            "worst": self.worst,
-            "scenarios": [
-                {
-                    "drive": d.name,
-                    "gap": d.gap,
-                    "load_inertia": d.J2,
-                    "load_torque": d.Mc,
-                    "position": d.start_position,
-                }
-                for d in self.scenarios
-            ],
-            "seconds": self.seconds,
-            "profile": profile,
-        }
-
-
-def _knots(profile: TorqueProfile) -> dict[str, Any]:
-    return {"time": profile.time.tolist(), "torque": profile.torque.tolist()}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SensorWorth:
-    """The best profile without a sensor, and the best that starts its second part at the contact.
-
-    `alone` holds the K_dyn that each scenario could have if it were the only one, where that was asked for.
-    """
-
-    blind: RobustOptimum
-    reacting: RobustOptimum
-    alone: tuple[float, ...] | None = None
-
-    @property
-    def percent(self) -> float:
-        """By how much the sensor lowers the worst K_dyn, per cent of the blind one; 0 if left unused."""
-        return max(100.0 * (1.0 - self.reacting.k_dyn / self.blind.k_dyn), 0.0)
-
-    def __repr__(self) -> str:
-        """One line with the main figures."""
-        return (
-            f"<SensorWorth: worst K_dyn {self.blind.k_dyn:.5f} blind, {self.reacting.k_dyn:.5f} reacting to "
-            f"the contact: {self.percent:.1f} % lower>"
-        )
-
-    def summary(self) -> dict[str, Any]:
-        """All figures under the names used everywhere (JSON, tables, docs)."""
-        return {
-            "k_dyn_blind": self.blind.k_dyn,
-            "k_dyn_reacting": self.reacting.k_dyn,
-            "percent": self.percent,
-            "k_dyn_alone": None if self.alone is None else list(self.alone),
-            "blind": self.blind.summary(),
-            "reacting": self.reacting.summary(),
-        }
+        if len(run.drive.shaft_names) > 1:
+            found["k_dyns"] = dict(zip(run.drive.shaft_names, run.k_dyns.tolist(), strict=True))
+        if problem.scenarios:
+            found["k_dyn_each"], found["start_times"] = list(self.k_dyn_each), list(self.start_times)
+            found["worst"], found["scenarios"] = self.worst, [one.name for one in problem.scenarios]
+        if self.alone:
+            found["k_dyn_if_position_known"] = {at: one.k_dyn for at, one in self.alone.items()}
+        if limits and self.kept is not None:
+            found["limits"] = self.kept.summary()
+        return found
 
 
 @dataclass(frozen=True)
@@ -432,8 +269,7 @@ class Verdict:
     """Why no start of the class asked for exists, and how short the start time may be."""
 
     problem: Problem
-    shortest_start_time: float
-    constraint: str  # what forbids it, in a few words
+    shortest_start_time: float  # the shortest one found; inf if none was
     sentence: str
 
     def summary(self) -> dict[str, Any]:
@@ -445,7 +281,6 @@ class Verdict:
             "terminal": self.problem.terminal,
             "start_time_bound": self.problem.start_time,
             "shortest_start_time": self.shortest_start_time,
-            "constraint": self.constraint,
         }
 
 
@@ -455,7 +290,7 @@ class InfeasibleError(RuntimeError):
     Parameters
     ----------
     verdict : Verdict
-        Which constraint forbids it, and what start time would do.
+        What was asked for, and what start time would do.
 
     Examples
     --------
@@ -463,8 +298,8 @@ class InfeasibleError(RuntimeError):
     >>> try:
     ...     optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.1)
     ... except InfeasibleError as error:
-    ...     print(error.verdict.constraint)
-    the largest motor torque of 62 N m, even if it acted all the time
+    ...     print(round(error.verdict.shortest_start_time, 4))
+    0.2386
     """
 
     def __init__(self, verdict: Verdict) -> None:
@@ -486,13 +321,12 @@ class OptimumError(RuntimeError):
 class NotConverged(RuntimeError):  # noqa: N818 - the name states the outcome
     """IPOPT found no solution: `reason` is its own status, `violation` the largest violated constraint.
 
-    `violation` is relative to the units of the problem (Ms, target speed, start time). A large one
+    `violation` is relative to the units of the problem (base torque, target speed, start time). A large one
     indicates a problem without solution, a small one a search that failed.
     """
 
-    def __init__(self, reason: str, violation: float, final: bool = False) -> None:
+    def __init__(self, reason: str, violation: float) -> None:
         self.reason, self.violation = reason, violation
-        self.final = final  # no other first guess is worth trying
         super().__init__(
             f"collocation: {reason} (largest violated constraint {violation:.2g} of the drive's own units)."
         )

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
 
-BOUNDS = {"certificate": "certified for", "momentum": "by momentum, for", "none": "none: "}
-
 
 class OptimumPanel:
     """Form, progress and result; built in the current slot."""
@@ -91,12 +89,7 @@ class OptimumPanel:
     def _done(self, found: tasks.Gentlest) -> None:
         self._found = found
         self._figures.set_content(facts(figures(found.best), "optimum-figures"))
-        bound = found.best.bound
-        self._why.set_text(
-            f"Method {found.best.method}: {found.best.why}. "
-            f"Lower bound {BOUNDS[bound.kind]} {bound.covers}".rstrip(".")
-            + "."
-        )
+        self._why.set_text(f"Method {found.best.method}: {found.best.why}. {found.bound}")
         self._result.set_visibility(True)
         self._stale.show_for(self._view.subject)
         self._hint.set_visibility(False)
@@ -141,7 +134,7 @@ def figures(best: Optimum) -> list[tuple[str, str]]:
     known = best.bound.kind != "none"
     return [
         ("K_dyn", number(best.k_dyn)),
-        ("lower bound", number(best.k_dyn_lower_bound) if known else number(None)),
+        ("lower bound", number(best.bound.k_dyn) if known else number(None)),
         ("above it by", percent(best.gap_percent if known else None)),
         ("start time", f"{number(best.end_time)} s"),
         ("peak torque", f"{number(best.run.peak_torque)} N m"),

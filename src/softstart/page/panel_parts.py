@@ -33,7 +33,7 @@ CLASS_OF = {
     State.FAILED: "job-failed",
 }
 # what tasks import, in a process that waits for one
-IMPORTED = ("softstart.page.tasks", "softstart.optimal.solving", "softstart.tuning.solving", "scipy.optimize")
+IMPORTED = ("softstart.page.tasks", "softstart.optimal.front", "softstart.tuning.solving", "scipy.optimize")
 TERMINALS = {
     "synchronous": "both masses at target speed",
     "reached": "load at target speed",

@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,7 @@ from softstart.drive import UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import best_start
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
 from softstart.page.sentences import clipped
@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from softstart.identification import logs
     from softstart.identification import solving as fits
     from softstart.identification.logs import TorqueIs
-    from softstart.optimal import front, shortest, solving
+    from softstart.optimal import front
+    from softstart.optimal import optimize as solving
     from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
@@ -58,11 +59,8 @@ else:  # they import scipy.optimize; in the server the first page would wait for
     logs, fits = late("softstart.identification.logs"), late("softstart.identification.solving")
     shown, optima = late("softstart.views.identification"), late("softstart.views.optima")
     lives = late("softstart.views.fatigue")
-    shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
+    solving = late("softstart.optimal.optimize")
 
-LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
-SHORT_SHARES = (0.0, 0.06, 0.2, 0.5)  # of the way from the shortest start time to the shortest easy one
-SHORT = 1.02  # how far above the shortest feasible start time the curve ends
 TUNING_SHARES = {
     "starts": (0.0, 0.05),
     "schedule": (0.05, 0.45),
@@ -74,9 +72,10 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 
 @dataclass(frozen=True)
 class Gentlest:
-    """An optimal start and the files of its profile, text by suffix: `.csv`, `.toml`, `.c`."""
+    """An optimal start, what its bound covers, and the files of its profile by suffix."""
 
     best: Optimum
+    bound: str
     files: dict[str, str]
 
 
@@ -84,8 +83,7 @@ def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: P
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     progress(None, "looking for the gentlest start")
     with no_solution_as_sentence():
-        several = len(drive.positions) > 1  # then a search goes on for minutes
-        best = solving.optimize(drive, start_time, terminal=terminal, time_limit=0.0 if several else math.inf)
+        best = solving.optimize(drive, start_time, terminal=terminal)
     progress(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     profile = best.profile
@@ -94,7 +92,7 @@ def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: P
         ".toml": text_of(lambda path: profile.to_toml(path, about), ".toml"),
         ".c": text_of(lambda path: profile.to_c(path, about=about), ".c"),
     }
-    return Gentlest(replace(best, warm=None), files)
+    return Gentlest(best, optima.bound_sentence(best), files)
 
 
 def player_of(best: Optimum) -> Controller:
@@ -113,47 +111,28 @@ def label_of(best: Optimum) -> str:
 def curve(
     drive: Machine, start_times: Sequence[float], terminal: Terminal = "reached", *, progress: Progress
 ) -> list[FrontPoint]:
-    """The least K_dyn over the start time: the easy long ones first, those of the strategies, the short ones.
+    """The least K_dyn over the start time, also at those of the strategies, the long start times first.
 
     Each point is sent as a part as soon as it is known; the result is all of them in order of start time.
     """
-    points: list[FrontPoint] = []
-    direct = simulate(drive, "direct").start_time
-    several = len(drive.positions) > 1  # then each point takes a search of some ten seconds
-    easy = [one * direct for one in LONG_MULTIPLES[:: 2 if several else 1]] if math.isfinite(direct) else []
-    own = [one for one in start_times if math.isfinite(one)]
-    long = sorted({*easy, *(one for one in own if easy and one >= easy[0])})
-    total = len(easy) + len(SHORT_SHARES) + len(own) + 1
     done = 0
 
     def each(point: FrontPoint) -> None:
         nonlocal done
         done += 1
         if point.found:
-            points.append(point)
             progress.part(point)
 
-    def doing(what: str) -> None:
-        progress(min(done / total, 1.0), f"start in {what.rpartition(': ')[2].removesuffix(f', {terminal}')}")
-
-    def through(times: Sequence[float]) -> None:
-        if times:
-            front.pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
-
     with no_solution_as_sentence():
-        through(long)
-        progress(done / total, "the shortest start time")
-        least = front.shortest_known(drive, terminal)
-        done += 1
-        if least is not None and math.isfinite(least):
-            first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
-            through([first + share * (last - first) for share in SHORT_SHARES])
-            through([one for one in own if least <= one < (easy[0] if easy else math.inf)])
-    if not points:
-        raise SimulationError(
-            "None of these start times is feasible; give this drive more torque or a lower target."
-        )
-    return sorted(points, key=lambda point: point.start_time_bound)
+        progress(0.0, "the shortest start time")
+        usual = front.default_start_times(drive, terminal)
+        times = sorted({*usual, *(one for one in start_times if math.isfinite(one))})
+
+        def doing(what: str) -> None:
+            progress(done / len(times), f"start in {what.rpartition(': ')[2].removesuffix(f', {terminal}')}")
+
+        found = front.pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
+    return [point for point in found.points if point.found]
 
 
 @contextmanager
@@ -161,7 +140,7 @@ def no_solution_as_sentence() -> Iterator[None]:
     """Turns "there is no solution" and "none was found" into a SimulationError with that sentence."""
     try:
         yield
-    except (InfeasibleError, OptimumError, NotConverged) as error:
+    except (InfeasibleError, OptimumError) as error:
         raise SimulationError(str(error)) from error
 
 
@@ -347,12 +326,12 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress
         name, title = "quickest", "The quickest start within limits"
         try:
             with no_solution_as_sentence():
-                best = solving.optimize(machine, limits=True)
+                quickest = solving.optimize(machine, limits=True)
         except (InputError, SimulationError) as error:
             parts.append(Part(name, title, [], [], [str(error)]))
         else:
-            quickest = replace(best, warm=None)
-            said = [optima.comparison(best, [row.run for row in rows.values()]), optima.bound_sentence(best)]
+            runs = [row.run for row in rows.values()]
+            said = [optima.comparison(quickest, runs), optima.bound_sentence(quickest)]
             parts.append(Part(name, title, [], [], said))
     return Checked(parts, quickest)
 

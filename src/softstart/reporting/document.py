@@ -335,8 +335,8 @@ def _on_an_ordinary_inverter(report: Report) -> list[str]:
 
 
 def _compared(report: Report, best: Candidate) -> str:
-    """What no start, and what the gentlest start known, has in the same time."""
-    bound, known = report.lower_bound(best.row), report.gentlest_known(best.row)
+    """What no start, and what the best start known, has in the same time."""
+    bound, known = report.lower_bound(best.row), report.lowest_known(best.row)
     if bound is None:
         return ""
     motor = report.drive.motor

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart.controller.base import label_of
-from softstart.drive import Drive
 from softstart.errors import InputError, listed
 from softstart.late import late
-from softstart.optimal.chains.problem import ChainProblem
-from softstart.optimal.front import FrontPoint, PointAsked, computed
-from softstart.optimal.lp import ideal, whole_search
-from softstart.optimal.momentum import momentum_shortest_time
-from softstart.optimal.problem import REACTS, Terminal, best_start, problem_of
-from softstart.optimal.pulse_coast_hold import applies
-from softstart.optimal.result import InfeasibleError, OptimumError
-from softstart.optimal.solving import optimize
+from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
+from softstart.optimal.front import FrontPoint, Stretch, computed
+from softstart.optimal.optimize import optimize
+from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
+from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve
 from softstart.processes import DiedError, Worker
 from softstart.processes import Progress as WorkerProgress
+from softstart.profile import TorqueProfile
 from softstart.reporting.choice import Choice
-from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
 from softstart.reporting.strategies import GREY, K_DYN, SMALL, WIDE, name_in_figure, ordered
 from softstart.start.comparison import REFERENCE
@@ -39,28 +36,24 @@ if TYPE_CHECKING:
 else:
     ticker = late("matplotlib.ticker")
 
-DESCENT = "slp"  # the method of an optimum on a chain
-TIGHT = 1.0  # per cent between an optimum and its bound that counts as certified
+TIGHT = 1.0  # per cent between an optimum and a lower bound that counts as proof
 TERMINAL: Terminal = "reached"
-SHARES = (1.02, 1.05, 1.1, 1.2, 1.35, 1.6)  # of the start time of direct, where optima are looked for
+SHARES = (1.0, 1.02, 1.05, 1.1, 1.2, 1.35, 1.6)  # of the start time of direct, where optima are looked for
 INSTANTS = 80  # of the curve of the bound
 EARLIER = 0.85  # of the quickest strategy: from where on the curve is drawn
 POLL = 0.1  # s
-GENTLER = 0.999  # times an optimum: what is no more than its last digits is not gentler
-SEARCHED = 0.5  # of the budget, after which the search on a chain goes into no new demand
-QUICK_SHARE = 0.3  # of the budget is kept for starts that are good and not proved best
 
 Progress = Callable[[float, str], object]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What no start can go below, and what the best one reaches.
+    """What no start can go below, and what the best ones found reach.
 
     `times` (s) and `bounds`: a K_dyn that no torque over time within the motor's limits can go below, however
     it is controlled. `shortest`: no torque at all is quicker, s. `points`: optima, each re-simulated exactly;
-    `missing` start times (s) whose optimum was not found within `budget` s. `known` are starts found by a
-    quick search where there is no optimum, or a less gentle one. `refusal` says why there is nothing.
+    `missing` start times (s) whose optimum was not found within `budget` s. `refusal` says why there is
+    nothing.
     """
 
     times: tuple[float, ...] = ()
@@ -68,25 +61,18 @@ class Limit:
     shortest: float = math.nan
     points: tuple[FrontPoint, ...] = ()
     missing: tuple[float, ...] = ()
-    known: tuple[GentleStart, ...] = ()
     budget: float = 0.0
     refusal: str = ""
 
     def optimum_at(self, start_time: float) -> FrontPoint | None:
         """The optimum for a start time, if it was found."""
-        return next((p for p in self.points if p.found and p.start_time_bound == start_time), None)
+        return next((p for p in self.found if p.start_time_bound == start_time), None)
 
-    def gentlest_known(self, start_time: float, rows: Sequence[Row] = ()) -> float | None:
-        """Least K_dyn of `rows`, optima and other starts found that take no longer, None without any."""
+    def lowest_known(self, start_time: float, rows: Sequence[Row]) -> float | None:
+        """Lowest K_dyn of `rows` and of the optima that take no longer, None without any."""
         found = [p.k_dyn for p in self.found if p.k_dyn is not None and p.start_time_bound <= start_time]
-        found += [one.k_dyn for one in self.known if one.start_time <= start_time]
         found += [row.run.k_dyn for row in rows if row.run.start_time <= start_time]
         return min(found, default=None)
-
-    @property
-    def gave_up(self) -> list[FrontPoint]:
-        """Start times at which the search came to its end without an optimum."""
-        return [p for p in self.points if p.status == "NOT_FOUND"]
 
     @property
     def found(self) -> list[FrontPoint]:
@@ -105,7 +91,6 @@ class Limit:
                 for p in self.points
             ],
             "not_found": list(self.missing),
-            "known_starts": [one.summary() for one in self.known],
             "budget": self.budget,
             "refusal": self.refusal,
         }
@@ -114,13 +99,14 @@ class Limit:
 def bound_at(drive: Any, start_time: float) -> float | None:
     """The K_dyn that no start within `start_time` s can go below; None where there is no bound.
 
+    >>> from softstart import Drive
     >>> round(bound_at(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042), 4)
     0.9092
     """
     if not start_time > 0.0:
         return None
     try:
-        bound = problem_of(drive, start_time, TERMINAL).lower_bound()
+        bound = momentum_bound(Problem(drive, start_time, TERMINAL))
     except InputError:
         return None
     return bound.k_dyn if math.isfinite(bound.k_dyn) and bound.kind != "none" else None
@@ -128,114 +114,65 @@ def bound_at(drive: Any, start_time: float) -> float | None:
 
 def limit(
     drive: Any,
+    chosen: Sequence[float],
     own: Sequence[float],
     reference: float,
     budget: float,
     progress: Progress,
     meanwhile: Callable[[], object] = lambda: None,
-    seeds: Sequence[str] | None = None,
 ) -> Limit:
-    """The limit for start times around those of the strategies, `own`, of which the first matter most.
+    """The limit for start times around those of the strategies, `own`, of which those `chosen` matter most.
 
-    Where there is a formula the optima are computed at once; the others, by linear program or collocation,
-    in a process of their own that is ended after `budget` s. `reference` is the start time of direct, s.
-    `meanwhile` is called once while that process computes. Of a chain the optimum is looked for in the first
-    start time alone, by linear programs on its exact start from the demands of `seeds`, names of strategies.
+    Where there is a formula the optima are computed at once. At the others, those chosen and shares of the
+    start time of direct, `reference` in s, they are searched in a process of their own that is ended after
+    `budget` s. `meanwhile` is called once while that process computes.
     """
     try:
-        problem = problem_of(drive, 1.0, TERMINAL)
+        problem = Problem(drive, 1.0, TERMINAL)
     except InputError as error:
         return Limit(refusal=error.sentences[0])
-    if isinstance(problem, ChainProblem):
-        return _by_descent(drive, own, budget, progress, meanwhile, seeds)
     shortest = momentum_shortest_time(problem)
     least = reference if math.isfinite(reference) else min(own, default=math.nan)
     if not (math.isfinite(least) and math.isfinite(shortest)):
         return Limit(refusal="No strategy reaches the target speed, so there is no start time to judge by.")
-    asked = list(dict.fromkeys([*own, *(share * least for share in SHARES)]))
-    longest = max(*asked, 1.05 * shortest)
-    soonest = max(1.0005 * shortest, EARLIER * min(asked))
-    times = np.linspace(soonest, longest, INSTANTS)
-    bounds = [bound_at(drive, float(t)) for t in times]
-    curve = [(float(t), b) for t, b in zip(times, bounds, strict=True) if b is not None]
-    points, left = _by_formula(drive, asked)
-    known: list[GentleStart] = []
+    asked = list(dict.fromkeys([*chosen, *(share * least for share in SHARES)]))
+    times = np.linspace(
+        max(1.0005 * shortest, EARLIER * min(*asked, *own)), max(*asked, *own, 1.05 * shortest), INSTANTS
+    ).tolist()
+    curve = [(t, bound) for t in times if (bound := bound_at(drive, t)) is not None]
+    points = list(_by_formula(drive, dict.fromkeys([*asked, *own])))
+    left = [t for t in asked if t not in {p.start_time_bound for p in points}]
     if left and budget > 0.0:
-        began = time.monotonic()
-        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, progress, meanwhile)
-        progress(1.0, "looking for gentle starts")
-        best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
-        order = sorted(left, key=lambda t: t in best)  # those without an optimum first
-        known = gentle_starts(drive, order, budget - (time.monotonic() - began))
-        known = [one for one in known if one.k_dyn < GENTLER * best.get(one.start_time_bound, math.inf)]
-    settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
-    return Limit(
-        times=tuple(t for t, _ in curve),
-        bounds=tuple(b for _, b in curve),
-        shortest=shortest,
-        points=tuple(sorted(points, key=lambda p: p.start_time_bound)),
-        missing=tuple(sorted(t for t in asked if t not in settled)),
-        known=tuple(known),
-        budget=budget,
-    )
-
-
-def _by_descent(
-    chain: Any,
-    own: Sequence[float],
-    budget: float,
-    progress: Progress,
-    meanwhile: Callable[[], object],
-    seeds: Sequence[str] | None,
-) -> Limit:
-    """The limit of a chain: what is found in the time given is not proved the gentlest."""
-    known = [one for one in own if math.isfinite(one)]
-    if not known:
-        return Limit(refusal="No strategy reaches the target speed.")
-    asked = known[:1]
-    times = np.linspace(EARLIER * min(known), max(known), INSTANTS).tolist()
-    curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
-    points: list[FrontPoint] = []
-    if asked and budget > 0.0:
-        points = _in_own_process(chain, asked, budget, progress, meanwhile, SEARCHED * budget, seeds)
+        points += _in_own_process(drive, left, budget, progress, meanwhile)
     else:
         meanwhile()
-    found = {p.start_time_bound for p in points if p.found}
+    settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
     return Limit(
-        times=tuple(t for t, _ in curve),
-        bounds=tuple(b for _, b in curve),
-        points=tuple(points),
-        missing=tuple(t for t in asked if t not in found),
-        budget=budget,
+        tuple(t for t, _ in curve),
+        tuple(bound for _, bound in curve),
+        shortest,
+        tuple(sorted(points, key=lambda p: p.start_time_bound)),
+        tuple(sorted(t for t in asked if t not in settled)),
+        budget,
     )
 
 
-def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint], list[float]]:
-    """Optima of the closed form, and the start times for which there is none."""
-    points, left = [], []
+def _by_formula(drive: Any, asked: Iterable[float]) -> Iterator[FrontPoint]:
+    """Optima of the closed form, where it holds."""
     for start_time in asked:
-        try:
-            best = optimize(drive, start_time, terminal="reached", method="closed-form")
-            points.append(FrontPoint.of_optimum(best, start_time))
-        except (InputError, InfeasibleError, OptimumError):
-            left.append(start_time)
-    return points, left
+        with suppress(NotApplicable):
+            solve(Problem(drive, start_time, TERMINAL))
+            yield FrontPoint.of_optimum(optimize(drive, start_time, terminal=TERMINAL), start_time)
 
 
 def _in_own_process(
-    drive: Any,
-    asked: Sequence[float],
-    budget: float,
-    progress: Progress,
-    meanwhile: Callable[[], object],
-    time_limit: float = 0.0,
-    seeds: Sequence[str] | None = None,
+    drive: Any, asked: Sequence[float], budget: float, progress: Progress, meanwhile: Callable[[], object]
 ) -> list[FrontPoint]:
-    """Optima by the other methods, as many as are found in time; each search ends after its `time_limit`."""
+    """Optima by search, as many as are found in time."""
     points: list[FrontPoint] = []
     worker = Worker(quiet=True)
     try:
-        worker.submit(optima, drive, asked, time_limit, seeds, reports=True)
+        worker.submit(optima, drive, asked, reports=True)
         began = time.monotonic()
         meanwhile()
         while True:
@@ -255,29 +192,17 @@ def _in_own_process(
     return points
 
 
-def optima(
-    drive: Any,
-    start_times: Sequence[float],
-    time_limit: float = 0.0,
-    seeds: Sequence[str] | None = None,
-    *,
-    progress: WorkerProgress,
-) -> None:
+def optima(drive: Any, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
     """Look for the optima of start times and send each at once: the first one first, then by distance to it.
 
-    Each is looked for beside the optimum of the nearest start time that has one.
+    Each begins with the optimum of the nearest start time that has one.
     """
-    known: dict[float, Any] = {}
+    near: dict[float, TorqueProfile] = {}
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
-        nearest = min(known, key=lambda one: abs(one - start_time), default=None)
-        warm = None if nearest is None or time_limit else known[nearest]  # a search with time has its seeds
-        try:
-            point, left = computed(
-                PointAsked(drive, {"seeds": seeds}, TERMINAL, start_time, warm, time_limit)
-            )
-            known |= {} if left is None else {start_time: left}
-        except InputError as error:  # of no class it solves
-            point = FrontPoint.not_found(str(error), start_time, TERMINAL)
+        nearest = min(near, key=lambda one: abs(one - start_time), default=math.nan)
+        (point,) = computed(Stretch(drive, {}, TERMINAL, (start_time,), near.get(nearest)))
+        if point.found:
+            near[start_time] = TorqueProfile(point.time, point.torque)
         progress.part(point)
 
 
@@ -304,11 +229,6 @@ def limit_section(drive: Any, choice: Choice, limit: Limit, figures: Figures) ->
             if len(drive.positions) > 1
             else "The solid line joins optimal starts, each simulated exactly."
         )
-    if limit.known:
-        caption.append(
-            "The dash-dotted line is the gentlest start known in that time, of a strategy, a profile or "
-            "a quick search (crosses): possible, not proved best."
-        )
     starts = "; ".join(
         f"{one.name} {fixed(one.row.run.k_dyn, 3)} at {digits(one.row.run.start_time)} s"
         for one in choice.candidates
@@ -333,11 +253,11 @@ def filled(choice: Choice) -> list[Row]:
 
 
 def how_near(drive: Any, found: Sequence[Row], limit: Limit) -> Html:
-    """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
+    """Each strategy beside the bound and the lowest K_dyn known in its own start time."""
     rows, bounded = [], bool(limit.bounds)
     for row in ordered(found):
         run, best = row.run, limit.optimum_at(row.run.start_time)
-        bound, known = bound_at(drive, run.start_time), limit.gentlest_known(run.start_time, found)
+        bound, known = bound_at(drive, run.start_time), limit.lowest_known(run.start_time, found)
         is_best = best is not None and known is not None and best.k_dyn == known
         cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3)]
         cells += [fixed(bound, 3)] if bounded else []
@@ -364,117 +284,62 @@ def _notes(drive: Any, choice: Choice, limit: Limit) -> list[str]:
     return [
         bound if limit.bounds else none,
         *_on_optima(drive, limit),
-        *_on_the_shortest(choice, limit),
         *_on_missing(drive, limit),
         *_on_the_recommended(drive, choice, limit),
     ]
 
 
 def _on_optima(drive: Any, limit: Limit) -> list[str]:
-    """Of how many optima it is proved that nothing is gentler, and among which starts."""
-    every, single, loose = [], [], []
-    notes = [
-        (
-            f"In {digits(p.start_time_bound)} s, the start time of the chosen strategy, the gentlest start "
-            f"found has K_dyn {fixed(p.k_dyn, 3)}: by linear programs on the exact start of the chain, from "
-            "the torque of that strategy. It is simulated exactly, and not proved the gentlest."
-        )
-        for p in limit.found
-        if p.method == DESCENT
-    ]
-    for p in limit.found if len(drive.positions) == 1 and not notes else ():
-        bound, above = bound_at(drive, p.start_time_bound), p.gap_percent
-        if bound and p.k_dyn is not None and 100.0 * (p.k_dyn / bound - 1.0) <= TIGHT:
-            every.append(100.0 * (p.k_dyn / bound - 1.0))
-        elif above is not None and above <= TIGHT:
-            single.append(p)
-        else:
-            loose.append(math.inf if above is None else above)
+    """How much better than the optima other starts could be, and which starts."""
     if limit.found and len(drive.positions) > 1:
-        notes.append(f"The best fixed profiles are those found, not proved best. {REACTS}")
+        return [f"The best fixed profiles are those found, not proved best. {REACTS}"]
+    every, single, loose = [], [], []
+    for p in limit.found:
+        bound, left = bound_at(drive, p.start_time_bound), p.gap_percent
+        over = math.inf if not bound or p.k_dyn is None else 100.0 * (p.k_dyn / bound - 1.0)
+        if over <= TIGHT:
+            every.append(max(over, 0.001))
+        elif p.bound_kind == "certificate" and left is not None and left <= TIGHT:
+            single.append((p.start_time_bound, max(left, 0.001)))
+        else:
+            loose.append(over)
+    notes, count = [], len(limit.found)
     if every:
         notes.append(
-            f"{len(every)} of {len(limit.found)} optima are certified against every other start: none "
-            f"lies more than {digits(max(*every, 0.001), 1)} % above the lower bound."
+            f"{len(every)} of {count} optima are proved against every other start: none lies more than "
+            f"{digits(max(every), 1)} % above the lower bound."
         )
     if single:
-        times, most = (
-            _times([p.start_time_bound for p in single]),
-            max(*(p.gap_percent or 0.0 for p in single), 0.001),
-        )
         notes.append(
-            (
-                f"That at {times} is certified among starts whose gap closes only once, to {digits(most, 1)} "
-                "%. That a start that bounces in the gap is gentler, down to the lower bound, is not ruled "
-                "out."
-            )
-            if len(single) == 1
-            else (
-                f"Those at {times} are certified among starts whose gap closes only once, to "
-                f"{digits(most, 1)} %. That a start that bounces in the gap is gentler, down to the "
-                "lower bound, is not ruled out."
-            )
+            f"Proved to {digits(max(share for _, share in single), 1)} % among starts whose gap closes only "
+            f"once: the optimum at {_times([t for t, _ in single])}. That a start that bounces in the gap "
+            "has a lower K_dyn, down to the lower bound, is not ruled out."
         )
     if loose:
-        count, every_one = len(loose), len(limit.found)
+        above = f", up to {digits(max(loose), 2)} % above the lower bound" if max(loose) < math.inf else ""
         notes.append(
-            (
-                f"{count} of {every_one} optima are the best starts found, up to {digits(max(loose), 2)} % "
-                "above their lower bound: gentler ones may exist."
-            )
-            if max(loose) < math.inf
-            else f"{count} of {every_one} optima are the best starts found: gentler ones may exist."
-        )
-    return notes
-
-
-def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
-    """Start times for which there is no start with a single contact, or just one."""
-    refused = [p for p in limit.points if p.status == "INFEASIBLE"]
-    if refused and len(choice.rows[0].run.drive.positions) > 1:
-        return [refused[-1].status_text]
-    once = [row.run.start_time for row in choice.rows if row.run.contacts == 1]
-    soonest = min((time for time in once if not math.isnan(time)), default=math.inf)
-    # within rounding of the shortest time the search may refuse a start that a strategy has made
-    none = [p for p in refused if p.start_time_bound < soonest and p.shortest_start_time is not None]
-    only = [p for p in refused if p.start_time_bound >= soonest]
-    notes = []
-    if none:
-        notes.append(
-            f"In {_times([p.start_time_bound for p in none])} there is no start whose gap closes only "
-            f"once; the shortest such start takes {digits(none[0].shortest_start_time, 5)} s. Quicker "
-            "starts bounce in the gap."
-        )
-    if only:
-        notes.append(
-            f"In {_times([p.start_time_bound for p in only])} there is no choice: no start whose gap "
-            "closes only once was found that is noticeably quicker, so there is no optimum to tell."
+            f"{len(loose)} of {count} optima are the best starts found{above}: better ones may exist."
         )
     return notes
 
 
 def _on_missing(drive: Any, limit: Limit) -> list[str]:
-    """Where there is no optimum, why, and what is shown instead."""
+    """Where there is no optimum, and why."""
     notes = []
+    if refused := [p for p in limit.points if p.status == "INFEASIBLE"]:
+        shortest = refused[-1].shortest_start_time
+        known = f"; the shortest one found takes {digits(shortest, 5)} s" if shortest else ""
+        notes.append(
+            f"In {_times([p.start_time_bound for p in refused])} the search found no start at all{known}."
+        )
     if limit.missing:
-        ended = (
-            f"none was found within {short(limit.budget)} s of search"
-            if limit.budget
-            else "none was looked for"
-        )
-        if gave_up := limit.gave_up:
-            ended = (
-                f"{ended}; at {_times([p.start_time_bound for p in gave_up])} the search ended without one"
-            )
+        reason = applies(Problem(drive, 1.0, TERMINAL)) or "so near the shortest start time"
+        ended = "none was looked for"
+        if limit.budget:
+            ended = f"none was found within {short(limit.budget)} s of search"
         notes.append(
-            f"For {_times(limit.missing)} no {best_start(drive)} is shown: {_why_hard(drive)}, and "
-            f"{ended}. The lower bound holds nevertheless."
-        )
-    if limit.known:
-        notes.append(
-            "Starts found: the best of some thousand torques over time that a quick search tried, each "
-            "simulated exactly. They are known to be possible, not known to be the gentlest: the limit "
-            "lies between them and the lower bound."
+            f"For {_times(limit.missing)} no {best_start(drive)} is shown: there is no formula ({reason}), "
+            f"and {ended}. The lower bound holds nevertheless."
         )
     return notes
 
@@ -485,7 +350,7 @@ def _on_the_recommended(drive: Any, choice: Choice, limit: Limit) -> list[str]:
     if best is None:
         return []
     time, own = best.row.run.start_time, best.row.run.k_dyn
-    bound, known = bound_at(drive, time), limit.gentlest_known(time, choice.rows)
+    bound, known = bound_at(drive, time), limit.lowest_known(time, choice.rows)
     if bound is None or known is None:
         return []
     optimum = limit.optimum_at(time)
@@ -504,7 +369,7 @@ def _on_the_recommended(drive: Any, choice: Choice, limit: Limit) -> list[str]:
         if known < own
         else (
             "In the {time} s of {name} the least possible K_dyn thus lies between {least} (proved) and "
-            "{known} (that of {name} itself, the gentlest start known): {most} less at most."
+            "{known} (that of {name} itself): {most} less at most."
         ).format(**figures)
     ]
 
@@ -515,29 +380,14 @@ def _times(times: Sequence[float]) -> str:
     return f"{len(times)} start times" if len(words) > 4 else listed(words)
 
 
-def _why_hard(drive: Any) -> str:
-    if len(drive.positions) > 1:
-        return "the start position is unknown, and one torque for every position has a search of its own"
-    problem = problem_of(drive, 1.0, "reached")
-    if isinstance(problem, ChainProblem):
-        return "there is no formula for a chain, only a search by linear programs on its exact start"
-    if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
-        return f"they need a numerical search (direct collocation), because {reason}"
-    if reason := applies(problem):
-        return f"there is no formula ({reason}), only a search by linear programs"
-    return "so near the shortest start time there is no formula, and a linear program has to be certified"
-
-
 def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> Any:
     """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
     placed = [row for row in rows if not math.isnan(row.run.start_time)]
     optima = limit.found
     own = [row.run.start_time for row in placed] + [p.start_time_bound for p in optima]
-    own += [one.start_time for one in limit.known]
     left, right = min(own), max(own)
     right = max(right, 1.001 * left)  # a single start
     values = [row.run.k_dyn for row in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
-    values += [one.k_dyn for one in limit.known]
     with drawing():
         figure, axes = new_figure(1, 1, (WIDE, 3.6))
         left, right = left - 0.15 * (right - left), right + 0.04 * (right - left)
@@ -550,17 +400,6 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], "-", color=COLOURS[0],
                 lw=1.2, marker=".", ms=7, label=f"{best_start(rows[0].run.drive)} found", zorder=3,
-            )  # fmt: skip
-        if limit.known:
-            steps = sorted({right, *own})
-            axes.step(
-                steps, [limit.gentlest_known(t, placed) for t in steps], where="post", ls=DASHES[2],
-                color="black", lw=1.0, zorder=3,
-                label="gentlest start known: possible, not proved best",
-            )  # fmt: skip
-            axes.plot(
-                [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], "+",
-                color="black", ms=6, zorder=3,
             )  # fmt: skip
         for index, row in enumerate(placed):
             best = row in strong

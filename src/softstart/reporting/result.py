@@ -18,7 +18,6 @@ from softstart import __version__
 from softstart.chain.model import Chain, load_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
-from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.records import is_machine
 from softstart.errors import InputError, SimulationError
@@ -167,9 +166,9 @@ class Report:
         curve = self.drive.limits.fatigue
         return DEFAULT_SLOPE if curve is None else math.nan if curve.slope is None else curve.slope
 
-    def gentlest_known(self, row: Row) -> float | None:
-        """Least K_dyn of all starts that this report knows and that take no longer than this one."""
-        return self.limit.gentlest_known(row.run.start_time, self.comparison.rows)
+    def lowest_known(self, row: Row) -> float | None:
+        """Lowest K_dyn of all starts that this report knows and that take no longer than this one."""
+        return self.limit.lowest_known(row.run.start_time, self.comparison.rows)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON, under the names used everywhere."""
@@ -185,7 +184,7 @@ class Report:
             "start_time": best.row.run.start_time if best else None,
             "peak_torque": best.row.run.peak_torque if best else None,
             "k_dyn_lower_bound": self.lower_bound(best.row) if best else None,
-            "k_dyn_gentlest_known": self.gentlest_known(best.row) if best else None,
+            "k_dyn_gentlest_known": self.lowest_known(best.row) if best else None,
             "k_dyn_direct": direct.run.k_dyn if direct else None,
             "start_time_direct": direct.run.start_time if direct else None,
             "ordinary": plain.name if plain else None,
@@ -340,12 +339,12 @@ def report(
 
     found = limit(
         machine,
-        [*times, *reached],
+        times,
+        reached,
         direct,
         budget,
         lambda share, what: show(0.5 + 0.5 * share, what),
         meanwhile,
-        [chosen[0].name] if chosen and chosen[0].name in ready_controller_names() else None,
     )
     show(1.0, "done")
     return Report(

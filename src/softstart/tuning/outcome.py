@@ -88,7 +88,7 @@ class Tuning:
     robust : RobustSet or None
         The one set of gains for all cells. None if not asked for.
     price : xarray.Dataset or None
-        For each cell: the robust set, the schedule, and the certified optimum within the same time.
+        For each cell: the robust set, the schedule, and the optimum within the same time.
     between : xarray.Dataset or None
         The schedule half way between the cells, where its gains are interpolated: where these differ much
         from cell to cell, nothing says that it does well there.

@@ -124,9 +124,8 @@ def tune(
     schedule, robust : bool
         Which of the two questions to answer.
     certified : bool, optional
-        Whether to compute each cell's certified optimum within the same time (metric `k_dyn` only). By
-        default that of drives. That of a chain is a local one, takes minutes a cell, and its lower bound is
-        that of momentum.
+        Whether to compute each cell's optimum within the same time and its lower bound (only of `k_dyn`).
+        By default that of drives; that of a chain takes longer.
     base : Drive or Chain, optional
         The drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
     seed, restarts, population, generations : int

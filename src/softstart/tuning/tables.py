@@ -1,4 +1,4 @@
-"""What tuning has found as tables, and the price of robustness beside the certified optimum of each cell."""
+"""What tuning has found as tables, and the price of robustness beside the optimum of each cell."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from softstart.chain.machines import Machine
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-from softstart.optimal.solving import optimize
+from softstart.optimal.optimize import optimize
+from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.processes import Pool
 from softstart.store import Records
 from softstart.tuning.gains import ScheduleFound, SetFound
@@ -238,7 +238,7 @@ def optima(
         for cell, bound in asked
         if (cell, bound) not in found
     ]
-    log.begin("certified optima", len(asked), len(found))
+    log.begin("optima", len(asked), len(found))
     for one, record in pool.results(optimum_of, missing):
         found[one.cell, one.bound] = record
         if record["status"] != "NOT_FOUND":  # another attempt may find it
@@ -257,18 +257,13 @@ def optimum_of(asked: Asked) -> dict[str, Any]:
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
         each = [
-            optimize(one, asked.bound, terminal="reached", base=asked.base, time_limit=0.0)
+            optimize(one, asked.bound, terminal="reached", base=asked.base)
             for one in ideal.positions.values()
         ]
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
-    except (OptimumError, NotConverged, InputError):
+    except (OptimumError, InputError):
         return {**nothing, "status": "NOT_FOUND"}
     best = max(each, key=lambda one: one.k_dyn)
-    low = best.k_dyn_lower_bound
-    return {
-        "k_dyn": best.k_dyn,
-        "k_dyn_lower_bound": low if low is not None and math.isfinite(low) else None,
-        "method": best.method,
-        "status": "OPTIMAL",
-    }
+    low = None if best.bound.kind == "none" else best.bound.k_dyn
+    return {"k_dyn": best.k_dyn, "k_dyn_lower_bound": low, "method": best.method, "status": "OPTIMAL"}

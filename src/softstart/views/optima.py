@@ -1,4 +1,4 @@
-"""What is shown of an optimal start, a front and a robust optimum: words, tables, figures, files of --out."""
+"""What is shown of an optimal start and of a front: words, tables, figures, files of --out."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
 from softstart.optimal.problem import REACTS, best_k_dyn, best_start
-from softstart.optimal.result import Kept, Optimum, RobustOptimum, SensorWorth
+from softstart.optimal.result import Kept, Optimum
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import Run
 from softstart.views.drawing import (
@@ -22,7 +21,6 @@ from softstart.views.drawing import (
     GREY,
     MARKERS,
     SHAFTS,
-    SMALL,
     drawing,
     entitle,
     head,
@@ -89,7 +87,11 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
         ["contacts", str(run.contacts)],
         ["knots of the profile", str(best.profile.time.size)],
-        *[[f"K_dyn if known to start at {name}", number(one.k_dyn, 6)] for name, one in best.alone.items()],
+        *[
+            [f"K_dyn if known to start at {name}", number(one.k_dyn, 6)]
+            for name, one in best.alone.items()
+            if not problem.scenarios
+        ],
         *([["answers of the searches", _searches(best)]] if len(best.tried) > 1 else []),
         ["computed in", f"{best.seconds:.2g} s"],
     ]
@@ -113,7 +115,7 @@ def _searches(best: Optimum) -> str:
 def question(best: Optimum) -> str:
     """What was asked for."""
     problem = best.problem
-    words = [best_k_dyn(problem.drive) if problem.minimise == "k_dyn" else f"least {AIMS[problem.minimise]}"]
+    words = [_aim(best)]
     if _by_limits(best) and best.kept is not None:
         limits = [f"{one.name} {short(one.limit)} {one.unit}" for one in best.kept.margins]
         words = [f"least start time that keeps the limits ({', '.join(limits)})"]
@@ -123,6 +125,8 @@ def question(best: Optimum) -> str:
         words.append(f"K_dyn at most {problem.k_dyn:.6g}")
     if problem.heat is not None:
         words.append(f"heat at most {problem.heat:.6g} s")
+    if problem.scenarios:
+        words.append(f"one profile for {len(best.runs)} machines")
     words.append(f"terminal {problem.terminal}")
     if problem.torque_speed:
         words.append("motor torque limited over its speed")
@@ -131,12 +135,21 @@ def question(best: Optimum) -> str:
     return ", ".join(words)
 
 
+def _aim(best: Optimum) -> str:
+    """What is the least of all."""
+    problem = best.problem
+    if problem.minimise != "k_dyn":
+        return f"least {AIMS[problem.minimise]}"
+    return "least largest K_dyn" if problem.scenarios else best_k_dyn(problem.drive)
+
+
 def comparison(best: Optimum, others: Sequence[Run]) -> str:
     """The optimum beside `direct` and the gentlest shipped controller, or the quickest within limits."""
     if best.kept is not None:
         return _within_limits(best, best.kept, others)
-    blind = "Best fixed profile: " if len(best.problem.drive.positions) > 1 else ""
-    text = f"{blind}K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
+    blind = "Best fixed profile: " if len(best.problem.machines) > 1 else ""
+    largest = "largest " if best.problem.scenarios else ""
+    text = f"{blind}{largest}K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
     reaching = [run for run in others if not math.isnan(run.start_time)]
     direct = next((run for run in reaching if run.controller_name == "direct"), None)
     if direct is not None:
@@ -155,21 +168,40 @@ def comparison(best: Optimum, others: Sequence[Run]) -> str:
     return text + "."
 
 
-def position_sentences(best: Optimum) -> list[str]:
-    """What a sensor of the start position is worth, where that is unknown."""
-    if len(best.problem.drive.positions) == 1:
+def known_sentences(best: Optimum) -> list[str]:
+    """What it is worth to know the start position, or the machine, where one profile serves several."""
+    problem = best.problem
+    if len(problem.machines) == 1:
         return []
+    what = "machine" if problem.scenarios else "position"
+    reacts = [REACTS] if len(problem.drive.positions) > 1 else []
     if not best.alone:
-        return [REACTS]
-    name, worst = max(best.alone.items(), key=lambda item: item[1].k_dyn)
-    lower = 100.0 * (1.0 - worst.k_dyn / best.k_dyn)
-    missing = [one for one in best.run.positions if one not in best.alone]
-    none = f" (no start that quick with one contact: {', '.join(missing)})" if missing else ""
+        return reacts
+    worst = f"scenario {best.worst + 1}" if problem.scenarios else best.run.position
+    name, hardest = max(best.alone.items(), key=lambda item: item[1].k_dyn)
+    lower = 100.0 * (1.0 - hardest.k_dyn / best.k_dyn)
+    missing = len(problem.machines) - len(best.alone)
+    none = f" ({missing} of {len(problem.machines)} without an optimum)" if missing else ""
     return [
-        f"Worst of {', '.join(best.run.positions)}: {best.run.position}. With the position known, the "
-        f"largest of the optima is {worst.k_dyn:.4f} ({name}), {lower:.1f} % lower{none}.",
-        REACTS,
+        f"Largest K_dyn: {worst}. With the {what} known, the largest of the optima is {hardest.k_dyn:.4f} "
+        f"({name}), {lower:.1f} % lower{none}.",
+        *reacts,
     ]
+
+
+def scenario_table(best: Optimum) -> Table:
+    """What is different in each machine that the profile serves, and its start."""
+    machines = (best.problem.drive, *best.problem.scenarios)
+    lumped = [one.lumped for one in machines]
+    columns = {
+        "scenario": [str(index) for index in range(1, len(machines) + 1)],
+        "gap\nrad": column_of([one.gap for one in lumped]),
+        "J2\nkg m2": column_of([one.J2 for one in lumped]),
+        "Mc\nN m": column_of([one.Mc for one in lumped]),
+        "K_dyn": [number(k, 4) for k in best.k_dyn_each],
+        "start\ntime s": column_of(list(best.start_times), 5),
+    }
+    return Table.of("", columns)
 
 
 def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
@@ -186,7 +218,7 @@ def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
     elif kept.binding:
         text += f" The {kept.binding} forbids a quicker start."
     else:
-        text += " No limit forbids a quicker start, but the motor torque and the gap, which may close once."
+        text += " No limit forbids a quicker start, but the motor torque."
     less = 100.0 * (1.0 - kept.at_least / best.end_time)
     text += f" None takes less than {kept.at_least:.6g} s ({less:.2g} % less)."
     passing = [run for run in others if _keeps(run, best)]
@@ -195,9 +227,7 @@ def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
         return f"{text} No shipped strategy {keeps}."
     first = min(passing, key=lambda run: run.start_time)
     taken = f"{first.controller_name}, takes {first.start_time:.4g} s"
-    several = first.start_time < best.end_time and first.contacts > 1
-    contacts = f", with {first.contacts} contacts" if several else ""
-    return f"{text} The quickest shipped strategy that {keeps}, {taken}{contacts}."
+    return f"{text} The quickest shipped strategy that {keeps}, {taken}."
 
 
 def _by_limits(best: Optimum) -> bool:
@@ -241,14 +271,10 @@ def optimum_figure(best: Optimum) -> Any:
         _twist(twist, best)
         for axes in panels if several else ():  # too many names to stand beside the title
             axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        twist.set_xlabel(f"time, s     ({'' if several else 'grey: gap open; '}dotted: end of the start)")
+        grey = ("" if several else "grey: gap open; ") + ("thin: other machines; " if best.runs[1:] else "")
+        twist.set_xlabel(f"time, s     ({grey}dotted: end of the start)")
         twist.set_xlim(0.0, run.end_time)
-        aim = (
-            best_k_dyn(run.drive)
-            if best.problem.minimise == "k_dyn"
-            else f"least {AIMS[best.problem.minimise]}"
-        )
-        aim = "least start time within limits" if _by_limits(best) else aim
+        aim = "least start time within limits" if _by_limits(best) else _aim(best)
         asked = f"{aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
     return figure
@@ -297,6 +323,8 @@ def _shafts(run: Run) -> list[tuple[str, dict[str, Any]]]:
 
 def _shaft_torque(axes: Axes, best: Optimum) -> None:
     run, base = best.run, best.problem.base_torque
+    for other in (one for one in best.runs if one is not run):
+        axes.plot(other.t, other.T, color=GREY, lw=0.7)
     for (name, line), torque in zip(_shafts(run), run.T.reshape(run.t.size, -1).T, strict=True):
         axes.plot(run.t, torque, label=name, **line)
     peak = run.peak_torque
@@ -366,8 +394,19 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     best.profile.to_csv(folder / "profile.csv")
     best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
     best.profile.to_c(folder / "profile.c")
-    best.run.to_csv(folder / "trace-optimum.csv")
-    left_out = ("profile", "seconds", "tried", "k_dyn_if_position_known")
+    numbers = [f"-{index}" for index in range(1, len(best.runs) + 1)] if best.problem.scenarios else [""]
+    traces = [f"trace-optimum{number}.csv" for number in numbers]
+    for name, run in zip(traces, best.runs, strict=True):
+        run.to_csv(folder / name)
+    left_out = {
+        "profile",
+        "seconds",
+        "tried",
+        "k_dyn_if_position_known",
+        "k_dyn_each",
+        "start_times",
+        "scenarios",
+    }
     summary = {key: value for key, value in best.summary().items() if key not in left_out}
     write_rows(folder / "figures.csv", [summary])
     rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
@@ -379,20 +418,21 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     }
     replay = REPLAY.format(what=drive.WHAT.removeprefix("a "))
     parts = [
-        f"# {markdown(drive.name)}: {best_start(drive)}",
+        f"# {markdown(drive.name)}: {'one profile for all' if best.problem.scenarios else best_start(drive)}",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
         markdown(comparison(best, others)),
         figure_table(rows),
-        *map(markdown, position_sentences(best)),
+        *([markdown_table(scenario_table(best))] if best.problem.scenarios else []),
+        *map(markdown, known_sentences(best)),
         markdown(bound_sentence(best)),
         "![optimum](optimum.svg)",
         "## The profile",
         "[profile.csv](profile.csv), [profile.toml](profile.toml) and, as an interpolating function in C, "
         f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{replay}\n```\n\n"
-        "Traces of the start: [trace-optimum.csv](trace-optimum.csv).",
-        "## The controllers on this drive",
-        markdown_table(Table.of("", beside, ("strategy",))),
+        f"Traces of the start: {', '.join(f'[{name}]({name})' for name in traces)}.",
     ]
+    if others:
+        parts += ["## The controllers on this drive", markdown_table(Table.of("", beside, ("strategy",)))]
     write_drive_report(folder, parts, drive, command)
 
 
@@ -470,28 +510,18 @@ def footnotes(front: Front) -> list[str]:
         if point.found and point.bound_covers
     )
     missing = dict.fromkeys(point.status_text for point in front.points if not point.found)
-    blind = len(front.drive.positions) > 1
-    reacts = [REACTS] if blind else []
-    apart = [f"{one.name}: {_why_apart(one, blind)}" for one in front.controllers if one.ratio is None]
+    reacts = [REACTS] if len(front.drive.positions) > 1 else []
+    apart = [
+        f"{one.name}: {one.status_text if one.optimum is None else one.optimum.status_text}"
+        for one in front.controllers
+        if one.ratio is None
+    ]
     below = [
         f"{one.name} lies below the lower bound of its start time: its start is not of the class covered."
         for one in front.controllers
         if one.optimum is not None and one.k_dyn < (one.optimum.k_dyn_lower_bound or 0.0)
     ]
     return [*reacts, *covers, *below, *missing, *apart]
-
-
-def _why_apart(one: ControllerPoint, blind: bool) -> str:
-    """Why a controller has no optimum to be compared with."""
-    best = one.optimum
-    if best is None:
-        return one.status_text
-    if best.status == "INFEASIBLE" and best.shortest_start_time is not None and not blind:
-        return (
-            "quicker than any start whose gap closes only once, which takes "
-            f"{best.shortest_start_time:.6g} s or more; there is no optimum to compare it with."
-        )
-    return best.status_text
 
 
 def front_figure(front: Front) -> Any:
@@ -537,7 +567,7 @@ def _curve(axes: Axes, found: Sequence[tuple[float, float, float | None]], name:
 
 
 def _where_nothing_starts(axes: Axes, front: Front) -> None:
-    """Hatched, where a start with one contact is impossible; crosses at the start times that were refused."""
+    """Hatched, where no start is known; crosses at the start times that were refused."""
     refused = [p.start_time_bound for p in front.points if not p.found]
     if refused:
         axes.plot(refused, [0.03] * len(refused), "x", ms=6, mew=1.5, color=GREY, clip_on=False,
@@ -548,9 +578,7 @@ def _where_nothing_starts(axes: Axes, front: Front) -> None:
         if left < shortest:
             axes.axvspan(left, shortest, fc="#F6F6F6", ec="#DDDDDD", hatch="///", lw=0, zorder=0)
             axes.set_xlim(left, right)
-        once = " with one contact" if len(front.drive.positions) == 1 else " found"
-        label = f"shortest{once}, {shortest:.4f} s"
-        axes.axvline(shortest, color=GREY, lw=1.0, ls=DASHES[1], label=label)
+        axes.axvline(shortest, color=GREY, lw=1.0, ls=DASHES[1], label=f"shortest found, {shortest:.4f} s")
 
 
 def _scale(axes: Axes, values: Sequence[float]) -> None:
@@ -588,117 +616,3 @@ def write_front(front: Front, folder: Path, command: str) -> None:
         "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
     ]
     write_drive_report(folder, parts, front.drive, command)
-
-
-# one profile for several drives -----------------------------------------------------------------------------
-
-
-def robust_question(blind: RobustOptimum) -> str:
-    """What was asked for."""
-    return (
-        f"one profile for {len(blind.scenarios)} drives, least largest K_dyn, start time at most "
-        f"{blind.start_time:.6g} s, terminal reached"
-    )
-
-
-def scenario_table(worth: SensorWorth) -> Table:
-    """What is different in each drive, and its start without and with a sensor."""
-    blind, reacting = worth.blind, worth.reacting
-    drives = blind.scenarios
-    where = [str(d.start_position) for d in drives]
-    columns = {
-        **({"position": where} if len(set(where)) > 1 else {}),
-        "gap\nrad": column_of([float(d.gap) for d in drives]),
-        "J2\nkg m2": column_of([float(d.J2) for d in drives]),
-        "Mc\nN m": column_of([float(d.Mc) for d in drives]),
-        "K_dyn\nblind": [number(k, 4) for k in blind.k_dyn_each],
-        "start\ntime s": column_of(list(blind.start_times), 5),
-        "K_dyn\nwith sensor": [number(k, 4) for k in reacting.k_dyn_each],
-        "start \ntime s": column_of(list(reacting.start_times), 5),
-    }
-    return Table.of("", columns, texts=["position"] if "position" in columns else [])
-
-
-def worth_conclusion(worth: SensorWorth) -> str:
-    """What the sensor is worth."""
-    blind, reacting = worth.blind, worth.reacting
-    text = f"Largest K_dyn {blind.k_dyn:.3f} without a contact sensor, {reacting.k_dyn:.3f} with one"
-    if worth.percent > 0.0:
-        return f"{text}: the sensor lowers it by {worth.percent:.1f} %."
-    return f"{text}: the sensor is worth nothing here."
-
-
-def robust_bound_sentence(optimum: RobustOptimum) -> str:
-    """How much better any profile could be."""
-    bound = optimum.lower_bound
-    if bound.kind == "none":
-        return "No lower bound is known here."
-    return (
-        f"No profile, reacting or not, brings all of them below K_dyn {bound.k_dyn:.4f} ({bound.kind} bound)."
-    )
-
-
-def worth_figure(worth: SensorWorth) -> Any:
-    """Demand and shaft torques of all drives under one profile: without a contact sensor, and with one."""
-    sides = (("without a contact sensor", worth.blind), ("with a contact sensor", worth.reacting))
-    with drawing():
-        figure, axes = new_figure(2, 2, (9.5, 6.0), sharex=True, sharey="row")
-        for column, (title, best) in enumerate(sides):
-            motor, shaft = axes[:, column]
-            base = best.runs[0].peak_torque / best.k_dyn_each[0]
-            for index, (drive, run) in enumerate(zip(best.scenarios, best.runs, strict=True)):
-                look = {"color": COLOURS[index % 8], "ls": DASHES[index % 8], "lw": 1.2}
-                motor.plot(run.t, run.u, **look)
-                shaft.plot(run.t, run.T, **look, label=_differing(drive, best.scenarios))
-            shaft.axhline(best.k_dyn * base, color=GREY, lw=1.0, ls=DASHES[1], label="largest peak")
-            if best.lower_bound.kind != "none":
-                least = best.lower_bound.k_dyn * base
-                shaft.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
-            for panel in (motor, shaft):
-                panel.axvline(best.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1])
-            motor.set_title(title, loc="left", fontsize=SMALL)
-            shaft.set_title(f"largest K_dyn {best.k_dyn:.4f}", loc="left", fontsize=SMALL)
-            shaft.set_xlabel("time, s     (dashed: start time allowed)")
-        axes[0, 0].set_ylabel("motor torque u, N m")
-        axes[1, 0].set_ylabel("shaft torque T, N m")
-        handles, labels = axes[1, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(labels)))
-        entitle(figure, f"{worth.blind.base.name}: one profile for all")
-    return figure
-
-
-def _differing(drive: Drive, drives: Sequence[Drive]) -> str:
-    """What sets a drive apart from the others."""
-    figures = {
-        "gap": (one.gap for one in drives),
-        "J2": (one.J2 for one in drives),
-        "Mc": (one.Mc for one in drives),
-    }
-    varied = [name for name, values in figures.items() if len(set(values)) > 1]
-    where = [str(drive.start_position)] if len({one.start_position for one in drives}) > 1 else []
-    return ", ".join([*where, *(f"{name} {getattr(drive, name):.4g}" for name in varied)]) or "the drive"
-
-
-def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
-    """Everything about one profile for several drives, without and with a contact sensor."""
-    base = worth.blind.base
-    save_figure(worth_figure(worth), folder, "contact-sensor")
-    for stem, best in (("blind", worth.blind), ("reacting", worth.reacting)):
-        best.profile.to_toml(folder / f"profile-{stem}.toml", about={"drive": base.name, "k_dyn": best.k_dyn})
-        for index, run in enumerate(best.runs, start=1):
-            run.to_csv(folder / f"trace-{stem}-{index}.csv")
-    worth.blind.profile.to_csv(folder / "profile-blind.csv")
-    worth.blind.profile.to_c(folder / "profile-blind.c")
-    parts = [
-        f"# {markdown(base.name)}: one profile for {len(worth.blind.scenarios)} drives",
-        f"Start time at most {worth.blind.start_time:.6g} s, terminal reached. "
-        f"{markdown(worth_conclusion(worth))}",
-        markdown_table(scenario_table(worth)),
-        markdown(robust_bound_sentence(worth.blind)),
-        "![contact-sensor](contact-sensor.svg)",
-        "Without a sensor: [profile-blind.toml](profile-blind.toml), [profile-blind.csv](profile-blind.csv), "
-        "[profile-blind.c](profile-blind.c). With one, its second part from the contact on: "
-        "[profile-reacting.toml](profile-reacting.toml). Traces of each drive, in the order of the table: "
-        "trace-blind-1.csv and so on.",
-    ]
-    write_drive_report(folder, parts, base, command)

@@ -43,10 +43,10 @@ def find(extent: Extent, progress: Progress) -> Found:
 
 
 class OptimalStarts(Study):
-    """The limit of every controller, with proof.
+    """The limit of every controller, with its lower bound.
 
     >>> OptimalStarts.name, len(OptimalStarts.pictures)
-    ('optimal-starts', 7)
+    ('optimal-starts', 6)
     """
 
     name: ClassVar[str] = "optimal-starts"
@@ -59,7 +59,6 @@ class OptimalStarts(Study):
         "optimal-starts-front-worn",
         "optimal-starts-terminals",
         "optimal-starts-sensor",
-        "optimal-starts-sensor-runs",
         "optimal-starts-smooth",
     )
 
@@ -83,7 +82,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
         *kinds.claims(found.kinds),
     )
     progress("drawing")
-    from softstart.views.optima import front_figure, worth_figure
+    from softstart.views.optima import front_figure
     from softstart_studies.optimal_starts import pictures
 
     new, worn = found.fronts[0], found.fronts[-1]
@@ -93,7 +92,6 @@ def present(found: Found, progress: Progress) -> StudyResult:
         front_figure(worn),
         pictures.terminals_figure(found.endings),
         pictures.sensor_figure(found.sensed),
-        worth_figure(found.sensed[0].worth),
         pictures.smooth_figure(found.prices),
     )
     return OptimalStarts.result(

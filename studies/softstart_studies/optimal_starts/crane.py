@@ -11,8 +11,8 @@ import numpy as np
 from softstart import Drive, simulate
 from softstart.controller import ready_controller_names
 from softstart.optimal.front import Front, pareto
+from softstart.optimal.optimize import shortest_start_time
 from softstart.optimal.problem import Problem, Terminal
-from softstart.optimal.shortest import shortest_start_time
 from softstart.study import Progress
 from softstart_studies.paper_g.crane import published
 
@@ -20,7 +20,7 @@ TARGET = 60.0  # rad/s, that of the anchors in docs/optimal-starts.md
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=TARGET)  # [G]: J2 = 5 J1, active load, undamped
 GAP_1, GAP_2 = 0.5, 2.0  # rad, new and worn
 DAMPING = 1.0  # N m s/rad, assumed: 15 % of the critical one; [G] has none
-NEAREST, LONGEST = 1.02, 1.6  # of the shortest start time with one contact, and of that of direct
+NEAREST, LONGEST = 1.06, 1.6  # of the start time of direct
 
 
 @dataclass(frozen=True)
@@ -64,18 +64,18 @@ def direct_time(gap: float) -> float:
 
 
 @cache
-def shortest_time(gap: float, terminal: Terminal = "reached") -> float:
-    """Shortest start time with one contact in s, undamped, active load."""
-    return float(shortest_start_time(Problem(crane(gap), 1.0, terminal)))
+def shortest_time(gap: float) -> float:
+    """Shortest start time found in s, terminal reached, undamped, active load."""
+    return float(shortest_start_time(Problem(crane(gap), 1.0, "reached")))
 
 
 def front_times(gap: float, count: int) -> list[float]:
-    """Start times in s from just above the shortest one on, closer together where the curve is steep.
+    """Start times in s from just above that of direct on, closer together where the curve is steep.
 
     >>> [round(t, 3) for t in front_times(0.5, 3)]
     [0.255, 0.287, 0.384]
     """
-    first, last = NEAREST * shortest_time(gap), LONGEST * direct_time(gap)
+    first, last = NEAREST * direct_time(gap), LONGEST * direct_time(gap)
     times: list[float] = (first + (last - first) * np.linspace(0.0, 1.0, count) ** 2).tolist()
     return times
 
@@ -95,6 +95,12 @@ def optima(
 
 def _prefixed(progress: Progress, what: str) -> Callable[[str], None]:
     return lambda text: progress(f"{what}: {text}")
+
+
+def gap_of(front: Front) -> float:
+    """The gap of its drive, rad."""
+    assert isinstance(front.drive, Drive)
+    return float(front.drive.gap)
 
 
 def percent(ratio: float, digits: int = 1) -> str:

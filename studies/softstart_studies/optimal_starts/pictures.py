@@ -46,9 +46,7 @@ def profiles_figure(found: Sequence[OptimalStart], base: float, target: float) -
                 speed.plot(one.run.t, one.run.w1, color=COLOURS[index], lw=0.8, alpha=0.8)
                 end = one.point.start_time or 0.0
                 speed.plot([end], [float(one.run.at(end)["w2"])], "o", ms=5, color=COLOURS[index])
-            title = f"gap {gap:g} rad" + (
-                f"; {', '.join(refused)} x: infeasible with one contact" if refused else ""
-            )
+            title = f"gap {gap:g} rad" + (f"; {', '.join(refused)} x: infeasible" if refused else "")
             motor.set_title(title, loc="left")
             motor.set_ylim(-3.0, 100.0)
             motor.set_yticks([0, 20, 40, 60])
@@ -95,23 +93,22 @@ def terminals_figure(found: Sequence[Endings]) -> Figure:
 
 
 def sensor_figure(found: Sequence[Sensed]) -> Figure:
-    """K_dyn over the gap under one profile, a panel a start time."""
+    """K_dyn over the gap under one torque, a panel a start time."""
     with drawing():
         figure, panels = new_figure(1, len(found), (9.0, 4.2), sharey=True, squeeze=False)
         for axes, one in zip(panels[0], found, strict=True):
-            gaps = [float(drive.gap) for drive in one.worth.blind.scenarios]
             axes.axhline(1.0, color=GREY, lw=0.9, ls=":")
             lines = (
-                ("one profile, blind", one.worth.blind.k_dyn_each, "s"),
-                ("one profile, reacts to contact", one.worth.reacting.k_dyn_each, "o"),
+                ("one torque, blind", one.blind, "s"),
+                ("planned again after the contact", one.reacting, "o"),
                 ("own optimum of each gap", one.alone, "^"),
             )
             for index, (label, values, marker) in enumerate(lines):
-                axes.plot(gaps, values, marker, color=COLOURS[(1, 0, 2)[index]], ls=DASHES[(1, 0, 2)[index]],
+                axes.plot(one.gaps, values, marker, color=COLOURS[index], ls=DASHES[index],
                           ms=6, mfc="white", mew=1.6, label=label)  # fmt: skip
             axes.set_title(f"start time {one.start_time:.4f} s", loc="left")
             axes.set_xlabel("gap, rad")
-            axes.set_xticks(gaps)
+            axes.set_xticks(one.gaps)
             axes.margins(x=0.1)
         panels[0, 0].set_ylabel(K_DYN)
         panels[0, 0].set_ylim(bottom=0.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from softstart import Run
-from softstart.optimal.exact import replay
+from softstart import Run, simulate
+from softstart.controller import make_controller
 from softstart.optimal.front import FrontPoint
 from softstart.profile import TorqueProfile
 from softstart.study import Progress, Table
@@ -48,7 +48,8 @@ def run_of(gap: float, point: FrontPoint) -> Run | None:
         return None
     drive = crane(gap)
     profile = TorqueProfile(list(point.time), list(point.torque))
-    return replay(drive, profile, point.start_time + float(drive.elastic_period))
+    player = make_controller("profile", {"profile": profile})
+    return simulate(drive, player, point.start_time + float(drive.elastic_period))
 
 
 def table(found: list[OptimalStart]) -> Table:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError
-from softstart.optimal.solving import optimize
+from softstart.optimal.optimize import optimize
+from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, percent, rounded
 
@@ -50,7 +50,7 @@ def _price(lag: float, rate: float, weight: float) -> Price:
     time = MULTIPLE * direct_time(float(drive.gap))
     try:
         best = optimize(drive, time, smoothness=weight)
-    except (InfeasibleError, NotConverged, OptimumError) as error:
+    except (InfeasibleError, OptimumError) as error:
         nan = math.nan
         return Price(lag, rate, weight, nan, nan, nan, nan, str(error))
     bound = best.bound.k_dyn

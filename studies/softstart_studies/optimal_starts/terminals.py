@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from softstart.optimal.front import Front, FrontPoint
 from softstart.optimal.problem import TERMINALS
 from softstart.study import Claim, Progress, Table, Verdict
-from softstart_studies.optimal_starts.crane import crane, direct_time, optima, percent, rounded
+from softstart_studies.optimal_starts.crane import crane, direct_time, gap_of, optima, percent, rounded
 
 PROMISED = 0.05  # by how much reached is said to lie below synchronous where K_dyn > 1
 
@@ -41,7 +41,7 @@ class Endings:
 
 def endings(front: Front, progress: Progress) -> Endings:
     """The other two terminals at the start times of a front; steady, slower to find, at some of them."""
-    gap = float(front.drive.gap)
+    gap = gap_of(front)
     times = [point.start_time_bound for point in front.points]
     return Endings(
         gap,

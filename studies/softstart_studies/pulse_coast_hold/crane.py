@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from softstart import Drive, Records, records
 from softstart.controller import Controller
 from softstart.drive import LoadKind
+from softstart.optimal.optimize import optimize
 from softstart.optimal.result import OptimumError
-from softstart.optimal.solving import optimize
 from softstart.start.batch import prepared
 from softstart_studies.paper_g.crane import published
 

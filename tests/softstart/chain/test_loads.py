@@ -15,7 +15,8 @@ from tests.softstart.chain.oracle_starts import both, differences, random_chain
 from softstart import simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import InputError
-from softstart.optimal.chains.problem import ChainProblem, momentum_bound
+from softstart.optimal.bounds import momentum_bound
+from softstart.optimal.problem import Problem
 from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.chain_schemes import scheme_svg
 from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
@@ -191,10 +192,10 @@ def test_ground_is_drawn_and_the_rest_is_said():
     assert "load curves of mass 2" in notes
     with pytest.raises(InputError, match="leave ground out"):
         chain_backbone(chain, 10.0)
-    problem = ChainProblem(chain, 1.0)
+    problem = Problem(chain, 1.0)
     assert momentum_bound(problem).k_dyn == 0.0
     with pytest.raises(InputError, match="leave no steady torque"):
-        ChainProblem(chain, 1.0, "steady")
+        Problem(chain, 1.0, "steady")
 
 
 def test_what_is_refused():

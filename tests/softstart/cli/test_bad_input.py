@@ -131,9 +131,8 @@ SEVERAL = {
     "compare wrong.toml --controllers dirct,ramp --until -1 --param ramp": [
         "starting_torque", "gap = nan", "did you mean direct?", "--until", "--param"
     ],
-    "optimize wrong.toml --terminal sync --method best --max-heat 0 --smoothness rough --torque-speed 62": [
-        "starting_torque", "gap = nan", "--terminal", "--method", "--max-heat", "--smoothness",
-        "--torque-speed",
+    "optimize wrong.toml --terminal sync --max-heat 0 --smoothness rough --torque-speed 62": [
+        "starting_torque", "gap = nan", "--terminal", "--max-heat", "--smoothness", "--torque-speed",
     ],
     "pareto wrong.toml --start-times soon,0.3 --terminal x --controllers dirct,ramp": [
         "starting_torque", "gap = nan", "--start-times", "--terminal", "did you mean direct?"

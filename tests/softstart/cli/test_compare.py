@@ -87,7 +87,7 @@ def test_table_says_all_and_fits(run, monkeypatch, width):
 
 
 QUICKLY = {
-    "optimize": ("--time-limit", "0"),
+    "optimize": (),
     "tune": ("--gaps", "1x", "--inertias", "1x", "--restarts", "1", "--workers", "1", "--no-optimum"),
 }
 

@@ -95,7 +95,7 @@ def test_points_of_another_drive_are_refused(place, begun, refused):
 
 @pytest.mark.slow
 def test_who_computes_changes_nothing(run, finished):
-    assert {point.method for point in finished[0].points if point.found} == {"closed-form", "lp"}
+    assert {point.method for point in finished[0].points if point.found} == {"closed-form", "descent"}
 
     def told(found):
         return [{**point, "seconds": None} for point in found["points"]], found["controllers"]
@@ -147,7 +147,6 @@ ONE_SENTENCE = {
     "count of a word": (["--start-times", "0.3:0.4:many"], ["from 2 to 1000"]),
     "mixed range": (["--start-times", "0.3:1.2x:5"], ["both ends"]),
     "terminal": (["--terminal", "steedy"], ["--terminal", "did you mean steady?"]),
-    "method": (["--method", "lq"], ["--method", "did you mean lp?"]),
     "controller": (["--controllers", "dirct"], ["did you mean direct?"]),
     "a controller that needs a parameter": (["--controllers", "profile"], ["profile"]),
 }

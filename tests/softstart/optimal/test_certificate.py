@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, get_args
 
 import numpy as np
 import pytest
+from hypothesis import given as drawn
+from hypothesis import settings
+from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.optimize import linprog
+from tests.softstart.optimal.drives import CRANE, played
 
-from softstart import Drive, TorqueProfile
+from softstart import Drive, TorqueProfile, optimize
 from softstart.arrays import Vector
-from softstart.optimal import certificate
-from softstart.optimal.certificate import _Dual, _Envelope, _Search, certified_bound, not_certified
-from softstart.optimal.exact import replay
-from softstart.optimal.lp.ideal import Multipliers
-from softstart.optimal.lp.motion import Contact, entry_of
+from softstart.optimal import certificate, contact_motion
+from softstart.optimal.bounds import momentum_bound
+from softstart.optimal.certificate import _Dual, _Multipliers, _Search, certified_bound, not_certified
+from softstart.optimal.contact_motion import Contact, entries
 from softstart.optimal.problem import Problem, Terminal
 
-CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 UNBOUNDED = 1e9  # rad/s: a target that is set later to what is reached
 
 
@@ -66,12 +69,9 @@ class Start:
         inner = np.abs(T[1:-1])
         left, right = np.abs(T[:-2]), np.abs(T[2:])
         bend = 2.0 * inner - left - right
-        top = inner + np.where(
-            (bend > 0.0) & (inner >= left) & (inner >= right),
-            (right - left) ** 2 / np.maximum(8.0 * bend, 1e-300),
-            0.0,
-        )
-        return float(max(np.abs(T).max(), top.max()))
+        peaked = (bend > 0.0) & (inner >= left) & (inner >= right)
+        more = np.where(peaked, (right - left) ** 2 / np.maximum(8.0 * bend, 1e-300), 0.0)
+        return float(max(np.abs(T).max(), (inner + more).max()))
 
     def judged(self) -> tuple[float, float] | None:
         """(peak of |T| in N m, load speed at the end); None if this is no start of the class."""
@@ -111,37 +111,25 @@ class Start:
         T, z, ones = np.array(T_rows), np.array(z_rows), np.ones((n * checks, 1))
         kept = z if self.pulls else T
         above = np.where(np.arange(n * checks) < checks, 0.0, 1e-3 * Ms)
-        rows = [
-            np.hstack([T[:, :n], -ones]),
-            np.hstack([-T[:, :n], -ones]),
-            np.hstack([-kept[:, :n], 0.0 * ones]),
-        ]
+        rows = [np.hstack([a[:, :n], b]) for a, b in ((T, -ones), (-T, -ones), (-kept, 0.0 * ones))]
         most = [-T[:, n], T[:, n], kept[:, n] - above]
-        equal = []
+        equal = [(X[2], target)] if target is not None else []
         if self.terminal == "reached":
             quarter = self.step(math.pi / float(drive.Omega) / 40.0)
-            tail, x = [], X
-            for _ in range(40):
-                x = quarter @ x
-                tail.append(self.torque(x.T))
-            after = np.array(tail)
+            x = X
+            after = np.array([self.torque((x := quarter @ x).T) for _ in range(40)])
             rows += [np.hstack([after[:, :n], -np.ones((40, 1))]), np.append(-T[-1, :n], 0.0)[None, :]]
             most += [-after[:, n], T[-1:, n] - drive.Mc]
         else:
             equal.append((X[1], 0.0))
         if self.terminal == "steady":
             equal.append((T[-1], drive.Mc))
-        if target is not None:
-            equal.append((X[2], target))
         found = linprog(
-            np.append(np.zeros(n), 1.0) if cost is None else np.append(cost, 0.1),
-            np.vstack(rows),
-            np.concatenate(most),
-            np.array([np.append(row[:n], 0.0) for row, _ in equal]) if equal else None,
+            np.append(np.zeros(n), 1.0) if cost is None else np.append(cost, 0.1), np.vstack(rows),
+            np.concatenate(most), np.array([np.append(row[:n], 0.0) for row, _ in equal]) if equal else None,
             np.array([right - row[n] for row, right in equal]) if equal else None,
-            [(0.0, Ms)] * n + [(0.0, None)],
-            method="highs",
-        )
+            [(0.0, Ms)] * n + [(0.0, None)], method="highs",
+        )  # fmt: skip
         return np.asarray(found.x[:n]) if found.status == 0 else None
 
 
@@ -160,38 +148,26 @@ def random_drive(rng: np.random.Generator) -> Drive:
     moving = 0.0 if reactive else rng.choice([0.0, 1.0])
     w2 = moving * rng.uniform(-1.0, 1.0) * Ms / (J2 * Omega)
     return Drive(
-        motor_inertia=J1,
-        load_inertia=J2,
-        starting_torque=Ms,
-        load_torque=Mc,
-        load_kind="reactive" if reactive else "active",
-        stiffness=c,
+        motor_inertia=J1, load_inertia=J2, starting_torque=Ms, load_torque=Mc, stiffness=c, gap=gap,
+        load_kind="reactive" if reactive else "active", start_position=position, target_speed=UNBOUNDED,
         damping=0.0 if reactive else 2.0 * rng.choice([0.0, 0.02, 0.1, 0.5, 1.5]) * c / Omega,
-        contact_law=rng.choice(["no-pull", "dead-zone"]).item(),
-        gap=gap,
-        start_position=position,
-        initial_load_speed=w2,
+        contact_law=rng.choice(["no-pull", "dead-zone"]).item(), initial_load_speed=w2,
         initial_motor_speed=w2 + moving * rng.uniform(0.0, 1.0) * Ms / (J1 * Omega),
-        target_speed=UNBOUNDED,
-    )
+    )  # fmt: skip
 
 
 def entered(rng: np.random.Generator, drive: Drive) -> tuple[float, Vector] | None:
     """(te, state) that the exact plant reaches under random pulses before both masses move in contact."""
     quick = math.sqrt(2.0 * float(drive.J1) * max(float(drive.gap), 0.2 * drive.Ms / drive.c) / drive.Ms)
-    levels = [
-        float(drive.Ms),
-        *rng.choice([0.0, float(drive.Ms), float(drive.Ms) * rng.random()], 3).tolist(),
-    ]
-    times = np.concatenate([[0.0], np.cumsum(quick * 10 ** rng.uniform(-1.0, 0.2, len(levels)))])
+    levels = float(drive.Ms) * np.append(1.0, rng.choice([0.0, 1.0, rng.random()], 3))
+    times = np.concatenate([[0.0], np.cumsum(quick * 10 ** rng.uniform(-1.0, 0.2, levels.size))])
     if float(drive.theta0) >= 0.5 * float(drive.gap) and drive.load_kind == "active":
         z, v = drive.theta0 - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
         return 0.0, np.array([z, v, drive.initial_load_speed, 0.0, 1.0], dtype=np.float64)
-    run = replay(drive, TorqueProfile.steps(times, levels), float(times[-1]) + 40.0 * quick)
+    run = played(drive, TorqueProfile.steps(times, levels), float(times[-1]) + 40.0 * quick)
     reactive = drive.load_kind == "reactive"
-    begins = [
-        event.time for event in run.events if event.kind == ("load starts" if reactive else "gap closed")
-    ]
+    first = "load starts" if reactive else "gap closed"
+    begins = [event.time for event in run.events if event.kind == first]
     opened = [event.time for event in run.events if event.kind == "gap opened"]
     if not begins or (opened and opened[0] < begins[0]):
         return None
@@ -243,7 +219,7 @@ def test_no_start_at_all_gets_below(terminal: Terminal, monkeypatch: pytest.Monk
     """Each start sets its own target and time; half of them are improved by programs at random entries."""
     monkeypatch.setattr(certificate, "MOST_PROGRAMS", 3)
     monkeypatch.setattr(certificate, "MOST_CELLS", 150)
-    monkeypatch.setattr(certificate, "ENTRY_CELLS", 600)
+    monkeypatch.setattr(contact_motion, "ENTRY_CELLS", 60)
     rng = np.random.default_rng(20)
     ratios: list[float] = []
     while len(ratios) < 8:
@@ -255,10 +231,17 @@ def test_no_start_at_all_gets_below(terminal: Terminal, monkeypatch: pytest.Monk
         if len(ratios) % 3:
             start, peak = pressed(rng, start, target, peak)
         problem = Problem(start.drive.replace(target_speed=target), start.te + start.tau, terminal)
-        search = _Search(problem, 1.002 * peak, start.te if rng.random() < 0.5 else None)
-        bound = search.bound()
+        near = start.te if rng.random() < 0.5 else None
+        cells = entries(problem, start.te + start.tau, near)
+        k = max(int(np.searchsorted(cells.te, start.te)) - 1, 0)  # the cell of this entry
+        speeds = cells.slowest[k], start.entered[1], cells.fastest[k]
+        assert np.all(np.diff(speeds) >= -1e-8 * cells.fastest.max())
+        search = _Search(problem, cells, 1.002 * peak, near)
+        bound = search.least()
         assert bound <= peak * (1.0 + 1e-7)
         for dual in search.duals:  # at this very entry and duration, without any cell
+            one_sided = np.abs(dual.by.of_T) if start.pulls else np.maximum(dual.by.of_T, 0.0)
+            assert one_sided.sum() + dual.by.tail.sum() < 1.0 + 1e-9
             fixed, by_v = dual.at(start.tau)
             missing = target - float(start.entered[2])
             assert fixed + by_v * start.entered[1] + dual.by.speed * missing <= peak * (1.0 + 1e-7)
@@ -266,27 +249,19 @@ def test_no_start_at_all_gets_below(terminal: Terminal, monkeypatch: pytest.Monk
     assert max(ratios) > 0.98  # and it says something
 
 
-def random_multipliers(rng: np.random.Generator, problem: Problem, tail_at: Vector) -> Multipliers:
-    share = np.sort(rng.uniform(0.0, 1.0, 12))
-    share[-1] = 1.0
+def random_multipliers(rng: np.random.Generator, problem: Problem) -> _Multipliers:
     pulls = problem.drive.contact_law == "dead-zone" and problem.drive.d > 0.0
-    peak, trough = rng.exponential(size=(2, 12)) * rng.choice([0.0, 1.0], (2, 12))
-    tail = rng.exponential(size=tail_at.size) * (0.3 if problem.terminal == "reached" else 0.0)
-    trough *= pulls
-    total = peak.sum() + trough.sum() + tail.sum() + 1e-12
+    peak, low, z = rng.exponential(size=(3, 12)) * rng.choice([0.0, 1.0], (3, 12))
+    tail = rng.exponential(size=certificate.TAIL) * (0.03 if problem.terminal == "reached" else 0.0)
+    total = peak.sum() + pulls * low.sum() + tail.sum() + 1e-12
     J2, Omega = float(problem.drive.J2), float(problem.drive.Omega)
     ends = problem.terminal != "reached"
-    return Multipliers(
-        share,
-        peak / total,
-        trough / total,
-        rng.exponential(size=12) * rng.choice([0.0, 0.3], 12),
-        tail_at,
-        tail / total,
+    return _Multipliers(
+        (peak - low) / total, -pulls * z / total, tail / total,
         speed=rng.normal() * J2 * Omega,
         rate=ends * rng.normal() * float(problem.drive.c) / Omega,
         torque=float(problem.terminal == "steady") * rng.normal(),
-    )
+    )  # fmt: skip
 
 
 DRIVES: dict[str, dict[str, Any]] = {
@@ -295,46 +270,57 @@ DRIVES: dict[str, dict[str, Any]] = {
     "damped": {"damping": 2.0},
     "dead-zone": {"damping": 2.0, "contact_law": "dead-zone"},
     "overdamped": {"damping": 40.0},
+    "overdamped in contact": {"damping": 40.0, "start_position": 0.33},
     "in contact": {"damping": 0.3, "start_position": 0.33, "initial_motor_speed": 2.0},
 }
 
 
 @pytest.mark.parametrize("given", DRIVES.values(), ids=DRIVES)
 @pytest.mark.parametrize("terminal", get_args(Terminal))
-def test_any_numbers_at_all_make_a_bound(given: dict[str, Any], terminal: Terminal) -> None:
-    """D(te, tau) of random multipliers against the same sum for random torques, and over a cell of tau."""
+def test_any_numbers_at_all_make_a_bound(
+    given: dict[str, Any], terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """D(te, tau) of random multipliers against the same sum for random torques, and over a cell of tau.
+
+    Coarse steps of the integral of q prove no more than fine ones.
+    """
     rng = np.random.default_rng(31)
     problem = Problem(CRANE.replace(**given), 0.3, terminal)
-    entry, contact = entry_of(problem), Contact.of(problem.drive)
-    coasting = min(contact.half_period, math.pi / contact.Omega)
-    envelope = _Envelope(contact, 0.3 + coasting)
-    pulls = problem.drive.contact_law == "dead-zone"
-    Ms = problem.highest_torque
+    Ms, cells = problem.highest_torque, entries(problem, 0.3)
     for _ in range(4):
-        by = random_multipliers(rng, problem, coasting * np.linspace(0.2, 1.0, 5))
-        v = float(entry.slowest(np.array([entry.earliest]))[0]) * rng.uniform(0.2, 1.0)
+        by = random_multipliers(rng, problem)
+        low, high = np.sort(rng.uniform(0.2, 1.0, 2)) * float(cells.fastest.max())
         tau = 0.25 * 10 ** rng.uniform(-1.5, 0.0)
-        dual = _Dual(problem, entry, by, envelope, v, tau)
-        search = _Search(problem, 1.0)
-        search.missing, search.low, search.high = np.zeros(2), np.array([v]), np.array([v])
+        missing, search = 20.0 * rng.normal(size=2), _Search(problem, cells, 1.0)
+        proved = list[float]()
+        for fine in (2.0, 0.5, 0.001, 0.02):
+            monkeypatch.setattr(certificate, "FINE", fine)
+            dual = _Dual(problem, cells, by, tau)
+            proved.append(dual.at(tau)[0])
+        assert max(proved) <= proved[2] + 1e-9 * abs(proved[2])
+        cells.slowest[0], cells.fastest[0], search.missing[:2] = low, high, missing
         taus = np.linspace(0.5 * tau, tau, 13)
-        least = search._dual(dual, taus[0], tau, 1).item()
-        at_end = search._dual(dual, tau, tau, 1).item()
-        shares = (np.arange(40) + 0.5) / 40
+        least = search._proved(dual, taus[0], tau, slice(1)).item()
+        at_end = search._proved(dual, tau, tau, slice(1)).item()
+        curved = (dual.still + dual.growing * tau) * (0.5 * tau) ** 2 / 8.0
+        assert -math.inf < least <= at_end - curved + 1e-9 * abs(at_end)
         for t in taus:
-            q = dual._weights(shares * t, t, dual._first(shares))[0]
+            q = dual.weights(t)[0] - dual.momentum
+            q = q[(np.arange(40) * q.size) // 40 + q.size // 80]
             for weights in (q, rng.normal(size=40)):  # the torque that presses most, and any
                 u = np.where(weights < 0.0, Ms, 0.0)
-                start = Start(problem.drive, terminal, 0.0, np.array([entry.z0, v, 0.0, 0.0, 1.0]), t, u)
-                value = the_sum(start, by, pulls)
+                v, w2 = rng.uniform(low, high), -rng.choice(missing)
+                if weights is q:
+                    v, w2 = low if dual.at(t)[1] > 0.0 else high, -missing[np.argmin(by.speed * missing)]
+                start = Start(problem.drive, terminal, 0.0, np.array([cells.z0, v, w2, 0.0, 1.0]), t, u)
+                value = the_sum(start, by)
                 scale = 1e-9 * (abs(value) + Ms)
                 assert value >= least - scale
                 if t == tau:
                     assert value >= at_end - scale
-        assert at_end > -math.inf
 
 
-def the_sum(start: Start, by: Multipliers, pulls: bool) -> float:
+def the_sum(start: Start, by: _Multipliers) -> float:
     """Sum of multipliers times limits, with T, z, z' and w2 from matrix exponentials."""
     drive, n = start.drive, start.u.size
     edges = np.linspace(0.0, start.tau, n + 1)
@@ -351,37 +337,60 @@ def the_sum(start: Start, by: Multipliers, pulls: bool) -> float:
         return np.asarray(start.step(s - edges[k]) @ x)
 
     total = 0.0
-    for share, peak, trough, closed in zip(by.share, by.peak, by.trough, by.closed, strict=True):
-        x = at(share * start.tau)
-        T = float(start.torque(x))
-        total += (peak - trough) * T - closed * (drive.c * x[0] if pulls else T)
-    for s, weight in zip(by.tail_at, by.tail, strict=True):
-        total += weight * float(start.torque(at(start.tau + s)))
+    for share, of_T, of_z in zip(np.arange(1, 13) / 12, by.of_T, by.of_z, strict=True):
+        x = at(min(share * start.tau, start.tau))
+        total += of_T * float(start.torque(x)) + of_z * drive.c * x[0]
+    for s, weight in zip(certificate._after(Contact.of(drive)), by.tail, strict=True):
+        total += weight * float(start.torque(at(start.tau + s))) if weight else 0.0
     end = nodes[-1]
     total -= by.speed * end[2] + by.rate * end[1] + by.torque * (float(start.torque(end)) - drive.Mc)
     return float(total)
 
 
-@pytest.mark.parametrize("d", [0.0, 0.5, 3.0, 6.5564, 60.0])
-@pytest.mark.parametrize("longest", [0.01, 0.3, 8.0])
-def test_the_envelope_is_above_the_kernels(d: float, longest: float) -> None:
+@pytest.mark.parametrize("given", DRIVES.values(), ids=DRIVES)
+def test_the_curvature_over_tau_is_enclosed(given: dict[str, Any]) -> None:
+    """Each multiplier alone: second differences at fixed v and u(s/tau) stay below M, and get near it."""
+    problem, ends, sharp = Problem(CRANE.replace(**given), 0.3), 24 + certificate.TAIL, list[float]()
+    cells, step = entries(problem, 0.3), 1e-3 / float(problem.drive.Omega)
+    speed = float(cells.fastest[0])
+    for unit in np.eye(ends + 3)[[2, 11, 14, 23, ends - 1, ends, ends + 1, ends + 2]]:
+        T, z, tail, numbers = np.split(unit, [12, 24, ends])
+        by, most = _Multipliers(T, -z, tail, *numbers.tolist()), 0.0
+        for angle, u, v, z0 in product((50, 1600, 3100), ([62, 62], [0, 62]), (0.0, speed), (0.0, 30.0)):
+            cells.fastest[:], cells = v, replace(cells, z0=z0)
+            x, tau = np.array([z0, v, 0.0, 0.0, 1.0]), angle * step
+            dual, taus = _Dual(problem, cells, by, 0.1), (tau - step, tau, tau + step)
+            f = [the_sum(Start(problem.drive, "reached", 0.0, x, one, np.array(u)), by) for one in taus]
+            bent = abs(f[0] - 2.0 * f[1] + f[2]) / step**2
+            most = max(most, bent / (dual.still + dual.growing * taus[2]))
+        sharp.append(most)
+    assert 0.25 < max(sharp) < 1.0 + 1e-4
+
+
+@settings(max_examples=150, deadline=None)
+@drawn(st.floats(0.0, 4.0) | st.just(1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.1, 30.0))
+def test_a_free_motion_stays_within_its_enclosure(share: float, y: float, rate: float, length: float) -> None:
+    """At any damping, of y' and y'' and of the responses of T, z and z' to a step of v or z."""
+    d = 2.0 * share * math.sqrt(368.465 / (1.0 / 0.035 + 1.0 / 0.175))
     contact = Contact(0.035, 0.175, 368.465, d, 7.16)
-    envelope = _Envelope(contact, longest)
-    s = np.unique(np.concatenate([np.linspace(0.0, longest, 20001), np.geomspace(1e-7, longest, 20001)]))
-    h, dh = contact.h(s), contact.dh(s)
-    ddh = -2.0 * contact.zeta * dh - contact.Omega**2 * h
-    third = -2.0 * contact.zeta * ddh - contact.Omega**2 * dh
-    for name, bent in (
-        ("T", contact.c * ddh + contact.d * third),
-        ("z", contact.c * ddh),
-        ("rate", third),
-        ("w2", third * contact.J1 / (contact.J1 + contact.J2)),
-    ):
-        assert np.abs(bent).max() <= envelope.by_v[name]
-        assert np.abs(bent).max() / contact.J1 <= envelope.kernels[name][2] * (1.0 + 1e-12)
-    over = contact.Omega**2
-    assert np.abs(over * ddh).max() <= envelope.by_overlap["rate"]
-    assert np.abs(over * (contact.c * dh + contact.d * ddh)).max() <= envelope.by_overlap["T"]
+    free = np.array([[0.0, 1.0], [-(contact.Omega**2), -2.0 * contact.zeta]])
+    step, x = expm(free * length / contact.Omega / 2000), np.array([y, contact.Omega * rate])
+    bounds = contact.swing(*x.tolist())
+    path = np.array([x, *(x := step @ x for _ in range(2000))])
+    assert np.abs(path[:, 1]).max() <= bounds[0] * (1.0 + 1e-12)
+    assert np.abs(path @ free[1]).max() <= bounds[1] * (1.0 + 1e-12)
+    _, h, dh = contact.responses(np.linspace(0.0, length / contact.Omega, 2001))
+    np.testing.assert_allclose(
+        np.array([dh + 2.0 * contact.zeta * h, h * contact.Omega]).T @ [y, rate], path[:, 0], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("name", ["crane-4amtkf-light", "crane-4amtkf-worn"])
+def test_it_is_close_where_momentum_is_far(name: str) -> None:
+    """K_dyn above 1, at 1.2 times the start time of direct: the momentum bound is 38 and 28 % below."""
+    best = optimize(Drive.load(name), "1.2x")
+    assert 0.9985 * best.k_dyn < best.bound.k_dyn <= best.k_dyn
+    assert momentum_bound(best.problem).k_dyn < 0.75 * best.k_dyn
 
 
 def test_what_the_bound_covers_is_said() -> None:
@@ -395,6 +404,19 @@ def test_what_the_bound_covers_is_said() -> None:
     assert "whose gap stays closed until the target speed is reached" in closed.covers
 
 
-def test_nothing_is_certified_where_the_start_is_no_linear_problem() -> None:
-    assert "start time" in not_certified(Problem(CRANE, None, minimise="start_time"))
-    assert "brake" in not_certified(Problem(CRANE.replace(minimum_torque=-5.0), 0.3))
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"minimum_torque": -5.0}, "brake"),
+        ({"contact_law": "modelica", "damping": 1.0}, "modelica law is not linear"),
+        ({"damping": 1.0, "load_torque": 0.0}, "did not push"),
+        ({"initial_load_speed": 3.0}, "runs away"),
+        ({"load_kind": "reactive", "damping": 1.0}, "depends on the speed"),
+        ({"load_kind": "reactive", "initial_motor_speed": 3.0}, "moves before the contact"),
+        ({"start_position": -0.3}, "wound up against the load"),
+        ({"load_kind": "reactive", "start_position": 0.27}, "wound up against the load"),
+    ],
+)
+def test_nothing_is_certified_where_the_start_is_no_linear_problem(given: dict[str, Any], why: str) -> None:
+    assert why in not_certified(Problem(CRANE.replace(**given), 0.3, "steady"))
+    assert "start time" in not_certified(Problem(CRANE.replace(**given), None, minimise="start_time"))

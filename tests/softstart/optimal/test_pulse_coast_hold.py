@@ -1,10 +1,10 @@
-"""The closed form against the exact plant, another integrator and the linear program; its limits."""
+"""The closed form against the exact plant and another integrator; its limits."""
 
 from __future__ import annotations
 
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,14 +12,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from tests.softstart.optimal.drives import CRANE, played
 
-from softstart import Drive, simulate
-from softstart.optimal.exact import replay
-from softstart.optimal.lp import ideal
+from softstart import Drive, TorqueProfile, simulate
+from softstart.optimal import pulse_coast_hold
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import NotApplicable, PulseCoastHold, applies, solve
+from softstart.optimal.pulse_coast_hold import NotApplicable, PulseCoastHold, applies
 
-CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+class Answer(NamedTuple):
+    """What the closed form answers."""
+
+    profile: TorqueProfile
+    end_time: float
+    claimed: float
+
+
+def solve(problem: Problem) -> Answer:
+    return Answer(*pulse_coast_hold.solve(problem))
 
 
 def integrated(drive: Drive, t1: float) -> tuple[float, float, float]:
@@ -84,7 +94,7 @@ def checked(problem: Problem) -> float:
     """K_dyn, after everything that the form promises has been found true on the exact plant."""
     best = solve(problem)
     drive = problem.drive
-    run = replay(drive, best.profile, best.end_time + drive.elastic_period)
+    run = played(drive, best.profile, best.end_time + drive.elastic_period)
     state = run.at(best.end_time)
     assert problem.start_time is not None
     assert best.end_time <= problem.start_time * (1 + 1e-12)
@@ -155,7 +165,7 @@ def test_reached_before_the_peak_of_the_shaft_torque() -> None:
     drive = drive.replace(target_speed=starts.load_speed(course, within, 1.5 * starts.most_held))
     best = solve(Problem(drive, within, "reached"))
     assert best.claimed == pytest.approx(1.5, rel=1e-6)
-    run = replay(drive, best.profile, course.t_peak + 0.2 * drive.elastic_period)
+    run = played(drive, best.profile, course.t_peak + 0.2 * drive.elastic_period)
     assert run.k_dyn == pytest.approx(best.claimed, rel=1e-12)
     assert run.start_time == pytest.approx(within, rel=1e-9)
     with pytest.raises(NotApplicable, match="before the shaft torque is at its peak"):
@@ -191,20 +201,6 @@ def test_what_it_is_not_for(changes: Any, terms: Any, reason: str) -> None:
     assert reason in applies(problem)
     with pytest.raises(NotApplicable, match=reason):
         solve(problem)
-
-
-@pytest.mark.parametrize(
-    ("drive", "start_time"),
-    [(CRANE, 0.2883042), (CRANE.replace(gap=0.01, motor_inertia=0.1), 0.42)],
-    ids=["pulse ends in the gap", "pulse ends in contact"],
-)
-def test_the_linear_program_finds_nothing_better(drive: Drive, start_time: float) -> None:
-    problem = Problem(drive, start_time)
-    program = ideal.solve(problem)
-    assert program is not None
-    # the program checks T at a grid of instants and steps its torque: a few 1e-4 to either side
-    assert program.claimed == pytest.approx(solve(problem).claimed, rel=5e-4)
-    assert program.claimed >= solve(problem).claimed * (1.0 - 1e-5)
 
 
 @settings(max_examples=60, deadline=None)

@@ -228,7 +228,7 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     crane = Drive.load("crane-4amtkf")
     session = Session(crane, controllers=["direct"])
     panel = OptimumPanel(session, "A", Jobs())
-    panel._found = tasks.Gentlest(optimize(crane, "1.2x"), {})
+    panel._found = tasks.Gentlest(optimize(crane, "1.2x"), "", {})
     session.take(Drive.load("hoist-15kw"))
     panel._stale.show_for(crane)
     panel._add()

@@ -140,6 +140,7 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
     found = tasks.gentlest(CRANE, "1.2x", "reached", progress=Heard())  # type: ignore[arg-type]
     best = optimize(CRANE, 1.2 * simulate(CRANE, "direct").start_time, terminal="reached")
     assert found.best.k_dyn == best.k_dyn
+    assert best.bound.covers.rstrip(".") in found.bound
     assert simulate(CRANE, player_of(found.best)).k_dyn == best.k_dyn
     assert player_of(found.best).name == label_of(best) == f"optimum {best.end_time:.4g} s"
     for suffix in (".csv", ".toml"):
@@ -153,12 +154,12 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
 
 
 def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The easy end only: the short end takes a search, which the browser's test and those of pareto have."""
-    monkeypatch.setattr("softstart.optimal.shortest.shortest_start_time", lambda problem: math.inf)
+    usual = [0.36, 0.4, 0.5]
+    monkeypatch.setattr("softstart.optimal.front.default_start_times", lambda drive, terminal: usual)
     runs = {name: simulate(CRANE, name) for name in ("current-limit-feedback", "ramp")}
     heard = Heard()
     points = tasks.curve(CRANE, [run.start_time for run in runs.values()], progress=heard)  # type: ignore[arg-type]
-    assert {p.start_time_bound for p in heard.parts} == {p.start_time_bound for p in points}
+    assert {p.start_time_bound for p in heard.parts} == {p.start_time_bound for p in points} >= {*usual}
     times = [p.start_time_bound for p in points]
     assert times == sorted(times)
     least = [p.k_dyn for p in points if p.k_dyn is not None]

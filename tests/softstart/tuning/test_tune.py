@@ -322,8 +322,8 @@ def test_the_price_sets_the_optimum_beside_it():
     price = tuned.price.isel(gap=0, load_inertia=0)
     best = optimize(CRANE, float(price.schedule_bound), terminal="reached")
     assert float(price.schedule_optimum) == pytest.approx(best.k_dyn, rel=1e-9)
-    assert float(price.schedule_lower_bound) == pytest.approx(best.k_dyn_lower_bound, rel=1e-9)
-    assert float(price.schedule) == float(tuned.schedule.k_dyn[0, 0]) >= best.k_dyn_lower_bound
+    assert float(price.schedule_lower_bound) == pytest.approx(best.bound.k_dyn, rel=1e-9)
+    assert float(price.schedule) == float(tuned.schedule.k_dyn[0, 0]) >= best.bound.k_dyn
     assert float(price.robust_over_schedule) == pytest.approx(float(price.robust / price.schedule))
     assert float(price.schedule_over_optimum) == pytest.approx(float(price.schedule) / best.k_dyn)
     assert tuned.between is None

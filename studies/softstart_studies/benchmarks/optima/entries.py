@@ -39,13 +39,14 @@ class Entry:
     trap: bool = False
 
 
-_OURS = ("softstart.optimal.solving",)
+_OURS = ("softstart.optimal.optimize",)
 ENTRIES = {
     "closed-form": Entry(
         OURS, "softstart_optimize", _OURS, "pulse, coast, hold", {"method": "closed-form"}
     ),
-    "lp": Entry(
-        OURS, "softstart_optimize", _OURS, "linear program, search over contact time", {"method": "lp"}
+    "descent": Entry(
+        OURS, "softstart_optimize", _OURS, "successive linear programs on the exact start, HiGHS",
+        {"method": "descent"},
     ),
     "collocation": Entry(
         OURS, "softstart_optimize", _OURS, "CasADi, phases of free duration, IPOPT", {"method": "collocation"}
@@ -75,7 +76,7 @@ ENTRIES = {
 def installed(name: str) -> str | None:
     """Version of the package behind a contender, None if it is not installed.
 
-    >>> installed("lp") is None
+    >>> installed("descent") is None
     False
     """
     return version_of(ENTRIES[name].package)

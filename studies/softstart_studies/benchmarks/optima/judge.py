@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.optimal.exact import replay
+from softstart import Run, simulate
+from softstart.controller import make_controller
 from softstart.profile import TorqueProfile
 from softstart_studies.benchmarks.optima.task import Answer, Task, crane
 
@@ -50,11 +51,11 @@ def judge(task: Task, answer: Answer) -> Judged:
     demand = np.array(answer.torque)
     excess = float(max(0.0, -demand.min(), demand.max() - task.Ms))
     profile = TorqueProfile(answer.time, demand.clip(0.0, task.Ms))
-    state = replay(drive, profile, until=end).at([end])
+    state = _replayed(profile, end).at([end])
     w1, w2, T = (float(state[name][0]) for name in ("w1", "w2", "T"))
     holding = (T * (task.J1 + task.J2) - task.Mc * task.J1) / task.J2
     tail = TorqueProfile([0.0], [float(np.clip(holding, 0.0, task.Ms))])
-    run = replay(drive, profile.followed_by(end, tail), until=end + float(drive.elastic_period))
+    run = _replayed(profile.followed_by(end, tail), end + float(drive.elastic_period))
     errors = (w1 - task.target, w2 - task.target)
     conditions = {
         "start time": end <= task.start_time * (1.0 + TIME_TOLERANCE),
@@ -64,3 +65,7 @@ def judge(task: Task, answer: Answer) -> Judged:
     }
     broken = tuple(name for name, kept in conditions.items() if not kept)
     return Judged(answer.claimed, run.k_dyn, end, *errors, run.contacts, excess, broken)
+
+
+def _replayed(profile: TorqueProfile, until: float) -> Run:
+    return simulate(crane(), make_controller("profile", {"profile": profile}), until)

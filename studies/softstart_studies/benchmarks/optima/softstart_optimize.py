@@ -1,18 +1,31 @@
-"""softstart itself: one call."""
+"""softstart itself: the closed form, the descent of `optimize`, and its CasADi statement."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from softstart_studies.benchmarks.optima.task import DRIVE, TARGET, Answer, Task
+from softstart_studies.benchmarks.optima.task import Answer, Task, crane
 
 
-def solve(task: Task, method: Any = "auto") -> Answer:
+def solve(task: Task, method: str = "closed-form") -> Answer:
     """Least peak torque by one of softstart's methods."""
-    from softstart.drive import Drive
-    from softstart.optimal.solving import optimize
+    from softstart.optimal.optimize import searched
+    from softstart.optimal.problem import Problem
+    from softstart.optimal.pulse_coast_hold import solve as closed_form
 
-    drive = Drive.load(DRIVE).replace(target_speed=TARGET)
-    best = optimize(drive, task.start_time, method=method)
-    profile = best.profile
-    return Answer(best.claimed, tuple(profile.time.tolist()), tuple(profile.torque.tolist()), best.end_time)
+    problem = Problem(crane(), task.start_time)
+    if method == "closed-form":
+        profile, end, claimed = closed_form(problem)
+    elif method == "descent":
+        found = searched(problem)
+        if found is None:
+            raise RuntimeError("no start was found.")
+        _, best, profile = found
+        claimed, end = best.peak / problem.base_torque, best.end
+    else:
+        from softstart import simulate
+        from softstart.optimal.statement import solve as nonlinear
+
+        drive = crane()  # whose strategy gives the order of contacts: one
+        run = simulate(drive, "pulse-coast-hold", task.start_time + float(drive.elastic_period))
+        claim = nonlinear(problem, run, straight=True)
+        profile, claimed, end = claim.profile, claim.value, claim.end_time
+    return Answer(claimed, tuple(profile.time.tolist()), tuple(profile.torque.tolist()), end)

@@ -5,15 +5,14 @@ import itertools
 import numpy as np
 import pytest
 
-from softstart import Drive, simulate
-from softstart.controller import make_controller
-from softstart.optimal.exact import replay
+from softstart import Drive
+from softstart.optimal.check import replayed
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import LowerBound, Optimum, RobustOptimum, SensorWorth
+from softstart.optimal.result import LowerBound, Optimum
 from softstart.profile import TorqueProfile
 from softstart.views.drawing import name_points, save_figure, shared
-from softstart.views.optima import front_figure, optimum_figure, worth_figure
+from softstart.views.optima import front_figure, optimum_figure, scenario_table
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -22,8 +21,8 @@ def optimum(kind="certificate", **options) -> Optimum:
     """A start that is no optimum, but has all that is drawn."""
     problem = Problem(CRANE, 0.28, **options)
     profile = TorqueProfile.steps([0.0, 0.0184, 0.0333, 0.34], [62.0, 0.0, 55.0])
-    run = replay(CRANE, profile, 0.34)
-    return Optimum(problem, profile, run, LowerBound(0.9, kind, "all"), "lp", "why", run.k_dyn, 0.28, 0.1)
+    runs = replayed(problem, profile, 0.28)
+    return Optimum(problem, profile, runs, LowerBound(0.9, kind, "all"), "descent", "why", 1.0, 0.28, 0.1)
 
 
 def lines(axes):
@@ -103,7 +102,7 @@ def test_the_front_is_drawn_from_its_points():
     assert drawn["optimum"].get_xydata().tolist() == [[p.start_time_bound, p.k_dyn] for p in found]
     assert drawn["lower bound"].get_ydata().tolist() == [p.k_dyn_lower_bound for p in found]
     assert drawn["no optimum"].get_xdata().tolist() == [0.22]
-    assert drawn["shortest with one contact, 0.2350 s"].get_xdata()[0] == 0.235
+    assert drawn["shortest found, 0.2350 s"].get_xdata()[0] == 0.235
     texts = "\n".join(text.get_text() for text in axes.texts).split("\n")
     assert sorted(texts) == sorted(f"{name}, x{k:.2f}" for name, _, k in CROWDED)
 
@@ -151,38 +150,20 @@ def test_pictures_are_files(tmp_path):
         assert "</svg>" in (tmp_path / f"{stem}.svg").read_text("utf-8")
 
 
-def worth(gaps) -> SensorWorth:
-    """Starts that are no optima, but have all that is drawn."""
-    drives = tuple(CRANE.replace(gap=gap) for gap in gaps)
-    after = TorqueProfile([0.0, 0.05], [0.0, 50.0])
-    sides = []
-    for react in (False, True):
-        profile = TorqueProfile([0.0, 0.0184, 0.0184], [62.0, 62.0, 50.0], after if react else None)
-        runs = tuple(
-            simulate(drive, make_controller("profile", {"profile": profile}), base=CRANE) for drive in drives
-        )
-        bound = LowerBound(0.8, "momentum", "all")
-        sides.append(RobustOptimum(drives, 0.32, CRANE, react, profile, runs, bound, 1.0))
-    return SensorWorth(*sides)
-
-
-def test_the_worth_of_a_sensor_is_drawn_from_all_runs():
-    one = worth([0.5, 1.0])
-    left, right, below_left, below_right = worth_figure(one).axes
-    for best, motor, shaft in ((one.blind, left, below_left), (one.reacting, right, below_right)):
-        for run, line in zip(best.runs, motor.get_lines(), strict=False):
-            assert np.array_equal(line.get_xydata(), np.column_stack([run.t, run.u]))
-        for run, gap in zip(best.runs, ("gap 0.5", "gap 1"), strict=True):
-            assert np.array_equal(lines(shaft)[gap].get_ydata(), run.T)
-        assert lines(shaft)["largest peak"].get_ydata()[0] == pytest.approx(
-            max(run.peak_torque for run in best.runs)
-        )
-        assert shaft.get_title(loc="left") == f"largest K_dyn {best.k_dyn:.4f}"
-
-
-def test_drives_are_named_by_what_differs():
-    labels = lines(worth_figure(worth([0.5])).axes[2])
-    assert "the drive" in labels
+def test_one_profile_for_several_machines_is_drawn_from_all_runs():
+    best = optimum(
+        terminal="reached", scenarios=(CRANE.replace(gap=0.4), CRANE.with_gap(1.0, load_inertia=0.1))
+    )
+    shaft = optimum_figure(best).axes[1]
+    for run in best.runs:
+        wanted = np.column_stack([run.t, run.T])
+        assert any(np.array_equal(line.get_xydata(), wanted) for line in shaft.get_lines())
+    assert lines(shaft)["peak"].get_ydata()[0] == max(run.peak_torque for run in best.runs)
+    rows = scenario_table(best).rows
+    assert [row[:3] for row in rows] == [
+        ["1", "0.500", "0.1750"], ["2", "0.400", "0.1750"], ["3", "1.000", "0.1000"],
+    ]  # fmt: skip
+    assert [float(row[4]) for row in rows] == pytest.approx(best.k_dyn_each, abs=1e-4)
 
 
 def test_a_front_without_any_optimum_is_drawn():

@@ -1,6 +1,6 @@
 """Lower bounds from momentum: valid for every torque over time, whatever controller makes it.
 
-Integrated from 0 to t_f, the load's J2 w2' = T - Mc says
+Two masses. Integrated from 0 to t_f, the load's J2 w2' = T - Mc says
 
     J2 (target - w2(0)) = integral T dt - Mc t_f <= P (t_f - t_c) - Mc t_f
 
@@ -32,22 +32,44 @@ Two sharper forms, where the twist cannot fall first and the load is active:
   limits v; and in the gap the soonest contact with at most that speed is an early pulse. A contact that has
   to be gentle comes later than t_c. Fewer instants s only lower the bound: a grid proves as much as it
   says.
+
+A brake that holds the motor at first is left out: the motor could hold it too.
+
+N masses. The load mass alone obeys J_L w_L' = T - M_L, T the torque of the n shafts beside it (1 at the end
+of a chain), brought to the motor's direction; with |T| <= P from the instant t_c on at which one can first
+drive it, J_L (target - w_L(0)) + M_L t_f <= n P (t_f - t_c) for an active load torque and a load mass without
+damping to the ground. Else, and where the load moves forward at first, what is left after its last standstill
+counts, J_L target <= (n P - M_L)(t_f - t_c). For t_c the chain has to begin at rest, motor and load on its
+ends, all gaps open or touching, no load torque on other masses, gears without losses, no friction; everywhere
+else t_c = 0:
+
+- Nothing but the motor's mass and the falling load mass moves before t_1, when the motor's shaft can close
+  under full torque U: t_1^2 = 2 J_1 travel/U.
+- From then on the speed of each mass is bounded by energy. E, kinetic and elastic, grows by no more than
+  U |w_1| + M_L |w_L| a second, so that d sqrt(2E)/dt <= S = U/sqrt(J_1) + M_L/sqrt(J_L), and the relative
+  speed at the load's shaft is at most A t, A = S sqrt(1/J_b + 1/J_L), J_b the mass before the load.
+
+So the shaft cannot pull before t_c, where M_L t_1^2/(2 J_L) + A (t_c^2 - t_1^2)/2 is what its gap leaves. No
+contact law adds energy.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from softstart.errors import InputError
-from softstart.optimal.exact import hold_of
-from softstart.optimal.lp.motion import Contact
+from softstart.arrays import Vector
+from softstart.drive import Drive
+from softstart.kernel import records as at
+from softstart.optimal.contact_motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
 from softstart.optimal.result import LowerBound
+from softstart.start.rows import rows_of
 
 ROUNDING = 1e-10  # by so much, relatively, time is stretched and a bound lowered: not to lie above an optimum
 INSTANTS = 64  # at which the coasting shaft torque is looked at
@@ -66,13 +88,92 @@ def momentum_bound(problem: Problem) -> LowerBound:
     >>> round(momentum_bound(Problem(drive.replace(load_kind="reactive"), 0.2883042)).k_dyn, 4)
     0.8688
     """
-    several = [replace(problem, drive=one) for one in problem.drive.positions.values()]
-    peak = max(least_peak(_released(one)[0]) for one in several) * (1.0 - ROUNDING)
+    each = [(problem.base_torque, *_least_peak(problem, one)) for one in problem.machines]
+    unknown = next((why for _, _, why in each if why), "")
+    if unknown:
+        return LowerBound(0.0, "none", unknown)
+    peak = max(P for _, P, _ in each) * (1.0 - ROUNDING)
     covers = (
         f"every torque from {problem.lowest_torque:g} to {problem.highest_torque:g} N m over time, by "
         "whatever controller, however often the gap closes"
     )
     return LowerBound(peak / problem.base_torque, "momentum", covers)
+
+
+def two_masses(machine: Any) -> Drive | None:
+    """The machine as a drive of two masses without friction, load curves and losses; None where it is not.
+
+    >>> two_masses(Drive.load("crane-4amtkf")).name == Drive.load("crane-4amtkf").name
+    True
+    """
+    if len(machine.mass_names) != 2:
+        return None
+    given = rows_of(machine)
+    masses, shaft = given.masses[0].view(at.MASS)[:, 0], given.shafts[0, 0].view(at.SHAFT)[0]
+    rubs = bool(masses["friction"].any() or masses["ground"].any())
+    plain = shaft["eta"] == 1.0 and not given.curves.size and bool(np.isfinite(masses["J"]).all())
+    straight = given.machine.motor == 0.0 and given.machine.load == 1.0
+    if rubs or not plain or not straight:
+        return None
+    drive: Drive = machine.two_masses
+    if drive.brake == "none":
+        return drive
+    return drive.replace(brake="none", start_position=float(drive.theta0))
+
+
+def _least_peak(problem: Problem, machine: Any) -> tuple[float, str]:
+    """No start of a machine has a lower peak of T than this, N m; or why none is known."""
+    pair = two_masses(machine)
+    if pair is None:
+        return _of_chain(problem, machine)
+    base = problem.base or problem.drive
+    return least_peak(replace(problem, drive=pair, base=base, scenarios=(), terminal=problem.terminal)), ""
+
+
+def _of_chain(problem: Problem, machine: Any) -> tuple[float, str]:
+    """The same from the load mass of a chain alone."""
+    given = rows_of(machine)
+    load, masses = int(given.machine.load), given.masses[0].view(at.MASS)[:, 0]
+    shafts, one = given.shafts[0].view(at.SHAFT)[:, 0], masses[load]
+    J, taken, w0 = float(one["J"]), float(one["Mc"] + one["active"]), float(one["w0"])
+    if load == given.machine.motor or (shafts["eta"] != 1.0).any():
+        return 0.0, "no bound is known where the motor or a gear with losses adds to T"
+    if given.curves.size and (given.curves.view(at.CURVE)["mass"] == load).any():
+        return 0.0, "no bound is known where the load torque follows a curve"
+    if problem.start_time is None:
+        return taken, ""
+    left = problem.start_time * (1.0 + ROUNDING) - _first_pull(problem, machine)
+    if left <= 0.0:
+        return math.inf, ""
+    gained, sides = J * (problem.target - w0), (load > 0) + (load < masses.size - 1)
+    if w0 <= 0.0 and (one["Mc"] > 0.0 or one["ground"] > 0.0):
+        gained = J * problem.target
+    elif w0 <= 0.0:
+        taken *= problem.start_time / left
+    return (gained / left + taken) / sides, ""
+
+
+def _first_pull(problem: Problem, machine: Any) -> float:
+    """No shaft drives the load mass of a chain before this instant, s; see the top of this file."""
+    given = rows_of(machine)
+    masses, shafts = given.masses[0].view(at.MASS)[:, 0], given.shafts[0].view(at.SHAFT)[:, 0]
+    last, record = masses.size - 1, given.machine
+    torques: Vector = masses["Mc"] + masses["active"]
+    alone = record.motor == 0.0 and record.load == last and last > 1
+    quiet = not masses["w0"].any() and not torques[:last].any() and not masses["friction"].any()
+    quiet = quiet and bool((np.abs(shafts["theta0"]) <= shafts["half"]).all()) and not given.curves.size
+    if not (alone and quiet) or (shafts["eta"] != 1.0).any() or not np.isfinite(masses["J"]).all():
+        return 0.0
+    U = max(problem.highest_torque, -problem.lowest_torque)
+    J1, Jb, JL = (float(masses["J"][i]) for i in (0, last - 1, last))
+    falls = float(masses["active"][last])
+    reach = float(shafts["half"][-1] - shafts["theta0"][-1])
+    t1 = math.sqrt(2.0 * float(shafts["half"][0] - abs(shafts["theta0"][0])) * J1 / U)
+    fallen = 0.5 * falls / JL * t1 * t1
+    if fallen >= reach:
+        return math.sqrt(2.0 * reach * JL / falls) if falls > 0.0 else 0.0
+    A = (U / math.sqrt(J1) + falls / math.sqrt(JL)) * math.sqrt(1.0 / Jb + 1.0 / JL)
+    return math.sqrt(t1 * t1 + 2.0 * (reach - fallen) / A)
 
 
 def least_heat(problem: Problem) -> float:
@@ -92,9 +193,11 @@ def least_heat(problem: Problem) -> float:
     >>> round(least_heat(Problem(drive, 0.3, minimise="heat")), 4)
     0.1886
     """
-    drive, time = problem.drive, problem.start_time
-    if problem.terminal == "reached" or time is None or drive.brake != "none":
+    time, pair = problem.start_time, two_masses(problem.machines[0])
+    held = rows_of(problem.machines[0]).machine.release_at > 0.0
+    if problem.terminal == "reached" or time is None or pair is None or held:
         return 0.0
+    drive: Any = pair
     J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
     gained = J1 * (problem.target - w1) + J2 * (problem.target - w2)
@@ -107,15 +210,6 @@ def least_heat(problem: Problem) -> float:
         time = min(time, gained / Mc) if Mc > 0.0 else time
         impulse = gained + Mc * time
     return float(max(impulse, 0.0) ** 2 / time / drive.Ms**2) * (1.0 - ROUNDING)
-
-
-def _released(problem: Problem) -> tuple[Problem, float]:
-    """The problem from the release of a brake on, and that instant in s; as it is where nobody knows it."""
-    try:
-        hold = hold_of(problem)
-    except InputError:
-        return problem, 0.0
-    return hold.free, hold.until
 
 
 def least_peak(problem: Problem) -> float:
@@ -262,13 +356,15 @@ def momentum_shortest_time(problem: Problem) -> float:
     >>> round(momentum_shortest_time(Problem(Drive.load("crane-4amtkf").replace(target_speed=60), 0.3)), 4)
     0.2298
     """
-    drive = problem.drive
-    if len(drive.positions) > 1:
-        return max(momentum_shortest_time(replace(problem, drive=one)) for one in drive.positions.values())
-    free, until = _released(problem)
-    if free is not problem:
-        return until + momentum_shortest_time(free)
-    if drive.brake != "none":
+    return max(_shortest(problem, machine) for machine in problem.machines)
+
+
+def _shortest(problem: Problem, machine: Any) -> float:
+    drive = two_masses(machine)
+    if drive is None:
+        return _first_pull(problem, machine)
+    problem = replace(problem, drive=drive, base=problem.base or problem.drive, scenarios=())
+    if rows_of(machine).machine.release_at > 0.0:
         return earliest_pull(problem)  # the brake may carry more than the motor can
     J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)

@@ -1,1 +1,0 @@
-"""Optimal starts of chains, through several gaps."""

@@ -1,0 +1,181 @@
+"""Whether an answer holds on the exact machine: its demand is run again, and every claim and bound compared.
+
+Nothing is read off the grid of a method: the demand is judged over all of its straight lines, the realised
+torque over every span of the run, the peak is located, the terminal condition is that of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softstart.arrays import Vector
+from softstart.chain.machines import Machine
+from softstart.controller import make_controller
+from softstart.kernel import records as at
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import LowerBound, OptimumError, heat_of
+from softstart.optimal.starts import carried, wanted
+from softstart.profile import TorqueProfile
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
+
+ROUNDING = 1e-9  # of limits and times
+SHORT = 1e-6  # of the target speed: by so much it may be missed
+SAME = 1e-3  # a claim and its exact replay differ by no more than this share
+BELOW = 1e-5  # K_dyn may lie below its bound by what SHORT is worth
+BEYOND = 1e-4  # of the highest torque, above a torque-speed curve
+SAMPLES = 64  # an elastic period, at which the torque is compared with a torque-speed curve
+
+
+def replayed(problem: Problem, profile: TorqueProfile, end: float) -> tuple[Run, ...]:
+    """The runs of the machine and of each scenario to one elastic period after their ends.
+
+    >>> from softstart import Drive
+    >>> problem = Problem(Drive.load("crane-4amtkf"), 0.5, "reached")
+    >>> round(replayed(problem, TorqueProfile([0.0], [62.0]), 0.5)[0].k_dyn, 4)
+    3.1179
+    """
+    player = make_controller("profile", {"profile": profile})
+
+    def run(machine: Machine) -> Run:
+        until = None if problem.terminal == "reached" else end + float(machine.elastic_period)
+        found = simulate(machine, player, until, base=problem.base or problem.drive)
+        if until is None and not found.start_time <= end * (1.0 + ROUNDING) and len(machine.positions) == 1:
+            found = simulate(
+                machine, player, end + machine.elastic_period, base=problem.base or problem.drive
+            )
+        return found
+
+    return tuple(run(machine) for machine in (problem.drive, *problem.scenarios))
+
+
+def check(
+    problem: Problem,
+    profile: TorqueProfile,
+    runs: tuple[Run, ...],
+    end: float,
+    claimed: float,
+    bound: LowerBound,
+) -> None:
+    """OptimumError with a sentence, both numbers in it, for each thing that does not hold.
+
+    >>> from softstart import Drive
+    >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
+    >>> profile = TorqueProfile([0.0], [62.0])
+    >>> runs = replayed(problem, profile, 0.2402535)
+    >>> check(problem, profile, runs, 0.2402535, 0.9, LowerBound(0.909, "momentum", "every torque"))
+    Traceback (most recent call last):
+    softstart.optimal.result.OptimumError: ...K_dyn is 3.1... in the exact re-simulation, 0.9 was claimed...
+    """
+    wrong = [*_demand(problem, profile)]
+    for run in runs:
+        wrong += [*_realised(problem, run), *_torque_speed(problem, run), *_terminal(problem, run, end)]
+    wrong += [*_figures(problem, runs, end, claimed, bound)]
+    if wrong:
+        raise OptimumError(" ".join(wrong))
+
+
+def _demand(problem: Problem, profile: TorqueProfile) -> Iterator[str]:
+    """A straight line is extreme at its ends."""
+    yield from _beyond(problem, "demand", profile.time, profile.torque)
+
+
+def _realised(problem: Problem, run: Run) -> Iterator[str]:
+    """In each span lag u' = ref + slope s - u: u is extreme at its ends or where u' = 0."""
+    lag = float(run.recorded.rows.machine.lag)
+    columns = (at.S_START, at.S_END, at.S_U, at.S_REF, at.S_SLOPE)
+    start, end, first, ref, ub = (run.recorded.spans[:, column] for column in columns)
+    length, ua = end - start, ref - lag * ub  # u(s) = ua + ub s + ue exp(-s/lag)
+    ue = first - ua
+    turns = np.zeros_like(length)
+    if lag > 0.0:
+        bent = (ub != 0.0) & (ue / np.where(ub != 0.0, ub * lag, 1.0) > 0.0)
+        turns[bent] = lag * np.log(ue[bent] / (ub[bent] * lag))
+    s = np.stack([np.zeros_like(length), length, np.clip(turns, 0.0, length)])
+    u = ua + ub * s + (ue * np.exp(-s / lag) if lag > 0.0 else 0.0)
+    yield from _beyond(problem, "motor torque", (start + s).ravel(), u.ravel())
+
+
+def _beyond(problem: Problem, name: str, times: Vector, torques: Vector) -> Iterator[str]:
+    """Where torques exceed the limits of the motor."""
+    low, high = problem.lowest_torque, problem.highest_torque
+    for i, limit, sign in ((np.argmax(torques), high, 1.0), (np.argmin(torques), low, -1.0)):
+        if sign * (float(torques[i]) - limit) > ROUNDING * max(abs(low), abs(high)):
+            yield (
+                f"The {name} is {torques[i]:.6g} N m at {times[i]:.6g} s, beyond the {limit:.6g} N m allowed."
+            )
+
+
+def torque_allowed(problem: Problem, w1: ArrayLike) -> Vector:
+    """What the (concave) torque-speed curve allows at w1 in rad/s, N m: the least of its lines.
+
+    >>> from softstart import Drive
+    >>> limit = ((0.0, 62.0), (60.0, 62.0), (100.0, 22.0))
+    >>> problem = Problem(Drive.load("crane-4amtkf"), 0.5, torque_speed=limit)
+    >>> torque_allowed(problem, [10.0, 80.0]).tolist()
+    [62.0, 42.0]
+    """
+    speed = np.asarray(w1, dtype=np.float64)
+    lines = [a[1] + (b[1] - a[1]) / (b[0] - a[0]) * (speed - a[0]) for a, b in pairwise(problem.torque_speed)]
+    return np.asarray(np.min(lines, axis=0))
+
+
+def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:
+    if not problem.torque_speed:
+        return
+    times = np.linspace(0.0, run.end_time, math.ceil(SAMPLES * run.end_time / run.elastic_period) + 2)
+    start, end = run.recorded.spans[:, [at.S_START, at.S_END]].T
+    times = np.unique(np.concatenate([times, start, end - 1e-9 * (end - start)]))  # both sides of steps
+    state = run.recorded.at(times)
+    over = state["u"] - torque_allowed(problem, state["w"][:, run.drive.motor_index])
+    i = int(np.argmax(over))
+    if over[i] > BEYOND * problem.highest_torque:
+        yield (
+            f"The motor torque is {state['u'][i]:.6g} N m at {times[i]:.6g} s, {over[i]:.6g} N m above the "
+            "torque-speed curve."
+        )
+
+
+def _terminal(problem: Problem, run: Run, end: float) -> Iterator[str]:
+    if problem.terminal == "reached":
+        if not run.start_time <= end * (1.0 + ROUNDING):
+            yield f"The load reaches its target speed after {run.start_time:.9g} s, not within {end:.9g} s."
+        return
+    state, target = run.recorded.at([end]), problem.target
+    off = float(np.abs(state["w"][0] / target - 1.0).max())
+    if off > SHORT:
+        yield f"The speeds at {end:.6g} s are off their target of {target:.9g} rad/s by a share of {off:.3g}."
+    if problem.terminal == "steady":
+        aim = wanted(carried(run.recorded.rows), problem.base_torque, run.drive.motor_index)
+        off = float(np.abs(state["T"][0] - aim).max())
+        if off > SAME * problem.base_torque:
+            yield f"The shaft torques at {end:.6g} s are off the load torques behind them by {off:.6g} N m."
+
+
+def _figures(
+    problem: Problem, runs: tuple[Run, ...], end: float, claimed: float, bound: LowerBound
+) -> Iterator[str]:
+    """What was claimed, and the bounds of the problem on what is not minimised."""
+    k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
+    heat = heat_of(runs[0], end)
+    value, name = {
+        "k_dyn": (k_dyn, "K_dyn"),
+        "heat": (heat, "The heat in s"),
+        "start_time": (end, "The start time in s"),
+    }[problem.minimise]
+    latest = problem.start_time
+    if latest is not None and end > latest * (1.0 + ROUNDING):
+        yield f"The start takes {end:.9g} s, longer than the start time of {latest:.9g} s."
+    if not abs(value - claimed) <= SAME * abs(value):
+        yield f"{name} is {value:.8g} in the exact re-simulation, {claimed:.8g} was claimed."
+    if problem.k_dyn is not None and k_dyn > problem.k_dyn * (1.0 + SAME):
+        yield f"K_dyn is {k_dyn:.8g}, above its bound of {problem.k_dyn:.8g}."
+    if problem.heat is not None and heat > problem.heat * (1.0 + SAME):
+        yield f"The heat is {heat:.8g} s, above its bound of {problem.heat:.8g} s."
+    if k_dyn < bound.k_dyn * (1.0 - BELOW):
+        yield f"K_dyn is {k_dyn:.8g}, below its lower bound of {bound.k_dyn:.8g} ({bound.kind})."

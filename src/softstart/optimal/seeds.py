@@ -1,0 +1,121 @@
+"""First demands for a descent: closed form, strategies, the answer to a similar question, a global search."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from softstart.errors import InputError, SimulationError
+from softstart.optimal.descent import Descent
+from softstart.optimal.pulse_coast_hold import PulseCoastHold
+from softstart.optimal.starts import Player
+from softstart.profile import TorqueProfile
+from softstart.start.simulation import simulate
+
+TRACE = 4001  # instants of a trace that becomes a first demand
+HALVINGS = 24
+LEVELS = 7
+PULSES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 1.0)
+PHASES = (0.0, 0.06, 0.12, 0.18, 0.25, 0.4)
+
+
+def pulse_coast_hold(search: Descent, player: Player) -> TorqueProfile | None:
+    """Pulse, coast, hold of the least peak that brings this machine to its speed in time; None if none does.
+
+    The instants are those of the two masses that stand for the machine, undamped and with an ideal torque;
+    whether it is in time, its exact start says.
+    """
+    try:
+        starts = PulseCoastHold.of_drive(player.machine.two_masses, search.high)
+    except InputError:
+        return None
+
+    def demand(P: float) -> TorqueProfile:
+        course = starts.course(P)
+        held = (P * (starts.J1 + starts.J2) - starts.Mc * starts.J1) / starts.J2
+        edges, levels = [0.0], []
+        for until, level in ((course.t1, search.high), (course.t_peak, 0.0), (search.until, held)):
+            if edges[-1] < until < math.inf:
+                edges.append(until)
+                levels.append(min(max(level, search.low), search.high))
+        return TorqueProfile.steps(edges, levels)
+
+    low, high = starts.least_peak, starts.full_peak
+    if not _in_time(search, player, demand(high)):
+        return None
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _in_time(search, player, demand(middle)) else (middle, high)
+    return demand(high)
+
+
+def _in_time(search: Descent, player: Player, demand: TorqueProfile) -> bool:
+    try:
+        return player.figures(demand, search.latest)[1] <= search.latest
+    except SimulationError:
+        return False
+
+
+def pulse_coast_level(search: Descent) -> list[TorqueProfile]:
+    """Pulse, coast (or brake), a constant torque: the gentlest of a few hundred exact starts, best first.
+
+    The pulse takes a share of the time that full torque needs to the first contact, the coast ends a share of
+    the period after the contact; the torque from there on is what brings all loads to their speeds in time.
+    One for each pulse, torque of the coast and machine whose contact counts.
+    """
+    found = []
+    for player in search.players:
+        first = _first_contact(player, TorqueProfile([0.0], [search.high]), search.until)
+        first = first if math.isfinite(first) and first > 0.0 else 0.25 * player.period
+        for low, share in itertools.product({max(0.0, search.low), search.low}, PULSES):
+            t1 = share * first
+            coast = TorqueProfile.steps([0.0, t1, search.until], [search.high, low])
+            contact = max(_first_contact(player, coast, search.latest), t1)
+            ends = [contact + phase * player.period for phase in PHASES if contact < search.latest]
+            levels = [_level(search, t1, t2, low) for t2 in ends if t2 < search.latest]
+            best = min((one for one in levels if one is not None), key=lambda one: one[0], default=None)
+            found += [] if best is None else [best]
+    return [one for _, one in sorted(found, key=lambda one: one[0])]
+
+
+def _first_contact(player: Player, demand: TorqueProfile, until: float) -> float:
+    """When a gap first closes, s; infinite if none does."""
+    try:
+        return player.first_contact(demand, until)
+    except SimulationError:
+        return math.inf
+
+
+def _level(search: Descent, t1: float, t2: float, low: float) -> tuple[float, TorqueProfile] | None:
+    """The least constant torque after a pulse and a coast that is in time, and the largest peak then."""
+
+    def demand(level: float) -> TorqueProfile:
+        edges, levels = [0.0], []
+        for until, torque in ((t1, search.high), (t2, low), (search.until, level)):
+            if until > edges[-1]:
+                edges.append(until)
+                levels.append(torque)
+        return TorqueProfile.steps(edges, levels)
+
+    def in_time(level: float) -> bool:
+        return all(_in_time(search, player, demand(level)) for player in search.players)
+
+    a, b = low, search.high
+    if not in_time(b):
+        return None
+    for _ in range(LEVELS):
+        middle = 0.5 * (a + b)
+        a, b = (a, middle) if in_time(middle) else (middle, b)
+    return max(player.figures(demand(b), search.latest)[0] for player in search.players), demand(b)
+
+
+def trace(search: Descent, player: Player, name: str) -> TorqueProfile | None:
+    """The torque of a strategy on this machine, as a demand; None where it does not start it."""
+    try:
+        run = simulate(player.machine, name)
+    except (InputError, SimulationError):
+        return None
+    times = np.linspace(0.0, min(run.end_time, search.until), TRACE)
+    return search.averaged(times, run.at(times)["u"])

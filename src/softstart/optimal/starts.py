@@ -1,0 +1,196 @@
+"""Open-loop starts of a machine, run exactly, with their exact sensitivities to the knots of the demand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import Machine
+from softstart.controller import make_controller
+from softstart.kernel import records as at
+from softstart.profile import TorqueProfile
+from softstart.start.engine import ended, run_one
+from softstart.start.recorded import Recorded, Recorder
+from softstart.start.rows import MAX_EVENTS, Rows, rows_of
+
+BEFORE = 1e-9  # of a span, before its end: a step of the torque has two sides
+TOUCH = 5e-4  # of the base torque
+SOFT = 1e-4  # of the largest speed: a contact at less moves too far with the demand
+GAUSS = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A start under a demand, from 0 to its end."""
+
+    profile: TorqueProfile
+    recorded: Recorded
+
+    @property
+    def peak(self) -> float:
+        """Largest |T| of all shafts, N m, located."""
+        return float(np.abs(self.recorded.shafts["peak"]).max())
+
+    def reached(self, target: float, latest: float, load: int) -> float:
+        """When the load first has its target speed, s; if not until `latest`, when it comes nearest to it."""
+        time = float(self.recorded.notes["start_time"])
+        if time <= latest:
+            return time
+        times = np.linspace(0.5 * latest, latest, 257)
+        return float(times[np.argmax(self.recorded.at(times)["w"][:, load])])
+
+    def instants(self, step: float) -> Vector:
+        """Both sides of every joint of spans and instants in between, no further apart than `step`, s."""
+        start, end = self.recorded.spans[:, [at.S_START, at.S_END]].T
+        parts = np.ceil((end - start) / step).astype(np.int64).clip(1)
+        first = np.repeat(np.cumsum(parts) - parts, parts)
+        share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
+        inside = np.repeat(start, parts) + share * np.repeat(end - start, parts)
+        return np.unique(np.concatenate([inside, end - BEFORE * (end - start), end[-1:]]))
+
+    def with_peaks(self, times: Vector) -> Vector:
+        """Rising instants, and between them where |T| of a shaft has a maximum: exactly the largest one."""
+        T = np.abs(self.recorded.at(times)["T"])
+        left, here, right = T[:-2], T[1:-1], T[2:]
+        j, k = np.nonzero((here >= left) & (here >= right) & (here > 0.0))
+        a, b = times[j + 1] - times[j], times[j + 2] - times[j + 1]
+        rise, fall = (here - left)[j, k], (here - right)[j, k]
+        curved = rise * b + fall * a
+        inside = curved > 0.0
+        shift = 0.5 * (rise * b * b - fall * a * a)[inside] / curved[inside]  # vertex of the parabola
+        vertices = times[j + 1][inside] + shift
+        return np.unique(np.concatenate([times, vertices, self.recorded.shafts["peak_time"]]))
+
+    def quadrature(self, until: float) -> tuple[Vector, Vector]:
+        """Instants and weights, s, of an integral over the start up to `until`: Gauss in each span."""
+        start, end = np.minimum(self.recorded.spans[:, [at.S_START, at.S_END]].T, until)
+        nodes, weights = GAUSS
+        half = 0.5 * (end - start)[:, None]
+        inside = half[:, 0] > 0.0
+        times = start[:, None] + half * (nodes + 1.0)
+        return times[inside].ravel(), (half * weights)[inside].ravel()
+
+    def torques_by_demand(self, times: ArrayLike) -> NDArray[np.float64]:
+        """dT_k(times[j])/du_q as [j, k, q], in N m/(N m)."""
+        return self.recorded.sensitivities(self.profile.time, times)[0]
+
+    def along_contacts(self, times: Vector) -> tuple[Matrix, Matrix]:
+        """How instants move that keep their place between the contacts, and dT_k/dt there.
+
+        A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/du = -(dtheta_k/du)/theta_k'; in
+        between the shift is interpolated, and it is none at both ends. Shapes (j, q) in s/(N m) and (j, k).
+        """
+        recorded, joints = self.recorded, self.recorded.rows.count - 1
+        events = recorded.events[recorded.events["kind"] == at.CLOSED]
+        events = events[(events["time"] > 0.0) & (events["time"] < times[-1])]
+        moved = np.zeros((times.size, self.profile.time.size))
+        if events.size:
+            shafts = events["place"].astype(int)
+            when = recorded.at(events["time"])["w"]
+            v = when[np.arange(shafts.size), shafts] - when[np.arange(shafts.size), shafts + 1]
+            hard = np.abs(v) > SOFT * float(np.abs(when).max())
+            begin, shafts, v = np.ascontiguousarray(events["time"][hard]), shafts[hard], v[hard]
+            shift = -self.state_by_demand(begin)[np.arange(shafts.size), shafts] / v[:, None]
+            begin, kept = np.unique(begin, return_index=True)
+            knots = np.concatenate([[0.0], begin, [times[-1]]])
+            index = (np.searchsorted(knots, times, side="right") - 1).clip(0, knots.size - 2)
+            share = (times - knots[index]) / (knots[index + 1] - knots[index])
+            none = np.zeros((1, moved.shape[1]))
+            ends = np.concatenate([none, shift[kept], none])
+            moved = ends[index] + share[:, None] * (ends[index + 1] - ends[index])
+        inside = recorded.index(times)
+        step = 1e-6 * float(self.profile.time[-1])
+        after, before = (recorded.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
+        assert after.shape[1] == joints
+        return moved, (after - before) / (2.0 * step)
+
+    def state_by_demand(self, marks: ArrayLike) -> NDArray[np.float64]:
+        """Of twists, speeds and realised torque at rising marks: the derivatives as [j, part, q]."""
+        return self.recorded.sensitivities(self.profile.time, (), marks)[1]
+
+
+class Player:
+    """Runs demands on one machine; `plays` counts them."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.rows = rows_of(machine)
+        self.plays = 0
+        self._room = 1024
+        record, masses, shafts = self.rows.machine, self.rows.masses[0], self.rows.shafts[0]
+        self.period, self.target = float(record.period), float(record.target)
+        self.motor, self.load, self.joints = int(record.motor), int(record.load), self.rows.count - 1
+        self.J, self.c = masses.view(at.MASS)[:, 0]["J"], shafts.view(at.SHAFT)[:, 0]["c"]
+        self.d = shafts.view(at.SHAFT)[:, 0]["d"]
+        self.fastest = (
+            2.0 * math.pi / math.sqrt(float((self.c * (1.0 / self.J[:-1] + 1.0 / self.J[1:])).max()))
+        )
+
+    def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[Recorder, int]:
+        made: Any = make_controller("profile", {"profile": profile})
+        recorder = Recorder(self.rows, int(made.sensors), room)
+        self.plays += 1
+        return recorder, run_one(made, self.machine, recorder, until)
+
+    def play(self, profile: TorqueProfile, until: float) -> Played:
+        """The start from 0 to `until` in s; SimulationError if it cannot be finished."""
+        recorder, reason = self._run(profile, until, self._room)
+        ended(recorder.state, reason, until, MAX_EVENTS, self.machine.name)
+        self._room = max(self._room, recorder.spans.shape[0])
+        return Played(profile, recorder.finished())
+
+    def figures(self, profile: TorqueProfile, until: float) -> tuple[float, float, float]:
+        """Largest |T| of all shafts until then, N m; start time, s (inf if none); load speed then, rad/s."""
+        state = self._run(profile, until, 0)[0].state
+        time = float(state.start_time)
+        return (
+            float(np.abs(state.peak).max()),
+            math.inf if math.isnan(time) else time,
+            float(state.final_speed),
+        )
+
+    def first_contact(self, profile: TorqueProfile, until: float) -> float:
+        """When a gap first closes, s; infinite if none does until then."""
+        time = float(self._run(profile, until, 0)[0].state.first_contact)
+        return math.inf if math.isnan(time) else time
+
+    def mean_torque(self, time: float) -> float:
+        """The torque that brings all masses as one to the target speed in this time, N m."""
+        J = self.J[np.isfinite(self.J)]
+        masses = self.rows.masses[0].view(at.MASS)[:, 0]
+        return float(J.sum()) * self.target / time + float((masses["Mc"] + masses["active"]).sum())
+
+    def twisting(self, closed: Vector, states: Matrix) -> Matrix:
+        """What the torques of closed shafts get from changes of twists and speeds, rows as in a state."""
+        by_twist = self.c[:, None] * states[: self.joints]
+        by_speed = -self.d[:, None] * np.diff(states[self.joints : -1], axis=0)
+        found: Matrix = closed[:, None] * (by_twist + by_speed)
+        return found
+
+
+def carried(rows: Rows) -> Vector:
+    """The torques of the shafts of a machine while all masses turn at one speed, N m.
+
+    >>> from softstart import Drive
+    >>> carried(rows_of(Drive.load("crane-4amtkf"))).tolist()
+    [7.16]
+    """
+    masses, motor = rows.masses[0].view(at.MASS)[:, 0], int(rows.machine.motor)
+    loads: Vector = masses["Mc"] + masses["active"]
+    torques = -np.cumsum(loads)[:-1]
+    torques[motor:] = np.cumsum(loads[::-1])[::-1][1 + motor :]
+    return torques
+
+
+def wanted(torques: Vector, base: float, motor: int) -> Vector:
+    """What a steady start ends with: where a shaft carries nothing its flanks press by `TOUCH` of `base`.
+
+    At no torque at all the gap would be open, and how it got so is no longer seen.
+    """
+    driving = np.where(np.arange(torques.size) >= motor, TOUCH, -TOUCH) * base
+    return np.where(np.abs(torques) < TOUCH * base, driving, torques)

@@ -1,0 +1,344 @@
+"""No start of any kind lies below the bounds by momentum: closed forms, random torques, all controllers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.softstart.optimal.drives import (
+    CRANE,
+    HELD,
+    LONG,
+    damped_crane,
+    moving_drive,
+    placed_drive,
+    played,
+    random_torque,
+    three_masses,
+    without_gaps,
+)
+
+from softstart import Drive, TorqueProfile, optimize, simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.controller import ready_controller_names
+from softstart.errors import SimulationError
+from softstart.kernel import records as at
+from softstart.optimal import pulse_coast_hold
+from softstart.optimal.bounds import earliest_pull, least_heat, momentum_bound, momentum_shortest_time
+from softstart.optimal.check import heat_of
+from softstart.optimal.problem import Problem
+from softstart.optimal.starts import Player
+
+
+def slack(machine: Any, k_dyn: float, start_time: float, terminal: Any = "reached") -> float:
+    """How far K_dyn lies above the bound, as a share; -inf if even the time is below the shortest one."""
+    problem = Problem(machine, start_time, terminal)
+    if start_time < momentum_shortest_time(problem) * (1 - 1e-9):
+        return -math.inf
+    bound = momentum_bound(problem)
+    assert bound.kind == "momentum"
+    return k_dyn / bound.k_dyn - 1.0 if bound.k_dyn > 0.0 else 0.0
+
+
+@pytest.mark.parametrize("braking", [False, True])
+def test_no_torque_at_all_gets_below(braking: bool) -> None:
+    rng = np.random.default_rng(5 + braking)
+    closest, several, rubs = math.inf, 0, 0
+    for _ in range(400):
+        drive = moving_drive(rng)
+        if braking:
+            drive = drive.replace(minimum_torque=-drive.Ms * rng.uniform(0.05, 1.0))
+        if rng.random() < 0.25:
+            share = 0.2 * (drive.Ms - drive.Mc)
+            rough = {
+                "motor_friction": share * rng.random(),
+                "motor_viscous_friction": share * rng.random() / drive.target_speed,
+                "load_viscous_friction": share * rng.choice([0.0, rng.random()]) / drive.target_speed,
+            }
+            drive = drive.replace(**rough)
+            rubs += 1
+        try:
+            run = played(drive, random_torque(rng, drive))
+        except SimulationError:
+            continue
+        if not math.isnan(run.start_time):
+            several += run.contacts > 1
+            closest = min(closest, slack(drive, run.k_dyn, run.start_time))
+    assert closest >= -1e-9
+    assert several > 70
+    assert rubs > 70
+
+
+def test_no_torque_gets_below_from_any_position() -> None:
+    """With a brake the earliest release counts."""
+    rng = np.random.default_rng(21)
+    closest, starts, released = math.inf, 0, 0
+    for _ in range(350):
+        drive = placed_drive(rng)
+        try:
+            run = played(drive, random_torque(rng, drive))
+        except SimulationError:
+            continue
+        if not math.isnan(run.start_time):
+            starts += 1
+            released += drive.brake == "motor"
+            closest = min(closest, slack(drive, run.k_dyn, run.start_time))
+    assert closest >= -1e-9
+    assert starts > 170
+    assert released > 40
+
+
+def test_no_gentle_torque_gets_below() -> None:
+    """The optimum's own form with its instants and levels shaken: as near to the bound as starts come."""
+    rng = np.random.default_rng(8)
+    near = 0
+    for _ in range(150):
+        shape = {"damping": rng.choice([0.0, 0.3]), "torque_lag": rng.choice([0.0, 1e-3])}
+        drive = CRANE.replace(gap=10 ** rng.uniform(-2, 0.3), **shape)
+        best, _, _ = pulse_coast_hold.solve(Problem(drive.replace(damping=0.0, torque_lag=0.0), 0.4))
+        times = best.time * (1 + 0.02 * rng.standard_normal(best.time.size) * (best.time > 0.0))
+        levels = np.clip(best.torque * (1 + 0.01 * rng.standard_normal(best.time.size)), 0.0, drive.Ms)
+        run = played(drive, TorqueProfile(np.sort(times), levels))
+        above = slack(drive, run.k_dyn, run.start_time)
+        assert above >= -1e-9
+        near += above < 0.05
+    assert near > 20
+
+
+def test_no_shipped_controller_gets_below() -> None:
+    rng = np.random.default_rng(3)
+    starts = 0
+    for i in range(30):
+        drive = (
+            placed_drive(rng) if i % 2 else moving_drive(rng, initial_load_speed=0.0, initial_motor_speed=0.0)
+        )
+        for name in ready_controller_names():
+            try:
+                run = simulate(drive, name)
+            except SimulationError:
+                continue
+            if not math.isnan(run.start_time):
+                starts += 1
+                assert slack(drive, run.k_dyn, run.start_time) >= -1e-9, (name, drive)
+    assert starts > 120
+
+
+def test_no_random_torque_of_a_chain_gets_below() -> None:
+    rng = np.random.default_rng(3)
+    nearest, starts = math.inf, 0
+    for i in range(80):
+        chain = damped_crane(float(rng.choice([0.0, 0.05])))
+        gaps, inertia = float(10.0 ** rng.uniform(-2, 0.3)), float(rng.uniform(0.1, 2))
+        chain = chain.changed(gaps=gaps, load_inertia=inertia)
+        if i % 3 == 0:
+            masses = [*chain.masses[:-1], chain.masses[-1].replace(kind="reactive")]
+            chain = dataclasses.replace(chain, masses=tuple(masses))
+        time = np.sort(np.append(0.0, rng.uniform(0.0, 0.5, 5)))
+        torque = rng.uniform(0.0, 62.0, 6) if i % 2 else np.full(6, rng.uniform(40.0, 62.0))
+        try:
+            start = Player(chain).play(TorqueProfile(time, torque), 1.5)
+        except SimulationError:
+            continue
+        start_time = float(start.recorded.notes["start_time"])
+        if math.isnan(start_time):
+            continue
+        starts += 1
+        nearest = min(nearest, slack(chain, start.peak / chain.mean_torque, start_time))
+        events = start.recorded.events
+        closed = events["time"][(events["kind"] == at.CLOSED) & (events["place"] == len(chain.shafts) - 1)]
+        if closed.size:  # no bound for a time at which the load cannot have been pulled yet
+            assert momentum_shortest_time(Problem(chain, start_time, "reached")) <= closed[0]
+    assert nearest >= 0.0
+    assert starts > 30
+
+
+@pytest.mark.parametrize("name", ["middle load", "motor in the middle", "friction", "no gaps", "ground"])
+def test_no_torque_of_other_chains_gets_below(name: str) -> None:
+    """A load between two shafts, a motor between two loads, friction, and a mass of inf."""
+    rng = np.random.default_rng(4)
+    shafts, motor = [Shaft(3e3, damping_ratio=0.02, gap=0.05), Shaft(2e3, gap=0.03)], Motor(100.0)
+    light = [Mass(0.1, name="a"), Mass(0.05, name="b", torque=5.0), Mass(0.4, name="c", torque=10.0)]
+    chains = {
+        "middle load": Chain(light, shafts, motor, load_mass="b", target_speed=12.0),
+        "motor in the middle": Chain(light, shafts, Motor(100.0, mass="b"), target_speed=12.0),
+        "friction": three_masses(motor={"torque_lag": 0.004}, kind="reactive"),
+        "no gaps": without_gaps(),
+        "ground": Chain([*light[:2], Mass(0.4, name="c"), Mass("inf", name="d")], [*shafts, Shaft(5.0)],
+                        motor, load_mass="c", target_speed=5.0),
+    }  # fmt: skip
+    chain, starts = chains[name], 0
+    for _ in range(40):
+        time = np.sort(np.append(0.0, rng.uniform(0.0, 0.4, 5)))
+        profile = {"profile": TorqueProfile(time, rng.uniform(10.0, 100.0, 6))}
+        run = simulate(chain, "profile", 1.0, parameters=profile, fitted_to=CRANE)
+        if not math.isnan(run.start_time):
+            starts += 1
+            assert slack(chain, run.k_dyn, run.start_time) >= -1e-9
+    assert starts > 10
+
+
+def test_a_load_that_follows_a_curve_and_losses_have_no_bound() -> None:
+    curved = three_masses(curve_speed=[0.0, 30.0], curve_torque=[0.0, 10.0])
+    for chain, why in ((curved, "follows a curve"), (three_masses(efficiency=0.97), "gear with losses")):
+        bound = momentum_bound(Problem(chain, 0.3))
+        assert (bound.kind, bound.k_dyn) == ("none", 0.0)
+        assert why in bound.covers
+
+
+def test_several_machines_have_the_largest_bound() -> None:
+    wide = CRANE.replace(gap=0.8)
+    problem = Problem(CRANE, LONG, "reached", scenarios=(wide,))
+    each = [momentum_bound(Problem(one, LONG, "reached", base=CRANE)).k_dyn for one in (CRANE, wide)]
+    assert momentum_bound(problem).k_dyn == max(each) == problem.lower_bound().k_dyn
+    times = [momentum_shortest_time(Problem(one, LONG, "reached")) for one in (CRANE, wide)]
+    assert momentum_shortest_time(problem) == max(times)
+    unknown = CRANE.replace(start_position="unknown")
+    each = [momentum_bound(Problem(one, LONG, "reached")).k_dyn for one in unknown.positions.values()]
+    assert momentum_bound(Problem(unknown, LONG)).k_dyn == max(each)
+
+
+@pytest.mark.parametrize("start_time", [LONG, 0.35, 0.6])
+def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(start_time: float) -> None:
+    problem = Problem(CRANE, start_time)
+    _, _, k_dyn = pulse_coast_hold.solve(problem)
+    assert momentum_bound(problem).k_dyn == pytest.approx(k_dyn, rel=1e-8)
+    assert momentum_bound(problem).k_dyn < k_dyn
+
+
+def test_the_plain_form() -> None:
+    """A braking motor leaves only J2 (target - w2) = (P - Mc) (t - t_c) - Mc t_c."""
+    drive = CRANE.replace(minimum_torque=-20.0)
+    t_c = math.sqrt(2.0 * 0.25 / (62.0 / 0.035 + 7.16 / 0.175))
+    P = (0.175 * 60.0 + 7.16 * 0.3) / (0.3 - t_c)
+    problem = Problem(drive, 0.3)
+    assert momentum_bound(problem).k_dyn == pytest.approx(P / problem.base_torque, rel=1e-9)
+
+
+def test_a_reactive_load_starts_from_rest() -> None:
+    drive = CRANE.replace(load_kind="reactive", damping=1.0)
+    t_c = math.sqrt(2.0 * 0.25 * 0.035 / 62.0)
+    problem = Problem(drive, 0.3)
+    P = 7.16 + 0.175 * 60.0 / (0.3 - t_c)
+    assert momentum_bound(problem).k_dyn == pytest.approx(P / problem.base_torque, rel=1e-9)
+
+
+def test_a_chain_knows_the_momentum_of_its_load() -> None:
+    """J_L target + M_L t_f <= P (t_f - t_c); before t_c the motor has to cross its own gap."""
+    for chain in (without_gaps(), three_masses()):
+        problem = Problem(chain, 0.3)
+        first = momentum_shortest_time(problem)
+        P = (0.4 * 20.0 + 20.0 * 0.3) / (0.3 - first)
+        assert momentum_bound(problem).k_dyn == pytest.approx(P / problem.base_torque, rel=1e-9)
+        assert (first > math.sqrt(2.0 * 0.025 * 0.1 / 100.0)) == (chain.shafts[0].gap > 0.0)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        CRANE,
+        CRANE.replace(start_position=-0.25, initial_motor_speed=3.0),
+        CRANE.replace(load_kind="reactive"),
+        CRANE.replace(load_kind="reactive", gap=0.0),
+        CRANE.replace(load_kind="reactive", start_position=0.26, load_torque=20.0),
+        CRANE.replace(load_kind="reactive", initial_motor_speed=2.0),
+    ],
+)
+def test_the_earliest_pull_is_that_of_full_torque(drive: Drive) -> None:
+    kind = "load starts" if drive.load_kind == "reactive" else "gap closed"
+    first = next(event.time for event in simulate(drive, "direct").events if event.kind == kind)
+    assert earliest_pull(Problem(drive, 1.0)) == pytest.approx(first, rel=1e-9)
+
+
+def test_a_damped_contact_has_to_be_gentle() -> None:
+    damped = Problem(CRANE.replace(damping=0.3), 0.32)
+    braked = Problem(damped.drive.replace(minimum_torque=-1e-9), 0.32)
+    assert momentum_bound(damped).k_dyn > 1.01 * momentum_bound(braked).k_dyn
+
+
+def test_without_time_only_the_load_torque_remains() -> None:
+    problem = Problem(CRANE, minimise="start_time")
+    assert momentum_bound(problem).k_dyn == pytest.approx(7.16 / problem.base_torque)
+
+
+def test_full_torque_all_the_way_is_no_less_than_allowed() -> None:
+    """The only start that is in time by a hair: rounding must not call it impossible."""
+    drive = CRANE.replace(gap=0.0, load_torque=0.0, target_speed=1.0)
+    run = simulate(drive, "direct")
+    assert momentum_bound(Problem(drive, run.start_time, "reached")).k_dyn <= run.k_dyn
+
+
+def test_too_short_for_a_contact() -> None:
+    assert momentum_bound(Problem(CRANE, 0.01)).k_dyn == math.inf
+    assert momentum_bound(Problem(damped_crane(), 0.005)).k_dyn == math.inf
+
+
+def test_shortest_times() -> None:
+    assert momentum_shortest_time(Problem(CRANE, 0.3)) == pytest.approx(0.21 * 60.0 / (62.0 - 7.16))
+    friction = CRANE.replace(load_kind="reactive")
+    assert momentum_shortest_time(Problem(friction, 0.3)) == pytest.approx(0.21 * 60.0 / 62.0)
+    # constant torque reaches the speed sooner than both masses could have it, never sooner than this
+    run = simulate(CRANE, "direct")
+    assert momentum_shortest_time(Problem(CRANE, 0.3, "reached")) < run.start_time
+
+
+def test_synchronous_starts_respect_the_shortest_time() -> None:
+    """Any start is synchronous whenever the twist turns: its speed is what the motor can have brought."""
+    rng = np.random.default_rng(11)
+    looked_at = 0
+    for _ in range(60):
+        drive = moving_drive(rng, torque_lag=0.0)
+        torque = random_torque(rng, drive)
+        try:
+            run = played(drive, torque, torque.end + 3 * drive.elastic_period)
+        except SimulationError:
+            continue
+        t = np.linspace(0.0, run.end_time, 4000)
+        state = run.at(t)
+        turns = np.flatnonzero((state["v"][:-1] * state["v"][1:] < 0.0) & (state["w2"][1:] > 0.0))
+        for i in turns[state["w2"][turns] > drive.initial_load_speed]:
+            # both speeds are at least this somewhere between the two instants
+            speed = float(min(state["w1"][i], state["w2"][i], state["w1"][i + 1], state["w2"][i + 1]))
+            if speed <= max(drive.initial_load_speed, 0.0):
+                continue
+            shortest = momentum_shortest_time(Problem(drive.replace(target_speed=speed), 1e9))
+            assert t[i + 1] >= shortest * (1 - 1e-9)
+            looked_at += 1
+    assert looked_at > 100
+
+
+# heat ------------------------------------------------------------------------------------------------------
+
+
+def test_the_least_heat_is_momentum_by_cauchy_and_schwarz() -> None:
+    for given in ({}, {"torque_lag": 0.004, "damping": 0.5}):
+        drive = CRANE.replace(**given)
+        mean = (drive.J1 + drive.J2) * 60.0 / 0.3 + drive.Mc
+        exact = mean**2 * 0.3 / drive.Ms**2
+        assert least_heat(Problem(drive, 0.3, minimise="heat")) == pytest.approx(exact, rel=1e-9)
+    friction = Problem(CRANE.replace(load_kind="reactive"), 0.3, minimise="heat", k_dyn=1.0)
+    moves = 0.175 * 60.0 / (friction.base_torque - 7.16)  # no sooner than at the largest T
+    impulse = 0.21 * 60.0 + 7.16 * moves
+    assert least_heat(friction) == pytest.approx(impulse**2 / 0.3 / 62.0**2, rel=1e-9)
+
+
+def test_no_start_has_less_heat() -> None:
+    """Optima of K_dyn are starts; where only the load has its speed, or a brake helps, no bound is known."""
+    for drive, time in ((CRANE, LONG), (CRANE, 0.6), (CRANE.replace(load_kind="reactive"), 0.3)):
+        best = optimize(drive, time)
+        bound = least_heat(Problem(drive, time, minimise="heat", k_dyn=best.k_dyn))
+        assert 0.5 * best.heat < bound < best.heat
+        assert best.heat == pytest.approx(heat_of(best.run, best.end_time), rel=1e-12)
+    assert least_heat(Problem(CRANE, 0.3, "reached", "heat")) == 0.0
+    assert least_heat(Problem(HELD.replace(release=0.05), 0.4, minimise="heat")) == 0.0
+    assert least_heat(Problem(damped_crane(), 0.4, minimise="heat")) == 0.0
+
+
+def test_constant_torque_without_a_shaft_to_wind_reaches_it() -> None:
+    stiff = CRANE.replace(gap=0.0, stiffness=2e5, start_position=7.16 / 2e5)
+    problem = Problem(stiff, 0.3, minimise="heat")
+    mean = 0.21 * 60.0 / 0.3 + 7.16
+    run = played(stiff, TorqueProfile([0.0], [mean]), 0.3)
+    assert heat_of(run, 0.3) == pytest.approx(least_heat(problem), rel=1e-9)

@@ -1,0 +1,238 @@
+"""The CasADi statement of an optimal start: against closed forms, descents and the exact plant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from tests.softstart.optimal.drives import CRANE, played, random_drive, three_masses
+
+from softstart import Drive, InputError, TorqueProfile, optimize, simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.optimal.check import BEYOND, torque_allowed
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import NotConverged, heat_of
+from softstart.optimal.statement import as_casadi, phases_of, solve
+
+WITHIN = 2e-3  # what a demand of straight lines, halved beside its jumps, may cost
+EXACT = 1e-3  # the collocation against the exact plant: the peak between its points
+
+
+def guess(hold: float, start_time: float, drive: Any = CRANE):
+    """A pulse, a coast, and a torque that is held: a run whose order of contacts is that of most optima."""
+    profile = TorqueProfile.steps([0.0, 0.0076, 0.0359, 1.0], [62.0, 0.0, hold])
+    return played(drive, profile, start_time + 1.001 * drive.elastic_period)
+
+
+def checked(problem, run, straight=False):
+    """The claim, and its exact run, with what every start must keep."""
+    claim = solve(problem, run, straight)
+    exact = played(problem.drive, claim.profile, claim.end_time + run.elastic_period)
+    end = exact.recorded.at([claim.end_time])
+    w = end["w"][0] / problem.target
+    if problem.terminal == "reached":
+        assert w[int(exact.recorded.rows.machine.load)] >= 1.0 - 1e-6
+    else:
+        np.testing.assert_allclose(w, 1.0, atol=1e-5)
+    assert problem.start_time is None or claim.end_time <= problem.start_time * (1.0 + 1e-7)
+    assert claim.profile.torque.min() >= problem.lowest_torque
+    assert claim.profile.torque.max() <= problem.highest_torque
+    value = {"k_dyn": exact.k_dyn, "start_time": claim.end_time}.get(problem.minimise)
+    value = value or heat_of(exact, claim.end_time)
+    assert value == pytest.approx(claim.value, rel=EXACT)
+    if problem.torque_speed:
+        state = exact.recorded.at(np.linspace(0.0, exact.end_time, 2000))
+        over = state["u"] - torque_allowed(problem, state["w"][:, exact.drive.motor_index])
+        assert over.max() <= BEYOND * problem.highest_torque
+    return claim, exact
+
+
+# [G]'s drive: the first by the closed form pulse, coast, hold, the second by linear programs
+@pytest.mark.parametrize(("start_time", "k_dyn"), [(0.2883042, 0.90924724), (0.2522662, 1.4564)])
+@pytest.mark.parametrize("straight", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_two_anchors_are_met_from_a_rough_guess(start_time, k_dyn, straight):
+    claim, _ = checked(Problem(CRANE, start_time), guess(56.0, start_time), straight)
+    assert claim.value == pytest.approx(k_dyn, rel=WITHIN)
+
+
+def test_the_first_anchor_is_a_pulse_a_coast_and_a_hold():
+    claim, _ = checked(Problem(CRANE, 0.2883042), guess(56.0, 0.2883042))
+    P = claim.value * Problem(CRANE, 0.2883042).base_torque
+    u_eq = (P * (CRANE.J1 + CRANE.J2) - CRANE.Mc * CRANE.J1) / CRANE.J2
+    assert claim.profile.at([0.001, 0.2, 0.27]) == pytest.approx([62.0, u_eq, u_eq], rel=2e-3)
+
+
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float | None]] = {
+    "steady": ({}, {"terminal": "steady"}, 0.2883042),
+    "reached, lag": ({"torque_lag": 0.005}, {"terminal": "reached"}, 0.27),
+    "reactive, damped": ({"load_kind": "reactive", "damping": 1.0}, {}, 0.27),
+    "dead-zone": ({"damping": 0.3, "contact_law": "dead-zone"}, {}, 0.2883),
+    "lag and rate": ({"torque_rate": 2000.0, "torque_lag": 0.005}, {}, 0.33),
+    "no gap": ({"gap": 0.0}, {}, 0.2883),
+    "braking motor": ({"minimum_torque": -30.0}, {}, 0.26),
+    "heat": ({}, {"minimise": "heat"}, 0.2883),
+    "K_dyn under a heat": ({}, {"heat": 0.2}, 0.32),
+    "start time under a K_dyn": ({}, {"minimise": "start_time", "k_dyn": 1.2}, None),
+    "curve": ({}, {"torque_speed": ((0.0, 62.0), (30.0, 62.0), (70.0, 30.0))}, 0.33),
+    "smooth": ({}, {"smoothness": 3e-5}, 0.2883),
+}
+QUICK = ("steady", "reactive, damped")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in CASES]
+)
+def test_every_class_agrees_with_the_optimum_found_otherwise(name):
+    changes, options, start_time = CASES[name]
+    best = optimize(CRANE.replace(**changes), start_time, **options)
+    until = (start_time or best.end_time) + 1.001 * best.run.elastic_period
+    run = played(best.problem.drive, best.profile, until)
+    claim, exact = checked(best.problem, run)
+    value = {"k_dyn": best.k_dyn, "heat": best.heat, "start_time": best.end_time}[best.problem.minimise]
+    assert claim.value == pytest.approx(value, rel=WITHIN)
+    if best.problem.k_dyn is not None:
+        assert exact.k_dyn <= best.problem.k_dyn * (1.0 + EXACT)
+    if best.problem.heat is not None:
+        assert heat_of(exact, claim.end_time) <= best.problem.heat * (1.0 + 1e-6)
+    if best.problem.smoothness or np.isfinite(best.problem.drive.torque_rate):
+        assert claim.profile.torque[0] == 0.0  # no step anywhere: its knots at one instant are equal
+        assert np.abs(np.diff(claim.profile.torque))[np.diff(claim.profile.time) == 0.0].max() == 0.0
+
+
+# classes by seed: 6 reactive, lag, damped; 13 rate, braking; 28 lag, rate; 33 lag, curve; 36 reactive, ideal
+@pytest.mark.parametrize(
+    "seed", [13, 36, *(pytest.param(k, marks=pytest.mark.slow) for k in (6, 8, 12, 21, 28, 33, 35))]
+)
+def test_random_drives_agree_with_the_linear_programs(seed):
+    rng = np.random.default_rng(seed)
+    drive, options = random_drive(rng)
+    best = optimize(drive, "1.3x", **options)
+    run = played(drive, best.profile, best.problem.start_time + 1.001 * best.run.elastic_period)
+    claim, _ = checked(best.problem, run)
+    assert claim.value == pytest.approx(best.k_dyn, rel=WITHIN)
+
+
+def test_least_heat_lies_a_little_above_what_momentum_demands():
+    """Momentum (J1 + J2) target = integral of u - Mc, and Cauchy-Schwarz; a stiff drive is one mass."""
+    drive = CRANE.replace(gap=0.0, stiffness=2000.0)
+    mean = (drive.J1 + drive.J2) * drive.target_speed / 0.3 + drive.Mc
+    bound = mean**2 * 0.3 / drive.Ms**2
+    run = played(drive, TorqueProfile([0.0], [mean]), 0.33)
+    claim, _ = checked(Problem(drive, 0.3, minimise="heat"), run)
+    assert bound < claim.value < 1.02 * bound
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"torque_lag": 0.005},
+        pytest.param({"torque_lag": 0.005, "torque_rate": 2000.0}, marks=pytest.mark.slow),
+        pytest.param({"release": 0.05}, marks=pytest.mark.slow),
+    ],
+    ids=str,
+)
+def test_a_brake_holds_the_motor_first(changes):
+    hoist = Drive.load("hoist-15kw").replace(
+        start_position="hanging", brake="motor", target_speed=50.0, **changes
+    )
+    best = optimize(hoist, "1.2x")
+    run = played(hoist, best.profile, best.problem.start_time + 1.001 * best.run.elastic_period)
+    claim, exact = checked(best.problem, run)
+    assert phases_of(best.problem, run)[0].braked
+    assert claim.value == pytest.approx(best.k_dyn, rel=WITHIN)
+    assert exact.release_time == pytest.approx(best.run.release_time, rel=0.01)
+
+
+# chains ---------------------------------------------------------------------------------------------------
+
+
+def refound(best):
+    """The answer run to one elastic period after the start time, however early it is."""
+    until = best.problem.start_time + best.run.elastic_period
+    return played(best.problem.drive, best.profile, until)
+
+
+@pytest.mark.slow
+def test_a_chain_agrees_with_the_linear_programs():
+    best = optimize(three_masses(), 0.2)
+    claim, _ = checked(best.problem, refound(best))
+    assert best.bound.k_dyn < claim.value
+    assert claim.value == pytest.approx(0.844, rel=4e-3)
+    assert best.k_dyn == pytest.approx(claim.value, rel=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("given", "terminal"),
+    [({"kind": "reactive"}, "reached"), ({"law": "dead-zone"}, "reached"), ({}, "synchronous")],
+)
+def test_loads_that_hold_another_contact_law_and_terminal(given, terminal):
+    best = optimize(three_masses(**given), 0.2, terminal=terminal)
+    claim, _ = checked(best.problem, refound(best))
+    assert best.bound.k_dyn < claim.value <= 1.001 * best.k_dyn
+
+
+def test_a_drive_as_a_chain_of_two_masses_has_the_same_optimum():
+    masses = [Mass(CRANE.J1), Mass(CRANE.J2, torque=CRANE.Mc)]
+    chain = Chain(masses, [Shaft(CRANE.c, gap=CRANE.gap)], Motor(CRANE.Ms), target_speed=60.0)
+    problem = Problem(chain, 0.2883042, "synchronous")
+    claim, _ = checked(problem, guess(56.0, 0.2883042, chain))
+    assert claim.value == pytest.approx(0.90924724, rel=WITHIN)
+
+
+def test_the_phases_are_those_of_the_record():
+    run = simulate(three_masses(), "direct", 0.2 + three_masses().elastic_period)
+    phases = phases_of(Problem(three_masses(), 0.2), run)
+    assert phases[0].pressing == (0, 0)
+    assert phases[0].end == pytest.approx(run.events[0].time, rel=1e-12)  # a gap closes
+    np.testing.assert_allclose([a.end for a in phases[:-1]], [b.begin for b in phases[1:]], rtol=1e-9)
+    assert [one.end for one in phases if one.last] == [0.2]
+    assert len(phases) > 10
+    assert phases[-1].end == pytest.approx(0.2 + run.elastic_period)
+    for one in phases:
+        T = run.at([0.5 * (one.begin + one.end)])["T"][0]
+        assert np.sign(T).astype(int).tolist() == list(one.pressing)
+
+
+# the program ----------------------------------------------------------------------------------------------
+
+
+def test_the_program_is_one_for_any_solver():
+    problem = Problem(CRANE, 0.3, "reached")
+    one = as_casadi(problem, guess(56.0, 0.3), straight=True)
+    x = ca.nlpsol("s", "ipopt", one.nlp, {"ipopt.print_level": 0, "print_time": False})(
+        x0=one.x0, p=one.p, lbx=one.lbx, ubx=one.ubx, lbg=one.lbg, ubg=one.ubg
+    )["x"]
+    assert len(one.slots) == x.shape[0] == one.lbx.size
+    assert one.end_time(x) == pytest.approx(0.3, rel=1e-6)
+    exact = played(CRANE, one.profile(x), 0.3 + CRANE.elastic_period)
+    assert exact.k_dyn == pytest.approx(one.k_dyn(x), rel=WITHIN)
+    with pytest.raises(InputError, match="x: 3 numbers"):
+        one.k_dyn([0.0, 1.0, 2.0])
+
+
+def test_a_start_time_that_is_too_short_is_no_result():
+    with pytest.raises(NotConverged) as caught:
+        solve(Problem(CRANE, 0.2), guess(62.0, 0.2))
+    assert caught.value.violation > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"law": "modelica"}, "contact_law = modelica"),
+        ({"efficiency": 0.97}, "gears with losses"),
+        ({"curve_speed": [0.0, 30.0], "curve_torque": [0.0, 10.0]}, "load curves"),
+    ],
+)
+def test_what_it_does_not_cover_is_said(given, said):
+    chain = three_masses(**given)
+    with pytest.raises(InputError, match=said):
+        as_casadi(Problem(chain, 0.2), simulate(chain, "direct", 0.4))
+
+
+def test_a_run_that_ends_too_early_is_refused():
+    with pytest.raises(InputError, match="an elastic period after"):
+        as_casadi(Problem(three_masses(), 0.2), simulate(three_masses(), "direct", 0.19))
