@@ -159,7 +159,8 @@ def test_no_one_is_gentler(index: int) -> None:
     row = measured(rng, False, 100)
     assert row.best is not None
     assert not wrong(row)
-    assert row.gap < 0.05
+    if row.best.bound.kind == "certificate":  # that of momentum does not know of lag, rate limit and damping
+        assert row.gap < 0.01
 
 
 def main() -> None:

@@ -1,21 +1,26 @@
 """From a first demand down to a local optimum: successive linear programs on the exact start.
 
 The demand u(t) is linear between knots; two knots at one instant are a step. For torques u_q at the knots the
-exact start of each machine s gives the torques T_k(t) of all its shafts, the state x(t_f) at the end, and how
+exact start of each machine gives the torques T_k(t) of all its shafts, the state x(t_f) at the end, and how
 they answer to the knots, exactly and through all contacts (`softstart.kernel.sensitivity`). To first order in
 a change v of the torques and h of the end t_f the problem is a linear program over v, h, the largest torque P
 and what is missed, m >= 0:
 
-    minimise    objective + penalty * sum of m
-    peak        |T_k(t) + dT_k(t)/du v| <= P        for all machines, shafts and instants t <= t_f + period
+    minimise    objective + penalty * sum of m + calm * sum of |u_(q+1) + v_(q+1) - u_q - v_q|
+    peak        |T_k(t) + (dT_k/du + T_k' dt/du) v| <= P       for all machines, shafts, t <= t_f + period
     terminal    x(t_f) + dx/du v + x'(t_f) h = wanted, up to m    (reached: the load speed, >=)
     limits      lowest <= u_q + v_q <= highest,  |u_(q+1) + v_(q+1) - u_q - v_q| <= rate * (t_(q+1) - t_q)
     curve       r(t) + dr/du v <= a + b (w + dw/du v) + m         r the realised torque, w the motor speed
     heat        H + dH/du v + r(t_f)^2 h <= bound + m
+    closed      T_k(t) + ... v >= 0 where a flank presses: in a second program, if the first one fails
     trust       |v_q| <= trust, |h| <= share of t_f,  t_f + h <= start_time
 
     objective   P (k_dyn), or H + dH/du v + v' G'G v (heat: a square, as the realised torque is linear in the
                 demand); smoothness adds its square. A square lies above tangent planes, added until near
+
+The instants of the peaks keep their place between the contacts and move with them, by dt/du v
+(`Played.along_contacts`): where a contact comes later, the torque after it does too. At fixed instants the
+program would be wrong beside each contact, and descents stall.
 
 CasADi hands the program to HiGHS. Of the rows of peaks and of the curve only those that matter are in it: it
 begins with the instants near the peak, thinned, and takes in local maxima that its answer would let through.
@@ -23,8 +28,8 @@ The step is then run exactly; what counts is the merit of that start, its object
 penalty times what it misses. The trust region follows how far the program was right. Where the terminal
 condition stays missed, missing it costs ten times as much, and so on.
 
-Knots: even ones and those of the first demand; then intervals beside large changes of the torque are halved,
-three times. Last, the smallest changes that meet the terminal condition to rounding (Newton).
+Knots: even ones and those of the first demand; then intervals beside bends of the torque are halved, a few
+times. Last, the smallest changes that meet the terminal condition to rounding (Newton).
 
 Successive linear programming: R. Fletcher, E. Sainz de la Maza, Math. Prog. 43 (1989) 235-256.
 """
@@ -48,11 +53,11 @@ from softstart.profile import TorqueProfile
 KNOTS = 14  # in an elastic period
 MOST_KNOTS = 160  # even ones
 INSTANTS = 32  # of the fastest period, at which torques are limited
-PENALTY, DEAREST = 20.0, 1e5  # of what is missed, as shares, beside the objective as a share
+PENALTY, DEAR, DEAREST = 20.0, 2e3, 1e5  # of what is missed, as shares, beside the objective as a share
 FIRST_TRUST, MOST_TRUST, LEAST_TRUST = 0.1, 0.5, 1e-4  # of the highest torque
 NEAR, THIN = 0.85, 3  # share of the peak from which rows are in a program; one of so many of them
 ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of the decrease
-STEPS = 60
+STEPS, INTO = 60, 16
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 MISSED = 1e-5
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
@@ -215,8 +220,10 @@ class Descent:
         if self.problem.terminal == "reached":
             return lacking[[player.load]]
         if self.problem.terminal == "steady":
-            aim = wanted(carried(player.rows), self.base, player.motor)
-            lacking = np.concatenate([lacking, (aim - state["T"][0]) / self.base])
+            own = carried(player.rows)
+            T, aim = state["T"][0], wanted(own, self.base, player.motor)
+            open_too = (T == 0.0) & (np.abs(own) < np.abs(aim))  # flanks apart carry nothing either
+            lacking = np.concatenate([lacking, np.where(open_too, 0.0, aim - T) / self.base])
         return lacking
 
     def _beyond(self, player: Player, start: Played) -> float:
@@ -257,6 +264,13 @@ class Descent:
         while found is not None and steps == STEPS and found.missed > MISSED and self.penalty < DEAREST:
             self.penalty *= 10.0
             found = self._down(found.torques, found.end, steps, least)
+        self.penalty = PENALTY
+        return found
+
+    def into(self, profile: TorqueProfile, end: float) -> Found | None:
+        """Down with missing a condition dear from the beginning: whether a start misses none."""
+        self.penalty = DEAR
+        found = self._down(self.onto(profile), end, INTO, 1e-3)
         self.penalty = PENALTY
         return found
 

@@ -236,7 +236,8 @@ def searched(
     firsts = _first_demands(search, near)
     if problem.terminal != "reached":  # begin with an easier end
         easier = Descent(replace(problem, terminal="reached"), search.players)
-        firsts = [*_tasted(easier, firsts)[:FINISHED], *firsts[:FINISHED]]
+        direct = firsts if problem.terminal == "steady" else firsts[:FINISHED]
+        firsts = [*_tasted(easier, firsts)[:FINISHED], *direct]
     done, merits = [], list[float]()
     for name, demand in _tasted(search, firsts)[:FINISHED]:
         found = search.down(demand, search.latest)
@@ -433,7 +434,7 @@ def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[floa
     while high - low > SHORTEST * high:
         middle = 0.5 * (low + high)
         search = Descent(replace(timed, start_time=middle))
-        tried = search.down(demand, middle)
+        tried = search.into(demand, middle)
         if tried is not None and tried.missed <= MISSED:
             high, demand = middle, TorqueProfile(search.time, tried.torques)
         else:
