@@ -72,17 +72,12 @@ def check(
     Traceback (most recent call last):
     softstart.optimal.result.OptimumError: ...K_dyn is 3.1... in the exact re-simulation, 0.9 was claimed...
     """
-    wrong = [*_demand(problem, profile)]
+    wrong = [*_beyond(problem, "demand", profile.time, profile.torque)]  # straight lines
     for run in runs:
         wrong += [*_realised(problem, run), *_torque_speed(problem, run), *_terminal(problem, run, end)]
     wrong += [*_figures(problem, runs, end, claimed, bound)]
     if wrong:
         raise OptimumError(" ".join(wrong))
-
-
-def _demand(problem: Problem, profile: TorqueProfile) -> Iterator[str]:
-    """A straight line is extreme at its ends."""
-    yield from _beyond(problem, "demand", profile.time, profile.torque)
 
 
 def _realised(problem: Problem, run: Run) -> Iterator[str]:

@@ -291,7 +291,7 @@ class Descent:
                 np.insert(found.torques, halved + 1, mean),
             )
             self.time = time
-            finer = self.down_from(torque, found.end, least)
+            finer = self._down(torque, found.end, STEPS // 2, least)
             if finer is None:
                 break
             gained, found = found.merit - finer.merit, finer
@@ -323,9 +323,6 @@ class Descent:
             else:
                 self.time = kept
         return found
-
-    def down_from(self, torques: Vector, end: float, least: float) -> Found | None:
-        return self._down(torques, end, STEPS // 2, least)
 
     def _down(self, torques: Vector, end: float, steps: int, least: float) -> Found | None:
         found = self.play(torques, end)

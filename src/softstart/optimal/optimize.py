@@ -183,7 +183,7 @@ def solve(problem: Problem, near: TorqueProfile | None = None, confirm: bool = F
         return _least_start_time(problem, near, began)
     assert problem.start_time is not None
     if problem.start_time < momentum_shortest_time(problem):
-        raise _too_short(problem)
+        raise _too_short(problem, shortest_start_time(problem))
     best = _by_formula(problem, began) or _by_descent(problem, near, began)
     if confirm:
         best = _confirmed(best)
@@ -205,11 +205,27 @@ def _by_formula(problem: Problem, began: float) -> Optimum | None:
 def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> Optimum:
     found = searched(problem, near)
     if found is None or found[1].missed > MISSED:
-        raise _too_short(problem)
+        found = _sooner(problem)
     name, best, profile = found
     claimed = {"k_dyn": best.peak / problem.base_torque, "heat": best.heat}[problem.minimise]
     why = f"successive linear programs on the exact start, from {name}"
     return _checked(problem, profile, best.end, claimed, "descent", why, began)
+
+
+def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
+    """A start from the shortest one found, where none was from others; the refusal if that takes longer."""
+    shortest = _shortest(problem)
+    assert problem.start_time is not None
+    if shortest is None or shortest[0] > problem.start_time:
+        raise _too_short(problem, math.inf if shortest is None else shortest[0])
+    end = min(shortest[0] * (1.0 + EDGE), problem.start_time)
+    found = searched(replace(problem, start_time=end), shortest[1])
+    if found is None or found[1].missed > MISSED:
+        raise OptimumError(
+            f"No start of {problem.drive.name} within {problem.start_time:.6g} s was found that keeps all "
+            f"bounds, though one of {shortest[0]:.6g} s exists; ask for more time."
+        )
+    return "the shortest start found", *found[1:]
 
 
 def searched(
@@ -290,14 +306,9 @@ def _first_demands(search: Descent, near: TorqueProfile | None) -> list[tuple[st
 
 
 def _checked(
-    problem: Problem,
-    profile: TorqueProfile,
-    end: float,
-    claimed: float,
-    method: Method,
-    why: str,
+    problem: Problem, profile: TorqueProfile, end: float, claimed: float, method: Method, why: str,
     began: float,
-) -> Optimum:
+) -> Optimum:  # fmt: skip
     """An answer that has passed the exact machine, with its bound."""
     runs = replayed(problem, profile, end)
     if problem.terminal == "reached":
@@ -442,13 +453,14 @@ def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[floa
     return high, demand
 
 
-def _too_short(problem: Problem) -> InfeasibleError:
-    shortest = shortest_start_time(problem)
+def _too_short(problem: Problem, shortest: float) -> InfeasibleError:
+    assert problem.start_time is not None
+    proved = problem.start_time < momentum_shortest_time(problem)
     known = "none was found" if math.isinf(shortest) else f"the shortest start found takes {shortest:.6g} s"
     bounds = "" if problem.heat is None else f" and a heat of {problem.heat:g} s"
     sentence = (
-        f"No torque brings {problem.drive.name} to {problem.target:g} rad/s ({problem.terminal}) within "
-        f"{problem.start_time:.6g} s{bounds}; {known}."
+        f"No torque {'' if proved else 'was found that '}brings {problem.drive.name} to {problem.target:g} "
+        f"rad/s ({problem.terminal}) within {problem.start_time:.6g} s{bounds}; {known}."
     )
     return InfeasibleError(Verdict(problem, shortest, sentence))
 
@@ -462,9 +474,8 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
             raise InfeasibleError(Verdict(problem, math.inf, sentence))
         timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + EDGE))
         best = _by_descent(timed, found[1], began)
-        best = replace(
-            best, problem=problem, why=f"the shortest start found, the gentlest of these; {best.why}"
-        )
+        why = f"the shortest start found, the gentlest of these; {best.why}"
+        best = replace(best, problem=problem, why=why)
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
     bound = Limit("K_dyn", "1", "k_dyn", problem.k_dyn)
 

@@ -85,7 +85,7 @@ class Played:
         A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/du = -(dtheta_k/du)/theta_k'; in
         between the shift is interpolated, and it is none at both ends. Shapes (j, q) in s/(N m) and (j, k).
         """
-        recorded, joints = self.recorded, self.recorded.rows.count - 1
+        recorded = self.recorded
         events = recorded.events[recorded.events["kind"] == at.CLOSED]
         events = events[(events["time"] > 0.0) & (events["time"] < times[-1])]
         moved = np.zeros((times.size, self.profile.time.size))
@@ -106,7 +106,6 @@ class Played:
         inside = recorded.index(times)
         step = 1e-6 * float(self.profile.time[-1])
         after, before = (recorded.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
-        assert after.shape[1] == joints
         return moved, (after - before) / (2.0 * step)
 
     def state_by_demand(self, marks: ArrayLike) -> NDArray[np.float64]:
@@ -115,12 +114,11 @@ class Played:
 
 
 class Player:
-    """Runs demands on one machine; `plays` counts them."""
+    """Runs demands on one machine."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
         self.rows = rows_of(machine)
-        self.plays = 0
         self._room = 1024
         record, masses, shafts = self.rows.machine, self.rows.masses[0], self.rows.shafts[0]
         self.period, self.target = float(record.period), float(record.target)
@@ -134,7 +132,6 @@ class Player:
     def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[Recorder, int]:
         made: Any = make_controller("profile", {"profile": profile})
         recorder = Recorder(self.rows, int(made.sensors), room)
-        self.plays += 1
         return recorder, run_one(made, self.machine, recorder, until)
 
     def play(self, profile: TorqueProfile, until: float) -> Played:
