@@ -9,23 +9,10 @@ speed v and goes on for tau under a torque u(s) from 0 to Ms has
       >= k(te, tau) + min over v of a(tau) v + Ms integral min(q(s), 0) ds  =: D(te, tau),
 
 with the kinks s_j at fixed shares of tau. A linear program gives good numbers for one (te, tau); D is then
-a bound for all u at any (te, tau), and is bounded from below over whole cells:
-
-- over te: k is linear in te, the least v at te falls with te, so the ends of a cell decide;
-- over tau: at fixed v and u(s/tau) the right side is a function of tau with |second derivative| <= M, so
-  over a cell of width w it is nowhere less than the lesser of its ends, minus M w^2/8;
-- q is, up to a constant, a free motion backward in time that is kicked at the kinks. So |q''| <= B in each
-  step h of a grid, and the integral of min(q, 0) over it is at least the trapezoid minus B h^3/12.
-
-M and B are enclosures: the energy y'^2 + Omega^2 y^2 of a free motion y never rises, whatever the damping, so
-that its value at one instant bounds y' at all later ones, and the energy of y' bounds y'' (`Contact.swing`).
-
-Cells whose bound is too low are split; where D itself is too low, a linear program there gives new numbers.
-Two plain bounds help: momentum, J2 (target - w2(te)) <= (P - Mc) tau, where the contact comes too late, and
-the peak that coasting from the least v brings where there is time in plenty.
-
-Arithmetic is floating point: for its rounding 1e-10 of the sum of the absolute terms of D is taken off, and
-the start time is stretched by 1e-10. D sums a few thousand terms, each rounded by about 1e-16.
+a bound for all u at any (te, tau), and is bounded from below over whole cells. Those that prove too little
+are split; where D itself is too low, a linear program there gives new numbers. Two plain bounds help:
+momentum, J2 (target - w2(te)) <= (P - Mc) tau, where the contact comes too late, and the peak that coasting
+from the least v brings where there is time in plenty. Cells, enclosures and rounding: docs/theory/optimum.md.
 """
 
 from __future__ import annotations
@@ -35,28 +22,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import solve_banded
+from scipy.optimize import linprog
 
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.optimal.contact_motion import Contact, Entries, entries, no_ideal
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
 
-ROUNDING = 1e-10
-FIRST_CELLS, MOST_CELLS = 24, 3000  # of tau
+ROUNDING = 1e-10  # of the absolute terms of D is taken off, and by so much the start time is stretched
+MOST_CELLS = 3000  # of tau
 NARROWEST = 1e-6  # cell of tau, as a share of the longest
-FLAT = 1e-4  # of what is proved at a point, by which the bound of a cell there may be less
-STEPS, MOST_STEPS = 80, 160  # of the coarse program: at least, and at least three quarters a radian
-FINER = 4  # times as many steps of the fine program
-ATOM = 0.03  # share of all multipliers from which an instant counts by itself
+MOST_STEPS = 160  # of the coarse program
 TAIL = 120  # instants of coasting at which T is checked
-PRICE = 40.0  # of missing the terminal condition by as much as the target speed, in Ms
 FINE = 0.02  # radians of the elastic oscillation, at most, in a step of the integral of q
 MOST_PROGRAMS = 60
-CLOSE, AGAIN = 0.01, 3  # so many programs within this share of the longest contact, each finer
+CLOSE = 0.01  # share of the longest contact within which programs are finer each time, three at most
 
 ENDINGS = {
     "synchronous": "both masses have the target speed",
@@ -72,9 +56,8 @@ def not_certified(problem: Problem) -> str:
     >>> not_certified(Problem(Drive.load("crane-4amtkf"), 0.5))
     ''
     """
-    if problem.start_time is None:
-        return "without a bound on the start time any peak above the load torque will do"
-    return no_ideal(problem)
+    no_end = "without a bound on the start time any peak above the load torque will do"
+    return no_end if problem.start_time is None else no_ideal(problem)
 
 
 def certified_bound(
@@ -260,63 +243,40 @@ class _Program:
         self.box[n:] = np.sort([cells.slowest[k], cells.fastest[k]]) / scale, (0.0, np.inf)  # rounding
 
     def solve(self, spans: int = 1, kept: Indices | None = None) -> _Multipliers | None:
-        """The best multipliers, of means of T over so many instants each, and of T at the instants `kept`."""
-        single = np.zeros(0, dtype=np.int64) if kept is None else kept
+        """The best multipliers, of means of T over so many instants each, and of T at the instants `kept`.
 
-        def chosen(rows: Matrix) -> Matrix:
-            return np.concatenate([rows.reshape(-1, spans, *rows.shape[1:]).mean(axis=1), rows[single]])
-
-        def spread(worth: Vector) -> Vector:
-            count = worth.size - single.size
-            at = np.repeat(worth[:count] / spans, spans)
-            at[single] += worth[count:]
-            return at
-
-        P, (T, T0), (z, z0) = np.append(np.zeros(self.n + 1), 1.0), map(chosen, self.T), map(chosen, self.z)
+        The equations may be missed, by the target speed for 40 Ms, so that there always is an answer.
+        """
+        each = np.eye(self.T[1].size // spans)
+        R = sparse.kron(each, np.full((1, spans), 1.0 / spans), format="csr")
+        if kept is not None:
+            R = sparse.vstack([R, sparse.eye_array(self.T[1].size, format="csr")[kept]], format="csr")
+        (T, T0), (z, z0) = ((R @ A, R @ b) for A, b in (self.T, self.z))
+        P = np.append(np.zeros(self.n + 1), 1.0)
         limits = [(T - P, -T0), (-T - self.pulls * P, T0)]
         limits += [(-z, z0)] if self.pulls else []
         limits += [(self.tail[0] - P, -self.tail[1])] if self.reached else []
-        found = _worth(P, limits, self.equal, self.value, self.box)
-        if found is None:
+        A, b = (np.concatenate(one) for one in zip(*limits, strict=True))
+        slack = np.eye(self.value.size)
+        missed = np.zeros((b.size, 2 * self.value.size))
+        found = linprog(
+            np.append(P, np.full(missed.shape[1], 40.0)), np.hstack([A, missed]), b,
+            np.hstack([self.equal, slack, -slack]), self.value,
+            np.vstack([self.box, np.tile([0.0, np.inf], (missed.shape[1], 1))]), "highs",
+            options={"presolve": False},
+        )  # fmt: skip
+        if found.status != 0:
             return None
-        worth, equal = found
-        peak, low = spread(worth[0]), spread(worth[1])
-        of_z = -spread(worth[2]) if self.pulls else np.zeros(low.size)
+        ends = np.cumsum([right.size for _, right in limits])[:-1]
+        worth = np.split(np.maximum(-found.ineqlin.marginals, 0.0), ends)
+        peak, low = R.T @ worth[0], R.T @ worth[1]
+        of_z = -(R.T @ worth[2]) if self.pulls else np.zeros(low.size)
         tail = worth[-1] if self.reached else np.zeros(TAIL)
         total = float(peak.sum() + self.pulls * low.sum() + tail.sum())
         if not total > 0.0:
             return None
-        ends = np.append(equal * self.units / total, [0.0, 0.0])[:3]
-        return _Multipliers((peak - low) / total, of_z / total, tail / total, *ends.tolist())
-
-
-def _worth(
-    cost: Vector, blocks: list[tuple[Matrix, Vector]], equal: Matrix, value: Vector, box: Matrix
-) -> tuple[list[Vector], Vector] | None:
-    """What the limits A x <= b of each block, and the equations, are worth at the least cost in the box.
-
-    The equations may be missed at a price, so that there always is an answer.
-    """
-    import casadi
-
-    missed, right = value.size, np.concatenate([b for _, b in blocks])
-    slack = np.hstack([np.eye(missed), -np.eye(missed)])
-    above = [np.vstack([A for A, _ in blocks]), np.zeros((right.size, 2 * missed))]
-    rows = np.block([above, [equal, slack]])
-    sparse = casadi.sparsify(casadi.DM(rows))
-    least, most = np.vstack([box, np.tile([0.0, np.inf], (2 * missed, 1))]).T
-    program: dict[str, Any] = {"a": sparse.sparsity(), "h": casadi.Sparsity(rows.shape[1], rows.shape[1])}
-    quiet: dict[str, Any] = {"highs": {"output_flag": False, "presolve": "off"}, "error_on_fail": False}
-    solver = casadi.conic("program", "highs", program, quiet)
-    out = solver(
-        g=np.append(cost, np.full(2 * missed, PRICE)), a=sparse, lbx=least, ubx=most,
-        lba=np.append(np.full(right.size, -np.inf), value), uba=np.append(right, value),
-    )  # fmt: skip
-    if not solver.stats()["success"]:
-        return None
-    worth = np.asarray(out["lam_a"], dtype=np.float64).ravel()
-    sizes = np.cumsum([b.size for _, b in blocks])
-    return np.split(np.maximum(worth[: right.size], 0.0), sizes[:-1]), -worth[right.size :]
+        numbers = np.append(found.eqlin.marginals * self.units / total, [0.0, 0.0])[:3]
+        return _Multipliers((peak - low) / total, of_z / total, tail / total, *numbers.tolist())
 
 
 # all entries and durations ----------------------------------------------------------------------------------
@@ -344,7 +304,7 @@ class _Search:
         """The least bound over all cells, N m."""
         k = int(np.clip(np.searchsorted(self.cells.te, self.near) - 1, 0, self.cells.slowest.size - 1))
         self._program(k, self.end - self.near)
-        edges = self.longest * (1.0 - np.linspace(1.0, 0.0, FIRST_CELLS + 1) ** 2)  # finer at the end
+        edges = self.longest * (1.0 - np.linspace(1.0, 0.0, 25) ** 2)  # finer at the end
         heap = sorted((self._cell(a, b)[0], a, b) for a, b in pairwise(edges.tolist()))
         for _ in range(MOST_CELLS):
             value, a, b = heapq.heappop(heap)
@@ -357,7 +317,7 @@ class _Search:
                 if self._program(k, b):
                     value, k = self._cell(a, b)
                 else:  # as good as it gets here
-                    self.goal = min(self.goal, self._best(self.duals, k, b) * (1.0 - FLAT))
+                    self.goal = min(self.goal, self._best(self.duals, k, b) * (1.0 - 1e-4))
             if narrow:
                 self.goal = min(self.goal, value)
             if value >= self.goal:
@@ -411,20 +371,20 @@ class _Search:
         te = float(self.cells.te[k + 1])
         tau = min(tau, self.end - te)
         again = sum(abs(te - one) + abs(tau - other) < CLOSE * self.longest for one, other in self.low)
-        n = max(STEPS, int(0.75 * self.contact.Omega * tau))
-        if tau <= 0.0 or n > MOST_STEPS or again >= AGAIN or len(self.duals) >= MOST_PROGRAMS:
+        n = max(80, int(0.75 * self.contact.Omega * tau))
+        if tau <= 0.0 or n > MOST_STEPS or again >= 3 or len(self.duals) >= MOST_PROGRAMS:
             return False  # of so many elastic periods momentum alone is as good
-        more = (1.0, 2**again) if self.contact.d > 0.0 else (1.5**again, 1)
-        n, parts = min(int(n * more[0]), MOST_STEPS), 2 * more[1]
+        damped, finer = self.contact.d > 0.0, 4
+        n, parts = min(int(n * (1.0 if damped else 1.5**again)), MOST_STEPS), 2 * (2**again if damped else 1)
         by = _Program(self.problem, self.cells, k, tau, n, 2).solve()
         if by is None:
             return False
         parted = np.maximum([by.of_T, -by.of_T, -by.of_z], 0.0)
-        atoms = np.flatnonzero(np.any(parted > ATOM * parted.sum(axis=1)[:, None], axis=0))
-        part = FINER * parts // 2  # instants of the fine program for each of the coarse one
+        atoms = np.flatnonzero(np.any(parted > 0.03 * parted.sum(axis=1)[:, None], axis=0))
+        part = finer * parts // 2  # instants of the fine program for each of the coarse one
         kept = np.unique(np.add.outer(part * atoms, np.arange(-part - 1, 3 * part)))
         kept = kept[(kept >= 0) & (kept < 2 * n * part)]
-        fine = _Program(self.problem, self.cells, k, tau, FINER * n, parts).solve(FINER * parts, kept)
+        fine = _Program(self.problem, self.cells, k, tau, finer * n, parts).solve(finer * parts, kept)
         self.duals.append(_Dual(self.problem, self.cells, fine or by, tau))
         if self._best(self.duals[-1:], k, tau) < (1.0 + CLOSE) * self.goal:
             self.low.append((te, tau))

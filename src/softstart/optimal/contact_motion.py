@@ -2,15 +2,9 @@
 
 With any torque between the limits at the motor's command (no lag, no rate limit), the part before the contact
 of a start whose gap closes once matters only through the instant te at which both masses begin to move in
-contact and the relative speed v = w1 - w2 that they have then. `entries` bounds v in cells of te:
-
-- an active load: theta'' = u/J1 + Mc/J2 over the travel still open fixes the first moment of the torque
-  about te, A = integral (te - s) u ds. Of all torques from 0 to Ms with that moment the earliest pulse has
-  the least impulse, the latest one the greatest. The load falls back meanwhile: w2 = w2(0) - Mc te/J2;
-- a reactive load at rest, undamped: the motor alone crosses the gap and winds the shaft up to T = Mc, where
-  the load breaks away (te, overlap z0 = Mc/c). An early pulse has the least v (its lead on any other torque
-  with the same te is concave from the end of the pulse on), and v falls with te; a load at rest can be kept
-  waiting, so that any later te has v >= 0. The work of Ms over the whole travel bounds v from above.
+contact and the relative speed v = w1 - w2 that they have then. `entries` bounds v in cells of te: of all
+torques that close the gap at te an early pulse has the least v, a late one the greatest. A reactive load at
+rest moves only when the shaft is wound up to T = Mc, at the overlap z0 = Mc/c (docs/theory/optimum.md).
 """
 
 from __future__ import annotations
@@ -24,9 +18,9 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
+from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, falls_back, first_true, reactive
 
 ENTRY_CELLS = 3000
-MARGIN = 2e-4  # of the largest torque: a smaller load torque at a steady end counts as none
 
 
 @dataclass(frozen=True)
@@ -123,25 +117,18 @@ class Entries:
 
 def no_ideal(problem: Problem) -> str:
     """Why the start is no linear problem from its contact on; empty if it is one."""
-    drive = problem.drive
-    v0 = float(drive.initial_motor_speed - drive.initial_load_speed)
-    reactive = drive.load_kind == "reactive" and float(drive.Mc) > 0.0
-    if problem.lowest_torque < 0.0:
-        return "the motor may brake, so the gap part is not one pulse at either end"
-    if drive.contact_law == "modelica" and drive.d > 0.0:
-        return "the damped modelica law is not linear in contact"
-    if problem.terminal == "steady" and drive.d > 0.0 and drive.Mc < MARGIN * problem.highest_torque:
-        return "a damped shaft ends without torque only after it did not push"
-    if v0 < 0.0:
-        return "the load runs away from the motor at first"
-    if reactive and drive.d > 0.0:
-        return "a damped shaft moves a reactive load at an overlap that depends on the speed"
-    if reactive and (drive.initial_load_speed != 0.0 or drive.initial_motor_speed != 0.0):
-        return "a reactive load that moves before the contact"
-    wound = abs(float(drive.theta0)) - 0.5 * float(drive.gap)
-    if wound > 0.0 and (drive.theta0 < 0.0 or (reactive and float(drive.c) * wound > float(drive.Mc))):
-        return "the start is wound up against the load"
-    return ""
+    drive, sticks, damped = problem.drive, reactive(problem), problem.drive.d > 0.0
+    little = drive.Mc < 2e-4 * problem.highest_torque  # so small a load torque at a steady end counts as none
+    preload = drive.c * max(drive.theta0 - 0.5 * drive.gap, 0.0)
+    return falls_back(problem) or first_true({
+        "the damped modelica law is not linear in contact": drive.contact_law == "modelica" and damped,
+        "a damped shaft ends without torque only after it did not push":
+            problem.terminal == "steady" and damped and little,
+        "a damped shaft moves a reactive load at an overlap that depends on the speed": sticks and damped,
+        "a reactive load that moves before the contact":
+            sticks and bool(drive.initial_load_speed or drive.initial_motor_speed),
+        "the start is wound up against the load": sticks and preload > drive.Mc,
+    })  # fmt: skip
 
 
 def entries(problem: Problem, end: float, near: float | None = None) -> Entries:
@@ -151,50 +138,42 @@ def entries(problem: Problem, end: float, near: float | None = None) -> Entries:
     >>> round(float(cells.te[0]), 5), round(float(cells.fastest[0]), 2)
     (0.01661, 30.1)
     """
-    if problem.drive.load_kind == "reactive" and problem.drive.Mc > 0.0:
-        return _through_standstill(problem, end)
-    return _through_gap(problem, end, near)
+    return _through_standstill(problem, end) if reactive(problem) else _through_gap(problem, end, near)
 
 
 def _through_gap(problem: Problem, end: float, near: float | None) -> Entries:
     """An active load; the gap may be closed at first."""
-    drive, Ms = problem.drive, problem.highest_torque
-    J1, pull, w2 = float(drive.J1), float(drive.Mc / drive.J2), float(drive.initial_load_speed)
-    v0, overlap = float(drive.initial_motor_speed) - w2, float(drive.theta0 - 0.5 * drive.gap)
-    travel, te = max(0.0, -overlap), np.zeros(2)
+    starts = PulseCoastHold.of(problem)
+    v0, push, pull, travel, te = starts.v0, starts.push, starts.pull, starts.travel, np.zeros(2)
     if travel > 0.0:
-        arriving = (v0 + math.sqrt(v0**2 + 2.0 * a * travel) for a in (Ms / J1 + pull, pull))
-        first, last = (2.0 * travel / speed if speed > 0.0 else math.inf for speed in arriving)
+        first, last = (fall_time(travel, v0, a) for a in (push + pull, pull))
         last, x = max(min(last, end), first), np.linspace(0.0, 1.0, ENTRY_CELLS + 1)
         te = first + (last - first) * x * x  # v is steepest at the first instant
         if near is not None and first < near < last:
             cubes = x[:-1] ** 3
             te = np.unique(np.concatenate([te, near + (last - near) * cubes, near - (near - first) * cubes]))
-    A = np.clip(J1 * (travel - v0 * te - 0.5 * pull * te * te) / Ms, 0.0, 0.5 * te * te)  # over Ms
+    A = np.clip((travel - v0 * te - 0.5 * pull * te * te) / push, 0.0, 0.5 * te * te)  # over Ms
     root = np.sqrt(te * te - 2.0 * A)
     pulse = np.divide(2.0 * A, te + root, out=np.zeros_like(te), where=te + root > 0.0)
-    slowest = v0 + pull * te + Ms / J1 * pulse
+    slowest = v0 + pull * te + push * pulse
     # within a cell the last pulse is longest at its beginning, the pull of the load greatest at its end
-    fastest = v0 + pull * te[1:] + Ms / J1 * np.sqrt(2.0 * A[:-1])
-    return Entries(te, slowest[1:], fastest, w2 - pull * te, max(overlap, 0.0), travel > 0.0, False)
+    fastest = v0 + pull * te[1:] + push * np.sqrt(2.0 * A[:-1])
+    return Entries(te, slowest[1:], fastest, starts.w2 - pull * te, starts.preload, travel > 0.0, False)
 
 
 def _through_standstill(problem: Problem, end: float) -> Entries:
     """A reactive load at rest: the cells are between the breakaways after first pulses of falling length."""
-    drive, Ms = problem.drive, problem.highest_torque
-    J1, c, overlap = float(drive.J1), float(drive.c), float(drive.theta0 - 0.5 * drive.gap)
-    travel, preload, z0 = max(0.0, -overlap), max(0.0, overlap), float(drive.Mc) / c
-    ws, a, mean = math.sqrt(c / J1), Ms / J1, Ms / c
-    crossing = math.sqrt(2.0 * travel / a)
+    starts = PulseCoastHold.of(problem)
+    c, Ms, travel, preload, z0 = starts.c, starts.Ms, starts.travel, starts.preload, starts.Mc / starts.c
+    ws, a, mean = math.sqrt(c / starts.J1), starts.push, Ms / c
+    crossing = fall_time(travel, 0.0, a)
     radius = math.hypot(preload - mean, a * crossing / ws)  # about `mean`, under full torque
     angle = math.atan2(a * crossing / ws, preload - mean)
 
     def duration(way: float) -> float:
         """Of the first `way` rad under full torque: through the gap, then winding the shaft up."""
-        if way <= travel:
-            return math.sqrt(2.0 * way / a)
-        cosine = (preload + way - travel - mean) / radius
-        return crossing + (angle - math.acos(min(max(cosine, -1.0), 1.0))) / ws
+        wound = starts.winding_time(a * crossing, preload + way - travel)
+        return fall_time(min(way, travel), 0.0, a) + wound
 
     # the shortest pulse brings no more than the work on the shaft; the longest lasts until the breakaway
     shortest = duration(0.5 * c * (z0**2 - preload**2) / Ms)
@@ -214,5 +193,5 @@ def _through_standstill(problem: Problem, end: float) -> Entries:
     count = max(int(np.searchsorted(te, end)), 1)
     te, slowest = np.append(te[:count], max(end, te[0])), np.append(slowest, 0.0)[: count + 1]
     # letting a wound shaft go first makes v greater still: at most from T = 0, or from the open gap
-    fastest = math.sqrt(2.0 / J1 * (Ms * (travel + z0) - 0.5 * c * z0**2))
+    fastest = math.sqrt(2.0 / starts.J1 * (Ms * (travel + z0) - 0.5 * c * z0**2))
     return Entries(te, slowest[1:], np.full(te.size - 1, fastest), np.zeros(te.size), z0, travel > 0.0, True)

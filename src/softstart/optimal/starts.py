@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import Machine
@@ -17,11 +18,6 @@ from softstart.profile import TorqueProfile
 from softstart.start.engine import ended, run_one
 from softstart.start.recorded import Recorded, Recorder
 from softstart.start.rows import MAX_EVENTS, Rows, rows_of
-
-BEFORE = 1e-9  # of a span, before its end: a step of the torque has two sides
-TOUCH = 5e-4  # of the base torque
-SOFT = 1e-4  # of the largest speed: a contact at less moves too far with the demand
-GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +43,10 @@ class Played:
     def instants(self, step: float) -> Vector:
         """Both sides of every joint of spans and instants in between, no further apart than `step`, s."""
         start, end = self.recorded.spans[:, [at.S_START, at.S_END]].T
-        parts = np.ceil((end - start) / step).astype(np.int64).clip(1)
-        first = np.repeat(np.cumsum(parts) - parts, parts)
-        share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
-        inside = np.repeat(start, parts) + share * np.repeat(end - start, parts)
-        return np.unique(np.concatenate([inside, end - BEFORE * (end - start), end[-1:]]))
+        count = np.cumsum(np.append(0.0, np.ceil((end - start) / step).clip(1.0)))
+        inside = np.interp(np.arange(count[-1]), count, np.append(start, end[-1]))
+        before = end - 1e-9 * (end - start)  # a step of the torque has two sides
+        return np.unique(np.concatenate([inside, before, end[-1:]]))
 
     def with_peaks(self, times: Vector) -> Vector:
         """Rising instants, and between them where |T| of a shaft has a maximum: exactly the largest one."""
@@ -69,7 +64,7 @@ class Played:
     def quadrature(self, until: float) -> tuple[Vector, Vector]:
         """Instants and weights, s, of an integral over the start up to `until`: Gauss in each span."""
         start, end = np.minimum(self.recorded.spans[:, [at.S_START, at.S_END]].T, until)
-        nodes, weights = GAUSS
+        nodes, weights = np.polynomial.legendre.leggauss(5)
         half = 0.5 * (end - start)[:, None]
         inside = half[:, 0] > 0.0
         times = start[:, None] + half * (nodes + 1.0)
@@ -93,16 +88,12 @@ class Played:
             shafts = events["place"].astype(int)
             when = recorded.at(events["time"])["w"]
             v = when[np.arange(shafts.size), shafts] - when[np.arange(shafts.size), shafts + 1]
-            hard = np.abs(v) > SOFT * float(np.abs(when).max())
+            hard = np.abs(v) > 1e-4 * float(np.abs(when).max())  # a softer contact moves too far
             begin, shafts, v = np.ascontiguousarray(events["time"][hard]), shafts[hard], v[hard]
             shift = -self.state_by_demand(begin)[np.arange(shafts.size), shafts] / v[:, None]
             begin, kept = np.unique(begin, return_index=True)
-            knots = np.concatenate([[0.0], begin, [times[-1]]])
-            index = (np.searchsorted(knots, times, side="right") - 1).clip(0, knots.size - 2)
-            share = (times - knots[index]) / (knots[index + 1] - knots[index])
-            none = np.zeros((1, moved.shape[1]))
-            ends = np.concatenate([none, shift[kept], none])
-            moved = ends[index] + share[:, None] * (ends[index + 1] - ends[index])
+            none, knots = np.zeros((1, moved.shape[1])), np.concatenate([[0.0], begin, [times[-1]]])
+            moved = make_interp_spline(knots, np.concatenate([none, shift[kept], none]), k=1)(times)
         inside = recorded.index(times)
         step = 1e-6 * float(self.profile.time[-1])
         after, before = (recorded.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
@@ -118,16 +109,15 @@ class Player:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        self.rows = rows_of(machine)
+        self.rows, masses, shafts = parts(machine)
         self._room = 1024
-        record, masses, shafts = self.rows.machine, self.rows.masses[0], self.rows.shafts[0]
+        record = self.rows.machine
         self.period, self.target = float(record.period), float(record.target)
-        self.motor, self.load, self.joints = int(record.motor), int(record.load), self.rows.count - 1
-        self.J, self.c = masses.view(at.MASS)[:, 0]["J"], shafts.view(at.SHAFT)[:, 0]["c"]
-        self.d = shafts.view(at.SHAFT)[:, 0]["d"]
-        self.fastest = (
-            2.0 * math.pi / math.sqrt(float((self.c * (1.0 / self.J[:-1] + 1.0 / self.J[1:])).max()))
-        )
+        self.motor, self.load, self.joints = int(record.motor), int(record.load), shafts.size
+        self.J, self.c, self.d = masses["J"], shafts["c"], shafts["d"]
+        fastest = math.sqrt(float((self.c * (1.0 / self.J[:-1] + 1.0 / self.J[1:])).max()))
+        self.fastest = 2.0 * math.pi / fastest
+        self._loads = float((masses["Mc"] + masses["active"]).sum())
 
     def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[Recorder, int]:
         made: Any = make_controller("profile", {"profile": profile})
@@ -145,11 +135,8 @@ class Player:
         """Largest |T| of all shafts until then, N m; start time, s (inf if none); load speed then, rad/s."""
         state = self._run(profile, until, 0)[0].state
         time = float(state.start_time)
-        return (
-            float(np.abs(state.peak).max()),
-            math.inf if math.isnan(time) else time,
-            float(state.final_speed),
-        )
+        peak, speed = float(np.abs(state.peak).max()), float(state.final_speed)
+        return peak, math.inf if math.isnan(time) else time, speed
 
     def first_contact(self, profile: TorqueProfile, until: float) -> float:
         """When a gap first closes, s; infinite if none does until then."""
@@ -158,9 +145,7 @@ class Player:
 
     def mean_torque(self, time: float) -> float:
         """The torque that brings all masses as one to the target speed in this time, N m."""
-        J = self.J[np.isfinite(self.J)]
-        masses = self.rows.masses[0].view(at.MASS)[:, 0]
-        return float(J.sum()) * self.target / time + float((masses["Mc"] + masses["active"]).sum())
+        return float(self.J[np.isfinite(self.J)].sum()) * self.target / time + self._loads
 
     def twisting(self, closed: Vector, states: Matrix) -> Matrix:
         """What the torques of closed shafts get from changes of twists and speeds, rows as in a state."""
@@ -170,24 +155,31 @@ class Player:
         return found
 
 
+def parts(machine: Machine) -> tuple[Rows, Any, Any]:
+    """A machine as rows of the kernel, and its masses and shafts by names."""
+    rows = rows_of(machine)
+    return rows, rows.masses[0].view(at.MASS)[:, 0], rows.shafts[0].view(at.SHAFT)[:, 0]
+
+
 def carried(rows: Rows) -> Vector:
-    """The torques of the shafts of a machine while all masses turn at one speed, N m.
+    """The torques of the shafts of a machine while all masses turn at its target speed, N m.
 
     >>> from softstart import Drive
     >>> carried(rows_of(Drive.load("crane-4amtkf"))).tolist()
     [7.16]
     """
     masses, motor = rows.masses[0].view(at.MASS)[:, 0], int(rows.machine.motor)
-    loads: Vector = masses["Mc"] + masses["active"]
-    torques = -np.cumsum(loads)[:-1]
-    torques[motor:] = np.cumsum(loads[::-1])[::-1][1 + motor :]
-    return torques
+    steady: Vector = masses["Mc"] + masses["active"] + masses["mean"]
+    loads = steady + masses["friction"] + masses["ground"] * float(rows.machine.target)
+    behind = np.cumsum(loads[::-1])[::-1][1:]
+    return np.where(np.arange(behind.size) < motor, -np.cumsum(loads)[:-1], behind)
 
 
 def wanted(torques: Vector, base: float, motor: int) -> Vector:
-    """What a steady start ends with: where a shaft carries nothing its flanks press by `TOUCH` of `base`.
+    """What a steady start ends with: where a shaft carries nothing its flanks press by a little.
 
     At no torque at all the gap would be open, and how it got so is no longer seen.
     """
-    driving = np.where(np.arange(torques.size) >= motor, TOUCH, -TOUCH) * base
-    return np.where(np.abs(torques) < TOUCH * base, driving, torques)
+    touch = 5e-4 * base
+    driving = np.where(np.arange(torques.size) >= motor, touch, -touch)
+    return np.where(np.abs(torques) < touch, driving, torques)

@@ -39,23 +39,14 @@ from softstart.kernel import records as at
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged
+from softstart.optimal.starts import carried, parts
 from softstart.profile import TorqueProfile
-from softstart.start.rows import rows_of
 from softstart.start.run import Run
 
 ca: Any = late("casadi")
 
 DEGREE = 5
-STRIDE = 3.0  # rad of the fastest vibration in contact that an element may span
-ELEMENTS = 16  # at least, in an elastic period
-MOST_PHASES = 120
 LEAST = 1e-9  # of the start time: what is shorter is no phase
-SHORTEST, LONGEST = 0.1, 8.0  # of its first guess: limits of the duration of a phase
-ASIDE = 1e-3  # of the target: what moves off from rest is not on a bound
-SMOOTH = 1e-5  # weight of squared steps of the demand, in mean torques, and of a P that is not minimised
-SHARP = 0.2  # of the torque range: a bend of the demand beside which elements are halved
-ROUNDS = 3  # of halving at most
-SETTLED = 2e-4  # relative: a figure that moves by less needs no finer elements
 OPTIONS = {
     "ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "error_on_fail": False, "ipopt.tol": 1e-7,
     "ipopt.max_iter": 200, "ipopt.max_cpu_time": 120.0, "ipopt.acceptable_tol": 1e-3,
@@ -189,19 +180,17 @@ class _Machine:
     """The equations of a machine, from the rows of the kernel; SI units at the motor shaft."""
 
     def __init__(self, problem: Problem) -> None:
-        rows = rows_of(problem.drive)
+        rows, mass, shaft = parts(problem.drive)
         given = rows.machine
-        mass, shaft = rows.masses[0].view(at.MASS)[:, 0], rows.shafts[0].view(at.SHAFT)[:, 0]
         self.J, self.ground, self.load_torque = mass["J"], mass["ground"], mass["active"] + mass["mean"]
         self.hold = mass["Mc"] + mass["friction"]
         self.c, self.d, self.half, self.law = shaft["c"], shaft["d"], shaft["half"], shaft["law"]
-        self.motor, self.load = int(given.motor), int(given.load)
+        self.motor, self.load, self.Ms = int(given.motor), int(given.load), problem.starting_torque
         self.lag, self.rate, self.release_at = float(given.lag), float(given.rate), float(given.release_at)
         self.first_torque = [float(given.initial_torque)]
         self.first = [*shaft["theta0"], *mass["w0"], *self.first_torque * bool(self.lag)]
-        self.Ms = float(getattr(problem.drive, "motor", problem.drive).starting_torque)
-        self.masses, self.shafts = mass.size, shaft.size
-        self.step = np.eye(self.masses)[:-1] - np.eye(self.masses)[1:]  # of the speeds at each shaft
+        self.masses, self.shafts, self.carried = mass.size, shaft.size, carried(rows)
+        self.at_motor = ca.DM(np.eye(self.masses)[self.motor])
         self.not_covered = {
             "efficiency: no gears with losses": (shaft["eta"] != 1.0).any(),
             "stiffness: no rigid shafts": shaft["rigid"].any(),
@@ -209,7 +198,7 @@ class _Machine:
             "contact_law = modelica: no-pull and dead-zone": (self.d[self.law == at.MODELICA] > 0.0).any(),
         }
 
-    def parts(self, x: SX, u: SX) -> tuple[SX, SX, SX]:
+    def split(self, x: SX, u: SX) -> tuple[SX, SX, SX]:
         """Twists, speeds, realised torque of states x under the demand u."""
         k, n = self.shafts, self.shafts + self.masses
         return x[:k, :], x[k:n, :], x[n, :] if self.lag else u
@@ -220,41 +209,26 @@ class _Machine:
 
     def torques(self, phase: Phase, x: SX) -> SX:
         """T = c z + d z' of the shafts that press, N m."""
-        twist, w, _ = self.parts(x, 0.0)
+        twist, w, _ = self.split(x, 0.0)
         pressing = np.array(phase.pressing) != 0
-        spring = _times(np.diag(pressing * self.c), _plus(twist, -self.flanks(phase)))
-        return spring + _times(np.diag(pressing * self.d) @ self.step, w)
+        return pressing * self.c * (twist - self.flanks(phase)) + pressing * self.d * (w[:-1, :] - w[1:, :])
 
     def push(self, phase: Phase, x: SX, u: SX) -> SX:
-        """The torque on each mass but for friction and brake, N m."""
-        _, w, M = self.parts(x, u)
-        at_motor = _times(np.eye(self.masses)[:, [self.motor]], M)
-        loads = _plus(_times(np.diag(self.ground), w), self.load_torque)
-        return at_motor - _times(self.step.T, self.torques(phase, x)) - loads
+        """T_(i-1) - T_i - loads (+ M at the motor), N m: the torque on each mass but friction and brake."""
+        _, w, M = self.split(x, u)
+        T, none = self.torques(phase, x), ca.DM.zeros(1, x.shape[1])
+        shafts = ca.vertcat(none, T) - ca.vertcat(T, none)
+        return ca.mtimes(self.at_motor, M) + shafts - self.ground * w - self.load_torque
 
     def slopes(self, phase: Phase, x: SX, u: SX) -> SX:
         """The derivatives x' = f(x, u)."""
-        _, w, M = self.parts(x, u)
+        _, w, M = self.split(x, u)
         moving = np.array(phase.moving)
         held = np.isinf(self.J) | ((self.hold > 0.0) & (moving == 0))
         held[self.motor] |= phase.braked
-        push = _plus(self.push(phase, x, u), -moving * self.hold)
-        slopes = [_times(self.step, w), _times(np.diag(np.where(held, 0.0, 1.0 / self.J)), push)]
+        push = self.push(phase, x, u) - moving * self.hold
+        slopes = [w[:-1, :] - w[1:, :], np.where(held, 0.0, 1.0 / self.J) * push]
         return ca.vertcat(*slopes, (u - M) / self.lag) if self.lag else ca.vertcat(*slopes)
-
-    def carried(self, speed: float) -> Vector:
-        """The torques of the shafts while all masses turn at one speed, N m."""
-        loads = self.load_torque + self.hold + self.ground * speed
-        behind = np.append(np.cumsum(loads[::-1])[::-1], 0.0)[1 : self.masses]
-        return np.where(np.arange(self.shafts) < self.motor, behind - loads.sum(), behind)
-
-
-def _times(matrix: Matrix, x: SX) -> SX:
-    return ca.mtimes(ca.sparsify(ca.DM(matrix)), x)
-
-
-def _plus(x: SX, column: Vector) -> SX:
-    return x + ca.repmat(ca.DM(column), 1, x.shape[1])
 
 
 class _Program:
@@ -268,16 +242,19 @@ class _Program:
         points = ca.collocation_points(DEGREE, "radau")
         self.points = np.array(points)
         self.derivative, _, self.weights = (np.array(one) for one in ca.collocation_coeff(points))
-        wrong = self.machine.not_covered
-        wrong[f"{len(phases)} phases of contact: at most {MOST_PHASES}"] = len(phases) > MOST_PHASES
+        wrong = self.machine.not_covered | {
+            f"{len(phases)} phases of contact: at most 120": len(phases) > 120
+        }
         if any(wrong.values()):
             raise InputError([f"{text} in the collocation." for text, is_so in wrong.items() if is_so])
 
-    def variable(self, slots: list[Slot], guess: Any, low: float, high: float) -> SX:
-        """A column of variables."""
-        self.x.append(ca.SX.sym(slots[0].kind, len(slots)))
-        self.limits += [(min(max(one, low), high), low, high) for one in np.ravel(guess).tolist()]
-        self.slots += slots
+    def variable(self, kind: str, phase: int, shares: Vector, guess: Any, low: float, high: float) -> SX:
+        """A column of variables, as many at each share of a phase as the guess has."""
+        guesses = np.ravel(guess).tolist()
+        each = range(len(guesses) // len(shares))
+        self.x.append(ca.SX.sym(kind, len(guesses)))
+        self.limits += [(min(max(one, low), high), low, high) for one in guesses]
+        self.slots += [Slot(kind, phase, share, i) for share in shares.tolist() for i in each]
         return self.x[-1]
 
     def between(self, low: float, value: SX, high: float) -> None:
@@ -291,7 +268,7 @@ class _Program:
         self.g, self.bounds = list[SX](), list[tuple[float, float]]()
         self.read = list[SX]()  # durations, demands and states of each phase
         most = math.inf if self.problem.k_dyn is None else self.problem.k_dyn
-        self.peak = self.variable([Slot("peak", 0, 0.0)], peak / self.base, 0.0, most)
+        self.peak = self.variable("peak", 0, np.zeros(1), peak / self.base, 0.0, most)
         self.elapsed, self.heat, self.rough, self.steps = (ca.SX(0.0) for _ in range(4))
         self.state, self.demand = ca.SX(self.machine.first), ca.SX(self.machine.first_torque) / self.base
         for number, (edges, guess) in enumerate(zip(mesh, guesses, strict=True)):
@@ -304,38 +281,35 @@ class _Program:
         # torques after the start and a P that do not matter get one value
         f = value + self.problem.smoothness * rough if self.problem.smoothness else value
         f = f / (1.0 if self.problem.minimise == "k_dyn" else self.period)
-        return self.finished(f + SMOOTH * (self.steps + self.peak), value, t_f, mesh)
+        return self.finished(f + 1e-5 * (self.steps + self.peak), value, t_f, mesh)
 
     def phase(self, number: int, edges: Vector, guess: Table) -> None:
         """The states x' = f(x, u) at the Radau points of a phase; what holds there and at its end."""
         machine, phase, widths = self.machine, self.phases[number], np.diff(edges)
         then = self.phases[number + 1] if number + 1 < len(self.phases) else phase
         waits = phase.braked and not self.continuous and not machine.lag and math.isinf(machine.release_at)
-        limits = 0.0 if waits else SHORTEST, LONGEST
-        length = self.variable([Slot("duration", number, 0.0)], guess.length / phase.length, *limits)
-        length = length * phase.length
+        shortest = 0.0 if waits else 0.1  # of the duration in the run
+        share = guess.length / phase.length
+        length = self.variable("duration", number, np.zeros(1), share, shortest, 8.0) * phase.length
         kept = int(self.continuous)  # where it may not jump, the demand goes on
         demands = np.interp(edges, guess.edges, guess.demands)[kept:] / self.base
-        slots = [Slot("demand", number, one) for one in edges[kept:].tolist()]
-        u = self.variable(slots, demands, self.low, self.high)
+        u = self.variable("demand", number, edges[kept:], demands, self.low, self.high)
         u = ca.vertcat(self.demand, u).T if kept else u.T
         zero, size = self.scales(phase)
         shares = self.shares(edges)
         states = np.transpose([np.interp(shares, guess.shares, column) for column in guess.states.T])
-        slots = [Slot("state", number, share, i) for share in shares.tolist() for i in range(size.size)]
-        scaled = self.variable(slots, (states - zero) / size, -math.inf, math.inf)
-        x = _plus(_times(np.diag(size), ca.reshape(scaled, size.size, -1)), zero)
+        scaled = self.variable("state", number, shares, (states - zero) / size, -math.inf, math.inf)
+        x = zero + size * ca.reshape(scaled, size.size, -1)
         rise = u[1:] - u[:-1]
         demand = self.base * ca.vertcat(*(u[:-1] + p * rise for p in self.points))
         demand = ca.reshape(demand, 1, -1)  # one for each point, as x
         nodes = [x[:, j::DEGREE] for j in range(DEGREE)]
         nodes = [ca.horzcat(self.state, nodes[-1][:, :-1]), *nodes]
-        slope = length * machine.slopes(phase, x, demand)
+        moves = length * ca.mtimes(machine.slopes(phase, x, demand), ca.diag(np.repeat(widths, DEGREE)))
         for j in range(DEGREE):
             moved = sum(self.derivative[m, j] * node for m, node in enumerate(nodes))
-            moved -= _times(np.diag(widths), slope[:, j::DEGREE].T).T
-            self.between(0.0, _times(np.diag(1.0 / size), moved), 0.0)
-        M = machine.parts(x, demand)[2] / machine.Ms
+            self.between(0.0, (moved - moves[:, j::DEGREE]) / size, 0.0)
+        M = machine.split(x, demand)[2] / machine.Ms
         self.heat += length * ca.mtimes(M**2, ca.DM(np.kron(widths, self.weights.ravel())))
         self.rough += (self.base / machine.Ms) ** 2 * ca.mtimes(rise**2, ca.DM(1.0 / widths)) / length
         self.steps += ca.sumsqr(rise)
@@ -361,7 +335,7 @@ class _Program:
 
     def curve(self, x: SX, demand: SX) -> None:
         """M below each line of the torque-speed curve; the lowest torque can be had at any speed."""
-        _, w, M = self.machine.parts(x, demand)
+        _, w, M = self.machine.split(x, demand)
         for (speed, torque), (next_speed, next_torque) in pairwise(self.problem.torque_speed):
             incline = (next_torque - torque) / (next_speed - speed)
             line = ca.fmax(torque + incline * (w[self.machine.motor, :] - speed), self.low * self.base)
@@ -370,7 +344,7 @@ class _Program:
     def kept(self, phase: Phase, then: Phase, x: SX, u: SX) -> None:
         """What holds in a phase; at its end not for what changes there (`then` follows)."""
         machine, points = self.machine, x.shape[1]
-        twist, w, _ = machine.parts(x, u)
+        twist, w, _ = machine.split(x, u)
         T, push = machine.torques(phase, x) / self.base, machine.push(phase, x, u)
         for k, (side, next_side) in enumerate(zip(phase.pressing, then.pressing, strict=True)):
             inner = slice(points if side == next_side else points - 1)
@@ -387,7 +361,7 @@ class _Program:
         for i in np.flatnonzero(machine.hold > 0.0).tolist():
             inner = slice(points if phase.moving[i] == then.moving[i] else points - 1)
             if phase.moving[i]:
-                self.between(-ASIDE, phase.moving[i] * w[i, inner] / self.target, math.inf)
+                self.between(-1e-3, phase.moving[i] * w[i, inner] / self.target, math.inf)  # off rest
             elif i != machine.motor or not phase.braked:
                 self.between(-1.0, push[i, inner] / machine.hold[i], 1.0)
         if phase.braked and math.isinf(machine.release_at):
@@ -424,13 +398,13 @@ class _Program:
     def terminal(self, phase: Phase) -> None:
         """What holds at t_f, and the bounds on t_f and heat."""
         machine, problem = self.machine, self.problem
-        _, w, _ = machine.parts(self.state, 0.0)
+        _, w, _ = machine.split(self.state, 0.0)
         if problem.terminal == "reached":
             self.between(1.0, w[machine.load] / self.target, math.inf)
         else:
             self.between(0.0, w / self.target - 1.0, 0.0)
         if problem.terminal == "steady":
-            missing = (machine.torques(phase, self.state) - machine.carried(self.target)) / self.base
+            missing = (machine.torques(phase, self.state) - machine.carried) / self.base
             self.between(0.0, missing[np.flatnonzero(phase.pressing).tolist()], 0.0)
         if problem.start_time is not None:
             self.between(-math.inf, self.elapsed / problem.start_time, 1.0)
@@ -463,7 +437,8 @@ class _Program:
         stiffness = machine.c * (1.0 / machine.J[:-1] + 1.0 / machine.J[1:])
         for phase in self.phases:
             fastest = math.sqrt(stiffness[np.array(phase.pressing) != 0].max(initial=0.0))
-            count = math.ceil(phase.length * max(fastest / STRIDE, ELEMENTS / self.period))
+            # an element spans 3 rad of the fastest vibration in contact, and a 16th of an elastic period
+            count = math.ceil(phase.length * max(fastest / 3.0, 16.0 / self.period))
             edges = np.linspace(0.0, 1.0, 1 + max(2, count))
             inside = phase.begin + phase.length * edges.clip(LEAST, 1.0 - LEAST)
             span = spans[run.recorded.index(inside)]
@@ -478,10 +453,10 @@ class _Program:
 
 
 def _halved(phase: Table, span: float, rate: float) -> Vector:
-    """The edges, and one more in each element beside a bend of the demand; `span` from lowest to highest."""
+    """The edges, and one more in each element beside a bend of the demand by a fifth of its `span`."""
     widths = np.diff(phase.edges)
     slopes, steepest = np.diff(phase.demands) / (widths * phase.length), span / (widths * phase.length)
-    bent = np.abs(np.diff(slopes)) > SHARP * np.minimum(rate, np.maximum(steepest[1:], steepest[:-1]))
+    bent = np.abs(np.diff(slopes)) > 0.2 * np.minimum(rate, np.maximum(steepest[1:], steepest[:-1]))
     beside = np.append(bent, False) | np.append(False, bent)
     return np.sort(np.append(phase.edges, (phase.edges[:-1] + 0.5 * widths)[beside]))
 
@@ -514,14 +489,14 @@ def solve(problem: Problem, run: Run, straight: bool = False) -> Claim:
     nlp = program.from_run(run, straight)
     best = nlp.reading(_minimised(nlp, {} if straight else NEAR))
     span = problem.highest_torque - problem.lowest_torque
-    for _ in range(ROUNDS):
+    for _ in range(3):
         mesh = [_halved(phase, span, program.machine.rate) for phase in best.phases]
         nlp = program.write(mesh, best.phases, best.peak)
         try:
             coarser, best = best, nlp.reading(_minimised(nlp, NEAR | {"ipopt.max_iter": 100}))
         except NotConverged:  # the coarser one is a solution too
             break
-        if abs(best.value - coarser.value) <= SETTLED * coarser.value:
+        if abs(best.value - coarser.value) <= 2e-4 * coarser.value:  # finer elements are not needed
             break
     return best
 

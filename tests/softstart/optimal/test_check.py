@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,8 @@ from softstart.optimal.check import check, heat_of, replayed, torque_allowed
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import solve
 from softstart.optimal.result import LowerBound, OptimumError
+from softstart.optimal.starts import carried
+from softstart.start.rows import rows_of
 
 PROBLEM = Problem(CRANE, LONG)
 GOOD, END, CLAIMED = solve(PROBLEM)
@@ -22,12 +25,9 @@ PROVED = LowerBound(0.909, "certificate", "one contact")
 
 
 def judged(
-    profile: TorqueProfile,
-    end: float = END,
-    claimed: float = CLAIMED,
-    problem: Problem = PROBLEM,
+    profile: TorqueProfile, end: float = END, claimed: float = CLAIMED, problem: Problem = PROBLEM,
     bound: Any = PROVED,
-) -> str:
+) -> str:  # fmt: skip
     """What the check says; empty if it passes."""
     try:
         check(problem, profile, replayed(problem, profile, end), end, claimed, bound)
@@ -237,3 +237,15 @@ def test_shaken_profiles_do_not_slip_through() -> None:
 def test_what_optimize_returns_has_passed() -> None:
     best = optimize(CRANE.replace(damping=0.3), 0.29)
     assert judged(best.profile, best.end_time, best.claimed, best.problem, best.bound) == ""
+
+
+def test_a_steady_shaft_carries_the_friction_of_its_load_too() -> None:
+    """The exact plant: wound up by this torque and at speed under the same torque, it stays so."""
+    drive = CRANE.replace(load_viscous_friction=0.05)
+    (T,) = carried(rows_of(drive)).tolist()
+    assert math.isclose(T, 7.16 + 0.05 * 60.0)
+    moving = {"initial_motor_speed": 60.0, "initial_load_speed": 60.0, "target_speed": 90.0}
+    run = played(drive.replace(start_position=0.25 + T / drive.c, **moving), TorqueProfile([0.0], [T]), 0.5)
+    state = run.recorded.at([0.1, 0.5])
+    np.testing.assert_allclose(state["T"], T, rtol=1e-9)
+    np.testing.assert_allclose(state["w"], 60.0, rtol=1e-9)

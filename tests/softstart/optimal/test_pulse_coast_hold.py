@@ -215,30 +215,18 @@ def test_what_it_is_not_for(changes: Any, terms: Any, reason: str) -> None:
     terminal=st.sampled_from(["synchronous", "reached"]),
 )
 def test_any_drive_keeps_the_promises(
-    inertia_ratio: float,
-    load: float,
-    windups: float,
-    position: float,
-    periods: float,
-    ahead: float,
-    share: float,
-    terminal: Any,
-) -> None:
+    inertia_ratio: float, load: float, windups: float, position: float, periods: float, ahead: float,
+    share: float, terminal: Any,
+) -> None:  # fmt: skip
     J1, Ms, Omega = 0.02, 50.0, 120.0
     J2 = J1 * inertia_ratio
     c = Omega**2 * J1 * J2 / (J1 + J2)
     target = (1.0 - load) * Ms / (J1 + J2) * periods * 2.0 * math.pi / Omega
     drive = Drive(
-        motor_inertia=J1,
-        load_inertia=J2,
-        starting_torque=Ms,
-        load_torque=load * Ms,
-        stiffness=c,
-        gap=windups * Ms / c,
-        start_position=position * windups * Ms / c,
-        initial_motor_speed=ahead * target,
+        motor_inertia=J1, load_inertia=J2, starting_torque=Ms, load_torque=load * Ms, stiffness=c,
+        gap=windups * Ms / c, start_position=position * windups * Ms / c, initial_motor_speed=ahead * target,
         target_speed=target,
-    )
+    )  # fmt: skip
     starts = PulseCoastHold.of(Problem(drive, 1.0))
     least = max(starts.least_peak, drive.Mc)
     P = least + share * (starts.most_held - least)
