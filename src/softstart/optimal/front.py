@@ -37,6 +37,7 @@ SHORT, LONG, COUNT = 1.02, 1.6, 12
 CHUNKS = 2  # stretches of start times for each worker
 SEARCHED = 10  # of so many points one is searched from all first demands
 JUMP = 0.1  # per cent, of the gap between K_dyn and its bound: searched again
+BEND = 1e-3  # of the largest torque: what is kept of the profile of a neighbour
 BETTER = 1e-4  # of K_dyn: a better start is followed back to longer start times
 COLUMNS = (
     "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind", "gap_percent",
@@ -370,6 +371,7 @@ class Stretch(NamedTuple):
 
     def point(self, start_time: float, near: TorqueProfile | None, follow: float = 0.0) -> FrontPoint:
         """The point of one start time; `near` and `follow` as in `solve`."""
+        near = near and near.simplified(BEND)  # else the knots of all neighbours add up
         try:
             problem = Problem(self.drive, start_time, self.terminal, **self.options)
             return FrontPoint.of_optimum(solve(problem, near, follow=follow), start_time)
@@ -404,9 +406,9 @@ def computed(asked: Stretch, tell: Progress = lambda doing: None) -> Iterator[Fr
         point = asked.point(t, near, 0.0 if searched else before)
         gaps = [one.gap_percent or 0.0 for one in (*found[-2:], point)]
         if point.found and not searched and gaps[-1] - gaps[-2] > 2.0 * max(gaps[-2] - gaps[0], 0.0) + JUMP:
-            searched = True
             again = asked.point(t, near)
-            point = again if again.found and (again.k_dyn or 0.0) < (point.k_dyn or 0.0) else point
+            searched = again.found and (again.k_dyn or 0.0) < (point.k_dyn or 0.0) * (1.0 - BETTER)
+            point = again if searched else point
         yield point
         if point.status == "INFEASIBLE":
             too_short = point
@@ -423,7 +425,7 @@ def computed(asked: Stretch, tell: Progress = lambda doing: None) -> Iterator[Fr
 
 
 def _listed(asked: Stretch) -> list[FrontPoint]:
-    return list(computed(asked))
+    return list(computed(asked))  # a generator does not leave its process
 
 
 def _points(
@@ -465,13 +467,10 @@ def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]
 def _checked(start_times: Sequence[float]) -> list[float]:
     """Start times above 0, sorted, each once."""
     given = list(start_times)
+    good = [isinstance(t, Real) and not isinstance(t, bool) and 0.0 < float(t) < math.inf for t in given]
     if not given:
         raise InputError("start_times: the list is empty; give at least one start time in s.")
-    wrong = [
-        f"start_times = {t!r}: give times above 0 s as numbers."
-        for t in given
-        if not isinstance(t, Real) or isinstance(t, bool) or not 0.0 < float(t) < math.inf
-    ]
-    if wrong:
-        raise InputError(wrong)
+    if not all(good):
+        wrong = (t for t, right in zip(given, good, strict=True) if not right)
+        raise InputError([f"start_times = {t!r}: give times above 0 s as numbers." for t in wrong])
     return sorted({float(t) for t in given})

@@ -54,7 +54,7 @@ EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 MOST_TRIALS = 24
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
-BEND, APART = 1e-3, 0.4  # of the largest torque; of even knots: what is kept of an answer that is followed
+APART = 0.4  # of the distance of even knots, which keep so far from those of an answer that is followed
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
 TIGHT = 1e-5  # a bound within this share needs no other one
 
@@ -225,7 +225,6 @@ def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> O
 def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float) -> Optimum | None:
     """The local optimum below the answer for a start time close by, as it is or scaled in time, if any."""
     search, firsts = Descent(problem), []
-    near = near.simplified(BEND)  # else the knots of all neighbours add up
     even = search.even
     for share in (1.0, scale):
         demand = TorqueProfile(near.time * share, near.torque)
