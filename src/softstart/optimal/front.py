@@ -246,7 +246,7 @@ def pareto(
         The machine.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
-    terminal, torque_speed, smoothness, base
+    terminal, torque_speed, smoothness, base : optional
         As in `optimize`.
     controllers : sequence of str or Controller, optional
         What to put beside the curve, each judged by the optimum at its own start time with terminal
