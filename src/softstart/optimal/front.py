@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
-from typing import IO, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from softstart.controller import Controller, make_controller, ready_controller_n
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.optimal.optimize import optimize, shortest_start_time
+from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
-from softstart.optimal.result import InfeasibleError, Optimum, OptimumError, Verdict
+from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.processes import Pool, checked_workers
 from softstart.profile import TorqueProfile
-from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
 
@@ -36,6 +35,14 @@ Progress = Callable[[str], object]
 YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
 SHORT, LONG, COUNT = 1.02, 1.6, 12
 CHUNKS = 2  # stretches of start times for each worker
+SEARCHED = 10  # of so many points one is searched from all first demands
+JUMP = 0.1  # per cent, of the gap between K_dyn and its bound: searched again
+BEND = 1e-3  # of the largest torque: what is kept of the profile of a neighbour
+BETTER = 1e-4  # of K_dyn: a better start is followed back to longer start times
+COLUMNS = (
+    "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind", "gap_percent",
+    "optimal_k_dyn", "ratio", "heat", "contacts", "method", "status",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class FrontPoint:
     of the profile, s and N m.
 
     >>> point = FrontPoint(0.3, "reached", "OPTIMAL", "", k_dyn=1.01, k_dyn_lower_bound=1.0)
-    >>> point.found, round(point.gap_percent, 6), FrontPoint.of_record(point.record()) == point
+    >>> point.found, round(point.gap_percent, 6), FrontPoint.of_record(asdict(point)) == point
     (True, 1.0, True)
     """
 
@@ -84,32 +91,14 @@ class FrontPoint:
     @classmethod
     def of_optimum(cls, best: Optimum, start_time: float) -> FrontPoint:
         """The point of an optimum for this bound on the start time."""
-        figures = best.summary()
-        names = ("terminal", "k_dyn", "k_dyn_lower_bound", "bound_kind", "bound_covers", "start_time", "heat",
-                 "contacts", "method", "why", "seconds")  # fmt: skip
-        return cls(
-            start_time, status="OPTIMAL", status_text="", time=tuple(best.profile.time.tolist()),
-            torque=tuple(best.profile.torque.tolist()), **{name: figures[name] for name in names},
-        )  # fmt: skip
+        figures = {**(every := best.summary()), **every["profile"], "status": "OPTIMAL", "status_text": ""}
+        figures["start_time_bound"] = start_time
+        return cls.of_record({name: figures[name] for name in cls.__dataclass_fields__ if name in figures})
 
-    @classmethod
-    def of_verdict(cls, verdict: Verdict, start_time: float, terminal: str) -> FrontPoint:
-        """The point of a start time that no start meets."""
-        shortest = verdict.shortest_start_time
-        known = shortest if math.isfinite(shortest) else None
-        return cls(start_time, terminal, "INFEASIBLE", verdict.sentence, shortest_start_time=known)
-
-    @classmethod
-    def not_found(cls, why: str, start_time: float, terminal: str) -> FrontPoint:
-        """The point of a start time for which the method failed."""
-        return cls(start_time, terminal, "NOT_FOUND", why)
-
-    def for_shorter(self, start_time: float) -> FrontPoint:
-        """The point of a start time shorter than this one, where this one is infeasible already."""
-        shortest = self.shortest_start_time
-        least = f"; the shortest found is {shortest:.6g} s" if shortest is not None else ""
-        reason = f"A start time of {start_time:.6g} s is too short ({self.terminal}){least}."
-        return replace(self, start_time_bound=start_time, status_text=reason)
+    @property
+    def profile(self) -> TorqueProfile:
+        """The torque over time of a point that was found."""
+        return TorqueProfile(self.time, self.torque)
 
     def summary(self) -> dict[str, Any]:
         """The figures under the names used everywhere."""
@@ -117,15 +106,10 @@ class FrontPoint:
         profile = {"time": list(about.pop("time")), "torque": list(about.pop("torque"))}
         return {**about, "gap_percent": self.gap_percent, "profile": profile if self.found else None}
 
-    def record(self) -> dict[str, Any]:
-        """All fields as plain data, for `of_record`."""
-        return asdict(self)
-
     @classmethod
     def of_record(cls, record: dict[str, Any]) -> FrontPoint:
-        """The point that `record` was made from."""
-        knots = {name: tuple(record[name]) for name in ("time", "torque")}
-        return cls(**{**record, **knots})
+        """The point with these fields, as `asdict` gives them and JSON keeps them."""
+        return cls(**record | {name: tuple(record[name]) for name in ("time", "torque")})
 
 
 @dataclass(frozen=True)
@@ -152,16 +136,11 @@ class ControllerPoint:
         """The figures under the names used everywhere."""
         best = self.optimum
         return {
-            "controller": self.name,
-            "k_dyn": self.k_dyn,
-            "start_time": self.start_time,
-            "status_text": self.status_text,
-            "optimal_k_dyn": best.k_dyn if best else None,
-            "k_dyn_lower_bound": best.k_dyn_lower_bound if best else None,
-            "ratio": self.ratio,
-            "optimum_status": best.status if best else None,
-            "optimum_status_text": best.status_text if best else None,
-        }
+            "controller": self.name, "k_dyn": self.k_dyn, "start_time": self.start_time,
+            "status_text": self.status_text, "optimal_k_dyn": best and best.k_dyn,
+            "k_dyn_lower_bound": best and best.k_dyn_lower_bound, "ratio": self.ratio,
+            "optimum_status": best and best.status, "optimum_status_text": best and best.status_text,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +150,13 @@ class Front:
     Parameters
     ----------
     drive : Drive or Chain
-        The drive or the chain.
+        The machine.
     terminal : {"synchronous", "steady", "reached"}
         What holds at the end of each optimal start.
     points : tuple of FrontPoint
         The optima, in order of start time.
     controllers : tuple of ControllerPoint
-        Each with its own start time and K_dyn, and the optimum at just that start time with terminal
-        `reached`.
+        Each with the optimum at just its own start time with terminal `reached`.
 
     Examples
     --------
@@ -221,23 +199,14 @@ class Front:
 
     def to_csv(self, path: str | Path) -> None:
         """Write the curve, then the controllers, as one table; numbers with all their digits."""
-        columns = (
-            "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind",
-            "gap_percent", "optimal_k_dyn", "ratio", "heat", "contacts", "method", "status",
-        )  # fmt: skip
         rows = [{"what": "optimum", **point.summary()} for point in self.points]
-        for one in self.controllers:
-            rows.append({**one.summary(), "what": one.name})
+        for one in self.controllers:  # a missing start time is an empty cell
+            rows.append({**one.summary(), "what": one.name} | ({} if one.optimum else {"start_time": None}))
 
-        def cell(value: Any) -> str:
-            if value is None or (isinstance(value, float) and math.isnan(value)):
-                return ""
-            return repr(value) if isinstance(value, float) else str(value)
-
-        def write(stream: IO[Any]) -> None:
-            table = csv.writer(stream, lineterminator="\n")
-            table.writerow(columns)
-            table.writerows([cell(row.get(name)) for name in columns] for row in rows)
+        def write(stream: Any) -> None:
+            table = csv.DictWriter(stream, COLUMNS, extrasaction="ignore", lineterminator="\n")
+            table.writeheader()
+            table.writerows(rows)
 
         write_whole(Path(path), write)
 
@@ -267,10 +236,9 @@ def pareto(
 ) -> Front:
     """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
-    The sweep goes from long start times to short ones; each optimum is one more first demand for the next
-    one. Several workers have a stretch of start times each. No point is left above one of a shorter start
-    time, as a start may arrive early, and no bound below that of a longer one. Start times too short for any
-    start are marked infeasible, no error.
+    The sweep goes from long start times to short ones, each optimum followed from its neighbour; every few
+    are searched as by `optimize`. No point is left above one of a shorter start time, as a start may arrive
+    early. Start times too short for any start are marked infeasible.
 
     Parameters
     ----------
@@ -278,25 +246,15 @@ def pareto(
         The machine.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
-    terminal : {"synchronous", "steady", "reached"}
-        What holds at the end of each optimal start, as in `optimize`.
+    terminal, torque_speed, smoothness, base : optional
+        As in `optimize`.
     controllers : sequence of str or Controller, optional
-        What to put beside the curve; by default all installed controllers that run without being given a
-        parameter, none for an empty list. Each is simulated, and judged by the optimum at its own start time
-        with terminal `reached`: the fair yardstick.
-    torque_speed : sequence of (float, float)
-        Corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
-    smoothness : float
-        Weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
-    base : Drive or Chain, optional
-        The machine to whose mean shaft torque K_dyn refers, if not `drive`.
+        What to put beside the curve, each judged by the optimum at its own start time with terminal
+        `reached`; by default all installed controllers that run without being given a parameter.
     save_to : str or path, optional
-        A file in which each finished point is kept at once. A second call with the same inputs takes them
-        from there; other inputs are refused.
-    progress : callable, optional
-        Called with a text before each point that is computed.
-    each : callable, optional
-        Called with each point at once, also with those of the controllers' own start times.
+        A file in which each finished point is kept at once, and from which a second call takes it.
+    progress, each : callable, optional
+        Called with a text before each point that is computed; with each point, those of controllers too.
     workers : int
         Processes of this machine; by default all is computed in this one.
     scheduler : str, optional
@@ -330,35 +288,56 @@ def pareto(
     """
     options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
     Problem(drive, 1.0, terminal, **options)
+    tell = progress or (lambda doing: None)
     times = None if start_times is None else _checked(start_times)
-    made = [
-        make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
-    ]
-    inputs = _inputs(drive, base, terminal, torque_speed, smoothness)
+    names = ready_controller_names() if controllers is None else controllers
+    made = [make_controller(one) for one in names]
+    inputs = {
+        "version of softstart": __version__,
+        "drive": drive.to_toml(),
+        "base drive": base.to_toml() if base else "",
+        "terminal": terminal,
+        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in torque_speed],
+        "smoothness": float(smoothness),
+    }
     count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
     runs = [simulate(drive, one, base=base) for one in made]
     if times is None:
-        _tell(progress, "looking for the shortest start time")
+        tell("looking for the shortest start time")
         times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
-    found: dict[tuple[Terminal, float], FrontPoint] = {}
+    found: dict[tuple[str, float], FrontPoint] = {}
     with (
         Records(target, inputs, ["terminal", "start_time_bound"]) as saved,
         Pool(count, scheduler=scheduler, describe=Stretch.__str__, kept="Finished points are kept.") as pool,
     ):
         for ending in dict.fromkeys([terminal, YARDSTICK]):
+            points: dict[float, FrontPoint] = {}
             asked = {*(times if ending == terminal else ()), *(own if ending == YARDSTICK else ())}
-            points = list(
-                _swept(
-                    drive, options, ending, sorted(asked, reverse=True), saved, pool, count, progress, each
-                )
-            )
-            found |= {(ending, t): point for t, point in _monotone(points)}
+            known = {t: FrontPoint.of_record(one) for t in asked if (one := saved.find(ending, t))}
+            for point in _points(
+                Stretch(drive, options, ending, tuple(sorted(asked, reverse=True))), known, pool, tell
+            ):
+                t = point.start_time_bound
+                if t not in known and point.status != "NOT_FOUND":  # another attempt may find it
+                    saved.add(asdict(point))
+                if each is not None and t not in points:
+                    each(point)
+                points[t] = point
+            found |= {(ending, t): point for t, point in _monotone(list(points.values()))}
     curve = tuple(found[terminal, t] for t in times)
-    if not any(point.found for point in curve) and any(point.status == "NOT_FOUND" for point in curve):
-        raise OptimumError(next(point.status_text for point in curve if point.status == "NOT_FOUND"))
-    return Front(drive, terminal, curve, tuple(_beside(run, found) for run in runs))
+    failed = [point.status_text for point in curve if point.status == "NOT_FOUND"]
+    if failed and not any(point.found for point in curve):
+        raise OptimumError(failed[0])
+    beside = [
+        ControllerPoint(
+            run.controller_name, run.k_dyn, run.start_time, run.status.value,
+            found.get((YARDSTICK, run.start_time)),
+        )
+        for run in runs
+    ]  # fmt: skip
+    return Front(drive, terminal, curve, tuple(beside))
 
 
 def default_start_times(
@@ -379,79 +358,91 @@ def default_start_times(
 
 
 class Stretch(NamedTuple):
-    """Start times that follow each other, long ones first, and a demand to begin with."""
+    """Start times that follow each other, long ones first."""
 
     drive: Machine
     options: dict[str, Any]
     terminal: Terminal
-    start_times: tuple[float, ...]
-    near: TorqueProfile | None
+    start_times: tuple[float, ...] = ()
+    too_short: FrontPoint | None = None  # known to be infeasible, and all shorter ones
 
     def __str__(self) -> str:
         return f"the optima for start times of {self.start_times[-1]:.5g} s to {self.start_times[0]:.5g} s"
 
-
-def computed(asked: Stretch) -> list[FrontPoint]:
-    """The points of a stretch; what is infeasible makes all shorter ones so."""
-    points: list[FrontPoint] = []
-    near = asked.near
-    for start_time in asked.start_times:
-        if points and points[-1].status == "INFEASIBLE":
-            points.append(points[-1].for_shorter(start_time))
-            continue
+    def point(self, start_time: float, near: TorqueProfile | None, follow: float = 0.0) -> FrontPoint:
+        """The point of one start time; `near` and `follow` as in `solve`."""
+        near = near and near.simplified(BEND)  # else the knots of all neighbours add up
         try:
-            best = optimize(asked.drive, start_time, terminal=asked.terminal, near=near, **asked.options)
+            problem = Problem(self.drive, start_time, self.terminal, **self.options)
+            return FrontPoint.of_optimum(solve(problem, near, follow=follow), start_time)
         except InfeasibleError as error:
-            points.append(FrontPoint.of_verdict(error.verdict, start_time, asked.terminal))
+            shortest = error.verdict.shortest_start_time
+            return FrontPoint(
+                start_time, self.terminal, "INFEASIBLE", str(error),
+                shortest_start_time=shortest if math.isfinite(shortest) else None,
+            )  # fmt: skip
         except OptimumError as error:
-            points.append(FrontPoint.not_found(str(error), start_time, asked.terminal))
-        else:
-            points.append(FrontPoint.of_optimum(best, start_time))
-            near = best.profile
-    return points
+            return FrontPoint(start_time, self.terminal, "NOT_FOUND", str(error))
 
 
-def _swept(
-    drive: Machine, options: dict[str, Any], terminal: Terminal, times: list[float], saved: Records,
-    pool: Pool, workers: int, progress: Progress | None, each: Callable[[FrontPoint], object] | None,
-) -> Iterator[FrontPoint]:  # fmt: skip
-    """The points of one terminal condition, those kept before first."""
-    known = {t: FrontPoint.of_record(one) for t in times if (one := saved.find(terminal, t)) is not None}
-    for point in known.values():
-        _told(each, point)
+def computed(asked: Stretch, tell: Progress = lambda doing: None) -> Iterator[FrontPoint]:
+    """The points of a stretch; a better one comes again. What is infeasible makes all shorter ones so.
+
+    Most are followed from their neighbour. The first, the last and every few are searched from all first
+    demands; what that finds is followed back to longer start times as long as it is better there.
+    """
+    found: list[FrontPoint] = []
+    too_short, count = asked.too_short, len(asked.start_times)
+    for number, t in enumerate(asked.start_times):
+        tell(f"start time {number + 1} of {count}: {t:.5g} s, {asked.terminal}")
+        if too_short is not None and t < too_short.start_time_bound:
+            shortest = too_short.shortest_start_time
+            known = "" if shortest is None else f"; the shortest found is {shortest:.6g} s"
+            reason = f"A start time of {t:.6g} s is too short ({asked.terminal}){known}."
+            yield replace(too_short, start_time_bound=t, status_text=reason)
+            continue
+        searched = number % SEARCHED == 0 or number == count - 1
+        near, before = (found[-1].profile, found[-1].start_time_bound) if found else (None, 0.0)
+        point = asked.point(t, near, 0.0 if searched else before)
+        gaps = [one.gap_percent or 0.0 for one in (*found[-2:], point)]
+        if point.found and not searched and gaps[-1] - gaps[-2] > 2.0 * max(gaps[-2] - gaps[0], 0.0) + JUMP:
+            again = asked.point(t, near)
+            searched = again.found and (again.k_dyn or 0.0) < (point.k_dyn or 0.0) * (1.0 - BETTER)
+            point = again if searched else point
         yield point
-    missing = [t for t in times if t not in known]
-    if workers == 1:
-        near: TorqueProfile | None = None
+        if point.status == "INFEASIBLE":
+            too_short = point
+        if not point.found:
+            continue
+        found.append(point)
+        for i in range(len(found) - 2, -1, -1) if searched else ():
+            after, now = found[i + 1], found[i]
+            again = asked.point(now.start_time_bound, after.profile, after.start_time_bound)
+            if not again.found or (again.k_dyn or 0.0) > (now.k_dyn or 0.0) * (1.0 - BETTER):
+                break
+            found[i] = again
+            yield again
+
+
+def _listed(asked: Stretch) -> list[FrontPoint]:
+    return list(computed(asked))  # a generator does not leave its process
+
+
+def _points(
+    asked: Stretch, known: dict[float, FrontPoint], pool: Pool, tell: Progress
+) -> Iterator[FrontPoint]:
+    """The points kept before, then the others; stretches of them by several workers."""
+    yield from sorted(known.values(), key=lambda one: -one.start_time_bound)
+    missing = tuple(t for t in asked.start_times if t not in known)
+    if pool.alone:
         too_short = next((one for one in known.values() if one.status == "INFEASIBLE"), None)
-        for number, t in enumerate(missing, start=1):
-            _tell(progress, f"start time {number} of {len(missing)}: {t:.5g} s, {terminal}")
-            if too_short is not None and t < too_short.start_time_bound:
-                point = too_short.for_shorter(t)
-            else:
-                (point,) = computed(Stretch(drive, options, terminal, (t,), near))
-            near = TorqueProfile(point.time, point.torque) if point.found else near
-            too_short = point if point.status == "INFEASIBLE" else too_short
-            if point.status != "NOT_FOUND":  # another attempt may find it
-                saved.add(point.record())
-            _told(each, point)
-            yield point
+        yield from computed(asked._replace(start_times=missing, too_short=too_short), tell)
         return
-    size = max(1, math.ceil(len(missing) / (CHUNKS * workers)))
-    chunks = [tuple(missing[i : i + size]) for i in range(0, len(missing), size)]
-    asked = [Stretch(drive, options, terminal, one, None) for one in chunks]
-    for stretch, points in pool.results(computed, asked):
-        _tell(progress, str(stretch))
-        for point in points:
-            if point.status != "NOT_FOUND":
-                saved.add(point.record())
-            _told(each, point)
-            yield point
-
-
-def _told(each: Callable[[FrontPoint], object] | None, point: FrontPoint) -> None:
-    if each is not None:
-        each(point)
+    size = max(1, math.ceil(len(missing) / (CHUNKS * pool.count)))
+    parts = [asked._replace(start_times=missing[i : i + size]) for i in range(0, len(missing), size)]
+    for part, points in pool.results(_listed, parts):
+        tell(str(part))
+        yield from points
 
 
 def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]]:
@@ -473,46 +464,13 @@ def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]
             yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
 
 
-def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:
-    return ControllerPoint(
-        run.controller_name, run.k_dyn, run.start_time, run.status.value,
-        None if math.isnan(run.start_time) else found[YARDSTICK, run.start_time],
-    )  # fmt: skip
-
-
-def _inputs(
-    drive: Machine,
-    base: Machine | None,
-    terminal: str,
-    corners: Any,
-    smoothness: float,
-) -> dict[str, Any]:
-    """All that a point depends on besides its start time, as plain data."""
-    return {
-        "version of softstart": __version__,
-        "drive": drive.to_toml(),
-        "base drive": base.to_toml() if base else "",
-        "terminal": terminal,
-        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in corners],
-        "smoothness": float(smoothness),
-    }
-
-
 def _checked(start_times: Sequence[float]) -> list[float]:
     """Start times above 0, sorted, each once."""
     given = list(start_times)
+    good = [isinstance(t, Real) and not isinstance(t, bool) and 0.0 < float(t) < math.inf for t in given]
     if not given:
         raise InputError("start_times: the list is empty; give at least one start time in s.")
-    wrong = [
-        f"start_times = {t!r}: give times above 0 s as numbers."
-        for t in given
-        if not isinstance(t, Real) or isinstance(t, bool) or not 0.0 < float(t) < math.inf
-    ]
-    if wrong:
-        raise InputError(wrong)
+    if not all(good):
+        wrong = (t for t, right in zip(given, good, strict=True) if not right)
+        raise InputError([f"start_times = {t!r}: give times above 0 s as numbers." for t in wrong])
     return sorted({float(t) for t in given})
-
-
-def _tell(progress: Progress | None, doing: str) -> None:
-    if progress is not None:
-        progress(doing)

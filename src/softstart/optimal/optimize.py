@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from softstart.chain.machines import Machine, one_machine
 from softstart.controller import ready_controller_names
 from softstart.drive import Limits
@@ -52,6 +54,8 @@ EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 MOST_TRIALS = 24
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
+APART = 0.4  # of the distance of even knots, which keep so far from those of an answer that is followed
+ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
 TIGHT = 1e-5  # a bound within this share needs no other one
 
 
@@ -173,22 +177,31 @@ def optimize(
             raise
         best = solve(replace(problem, terminal="reached"), known, confirm)
         why += ", in which only the load can have the target speed"
-    return replace(best, why=best.why + why)
+    alone = _alone(best.problem) if len(problem.machines) > 1 and near is None else {}
+    return replace(best, why=best.why + why, alone=alone)
 
 
-def solve(problem: Problem, near: TorqueProfile | None = None, confirm: bool = False) -> Optimum:
-    """The optimum of a problem; see `optimize`."""
+@on_one_thread
+def solve(
+    problem: Problem, near: TorqueProfile | None = None, confirm: bool = False, follow: float = 0.0
+) -> Optimum:
+    """The optimum of a problem; see `optimize`.
+
+    Where `near` is the answer for a start time close by, `follow` in s, and a start is found from it, no
+    other first demand is tried.
+    """
     began = time.perf_counter()
     if problem.minimise == "start_time":
         return _least_start_time(problem, near, began)
     assert problem.start_time is not None
     if problem.start_time < momentum_shortest_time(problem):
         raise _too_short(problem, shortest_start_time(problem))
-    best = _by_formula(problem, began) or _by_descent(problem, near, began)
+    best = _by_formula(problem, began)
+    if best is None and near is not None and follow:
+        best = _followed(problem, near, problem.start_time / follow, began)
+    best = best or _by_descent(problem, near, began)
     if confirm:
         best = _confirmed(best)
-    if len(problem.machines) > 1 and near is None:  # in a sweep nobody asks for it
-        best = replace(best, alone=_alone(problem))
     return replace(best, seconds=time.perf_counter() - began)
 
 
@@ -206,7 +219,31 @@ def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> O
     found = searched(problem, near)
     if found is None or found[1].missed > MISSED:
         found = _sooner(problem)
-    name, best, profile = found
+    return _answer(problem, *found, began)
+
+
+def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float) -> Optimum | None:
+    """The local optimum below the answer for a start time close by, as it is or scaled in time, if any."""
+    search, firsts = Descent(problem), []
+    even = search.even
+    for share in (1.0, scale):
+        demand = TorqueProfile(near.time * share, near.torque)
+        far = np.abs(even[:, None] - demand.time).min(axis=1) > APART * even[1]
+        far[[0, -1]] = True
+        search.even = even[far]
+        start = search.play(search.onto(demand), search.latest)
+        firsts += [] if start is None else [(start.merit, share, demand, search.even)]
+    for *_, demand, search.even in sorted(firsts, key=lambda one: one[:2])[:1]:
+        found = search.down(demand, search.latest, least=ROUGH)
+        found = None if found is None else search.finished(search.refined(found, 1))
+        if found is not None and found.missed <= MISSED:
+            profile = TorqueProfile(search.time, found.torques).simplified()
+            with suppress(OptimumError):
+                return _answer(problem, "the answer for the next start time", found, profile, began)
+    return None
+
+
+def _answer(problem: Problem, name: str, best: Found, profile: TorqueProfile, began: float) -> Optimum:
     claimed = {"k_dyn": best.peak / problem.base_torque, "heat": best.heat}[problem.minimise]
     why = f"successive linear programs on the exact start, from {name}"
     return _checked(problem, profile, best.end, claimed, "descent", why, began)

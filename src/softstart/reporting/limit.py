@@ -15,7 +15,7 @@ from softstart.controller.base import label_of
 from softstart.errors import InputError, listed
 from softstart.late import late
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
-from softstart.optimal.front import FrontPoint, Stretch, computed
+from softstart.optimal.front import FrontPoint, Stretch
 from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
 from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve
@@ -198,11 +198,12 @@ def optima(drive: Any, start_times: Sequence[float], *, progress: WorkerProgress
     Each begins with the optimum of the nearest start time that has one.
     """
     near: dict[float, TorqueProfile] = {}
+    question = Stretch(drive, {}, TERMINAL)
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
         nearest = min(near, key=lambda one: abs(one - start_time), default=math.nan)
-        (point,) = computed(Stretch(drive, {}, TERMINAL, (start_time,), near.get(nearest)))
+        point = question.point(start_time, near.get(nearest))
         if point.found:
-            near[start_time] = TorqueProfile(point.time, point.torque)
+            near[start_time] = point.profile
         progress.part(point)
 
 

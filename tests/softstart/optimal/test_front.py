@@ -218,7 +218,7 @@ def test_not_a_single_point_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None
     def fails(*given: Any, **options: Any) -> None:
         raise OptimumError("it could not be found.")
 
-    monkeypatch.setattr("softstart.optimal.front.optimize", fails)
+    monkeypatch.setattr("softstart.optimal.front.solve", fails)
     with pytest.raises(OptimumError, match="could not be found"):
         pareto(CRANE, [0.3], controllers=[])
 

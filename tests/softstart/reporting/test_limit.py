@@ -67,15 +67,14 @@ def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostil
 def test_optima_of_a_report_begin_with_the_nearest_that_is_known(monkeypatch):
     asked = []
 
-    def noted(stretch):
-        (start_time,) = stretch.start_times
-        asked.append((start_time, stretch.near and stretch.near.time[-1]))
+    def noted(stretch, start_time, near):
+        asked.append((start_time, near and near.time[-1]))
         if start_time == 0.32:
-            return [FrontPoint.not_found("", start_time, "reached")]
-        return [replace(OPTIMUM, time=(0.0, start_time), torque=(1.0, 1.0))]
+            return FrontPoint(start_time, "reached", "NOT_FOUND", "")
+        return replace(OPTIMUM, time=(0.0, start_time), torque=(1.0, 1.0))
 
     OPTIMUM = FrontPoint.of_optimum(optimize(LAGGING.replace(torque_lag=0.0), 0.32, terminal="reached"), 0.32)
-    monkeypatch.setattr("softstart.reporting.limit.computed", noted)
+    monkeypatch.setattr("softstart.reporting.limit.Stretch.point", noted)
     optima(LAGGING, [0.3, 0.4, 0.31, 0.32, 0.35], progress=Progress(lambda message: None))
     assert asked == [(0.3, None), (0.31, 0.3), (0.32, 0.31), (0.35, 0.31), (0.4, 0.35)]
 
