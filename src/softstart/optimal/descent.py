@@ -52,6 +52,7 @@ from softstart.profile import TorqueProfile
 
 KNOTS = 14  # in an elastic period
 MOST_KNOTS = 160  # even ones
+APART = 0.4  # of the distance of even knots, which keep so far from those of a demand
 INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY, DEAR, DEAREST = 20.0, 2e3, 1e5  # of what is missed, as shares, beside the objective as a share
 FIRST_TRUST, MOST_TRUST, LEAST_TRUST = 0.1, 0.5, 1e-4  # of the highest torque
@@ -68,7 +69,7 @@ BETWEEN = 5e-5  # of the highest torque: kept from the curve for what happens be
 IN_LAG = 0.04  # of a torque lag, between instants at which a curve limits the torque
 FARTHEST = 0.2  # of t_f, that it moves in a step
 CALM = 1e-5  # weight of the total variation of the torque, in highest torques
-JUMP = 0.04  # of the highest torque between two knots: halved there
+JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which intervals are halved; so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,18 +125,17 @@ class Descent:
     # demands -----------------------------------------------------------------------------------------------
 
     def onto(self, profile: TorqueProfile) -> Vector:
-        """Take the knots of a demand into the grid; its torques there."""
-        when = np.minimum(profile.time, self.until)
+        """Take the knots of a demand, and even ones not near to them, as the grid; its torques there."""
         keep = profile.time < self.until
+        when = profile.time[keep]
+        far = np.abs(self.even[:, None] - when).min(axis=1, initial=math.inf) > APART * self.even[1]
+        far[-1] = True
+        far[0] = when.size == 0 or when[0] > 0.0
+        new = self.even[far]
         if self.starts_at_initial:  # no steps
-            self.time = np.unique(np.concatenate([self.even, when[keep]]))
+            self.time = np.unique(np.concatenate([new, when]))
             return self.allowed(profile.at(self.time))
-        far = (
-            np.abs(self.even[:, None] - when[None, keep]).min(axis=1, initial=math.inf) > 1e-3 * self.even[1]
-        )
-        ends = np.isin(self.even, self.even[[0, -1]])
-        new = self.even[(far | ends) & ~np.isin(self.even, when[keep])]
-        time = np.concatenate([when[keep], new])
+        time = np.concatenate([when, new])
         torque = np.concatenate([profile.torque[keep], profile.at(new)])
         order = np.argsort(time, kind="stable")
         self.time = time[order]
@@ -254,14 +254,16 @@ class Descent:
     # descents ----------------------------------------------------------------------------------------------
 
     def down(
-        self, profile: TorqueProfile, end: float, steps: int = STEPS, least: float = 1e-4
+        self, profile: TorqueProfile, end: float, steps: int = STEPS, least: float = 1e-4, dear: bool = True
     ) -> Found | None:
         """Down from a first demand, until a program promises less than the share `least`.
 
-        Where a condition is missed at last, missing it costs more: near the shortest start time.
+        Where a condition is missed after all steps, missing it costs more: near the shortest start time.
         """
         found = self._down(self.onto(profile), end, steps, least)
-        while found is not None and steps == STEPS and found.missed > MISSED and self.penalty < DEAREST:
+        while (
+            found is not None and dear and steps == STEPS and found.missed > MISSED and self.penalty < DEAREST
+        ):
             self.penalty *= 10.0
             found = self._down(found.torques, found.end, steps, least)
         self.penalty = PENALTY
@@ -279,9 +281,11 @@ class Descent:
         for _ in range(times):
             width = np.diff(self.time)
             slope = np.diff(found.torques) / np.maximum(width, 1e-12 * self.until)
-            bend = np.abs(np.diff(slope)) * np.maximum(width[1:], width[:-1]) > JUMP * self.high
-            beside = np.append(bend, False) | np.append([False], bend)
-            halved = np.flatnonzero(beside & (width > 1e-4 * self.period))
+            bend = np.abs(np.diff(slope)) * np.maximum(width[1:], width[:-1])
+            beside = np.maximum(np.append(bend, 0.0), np.append([0.0], bend))
+            beside[width <= 1e-4 * self.period] = 0.0
+            most = max(np.sort(beside)[-HALVED:][0], JUMP * self.high) if beside.size else math.inf
+            halved = np.flatnonzero(beside >= most)
             if halved.size == 0:
                 break
             middle = 0.5 * (self.time[halved] + self.time[halved + 1])
@@ -318,7 +322,7 @@ class Descent:
             down = self.down(demand, self.latest, TASTE, 1e-3)
             if down is not None and down.merit < HOPEFUL * found.merit:
                 down = self._down(down.torques, down.end, STEPS, 1e-3)
-            if down is not None and down.missed <= MISSED and down.merit < found.merit:
+            if down is not None and down.missed <= max(MISSED, found.missed) and down.merit < found.merit:
                 found = down
             else:
                 self.time = kept
@@ -442,13 +446,15 @@ class Program:
         rows = (np.concatenate(self.values), np.concatenate(self.places), ends)
         whole = csr_array(rows, shape=(ends.size - 1, self.columns)).tocsc()
         pattern = ca.Sparsity(*whole.shape, whole.indptr.tolist(), whole.indices.tolist())  # type: ignore[call-overload]
-        options: Any = {"highs": {"output_flag": False, "presolve": "off"}, "error_on_fail": False}
+        most = 20 * self.columns  # of iterations: a few programs in a thousand cycle
+        highs: Any = {"output_flag": False, "presolve": "off", "simplex_iteration_limit": most}
         solver = ca.conic(
-            "step", "highs", {"a": pattern, "h": ca.Sparsity(self.columns, self.columns)}, options
-        )
-        least, most = np.concatenate(self.least), np.concatenate(self.most)
+            "step", "highs", {"a": pattern, "h": ca.Sparsity(self.columns, self.columns)},
+            {"highs": highs, "error_on_fail": False},
+        )  # fmt: skip
+        lower, upper = np.concatenate(self.least), np.concatenate(self.most)
         try:
-            out = solver(g=cost, a=ca.DM(pattern, whole.data), lba=least, uba=most, lbx=low, ubx=high)
+            out = solver(g=cost, a=ca.DM(pattern, whole.data), lba=lower, uba=upper, lbx=low, ubx=high)
         except RuntimeError:  # HiGHS gives up
             return None
         return np.array(out["x"]).ravel() if solver.stats()["success"] else None

@@ -5,12 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from softstart.chain.machines import Machine, one_machine
 from softstart.controller import ready_controller_names
@@ -47,15 +45,15 @@ FIRST, BESIDE, FINISHED = (
     2,
 )  # first demands that are followed a few steps, beside a known one, to the end
 DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
-TRIES = 24  # starts around one, where one torque serves several machines
+TRIES, FEW = 8, 4  # starts around one, where one torque serves several machines; the same in between
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 MOST_TRIALS = 24
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
-APART = 0.4  # of the distance of even knots, which keep so far from those of an answer that is followed
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
+NEARLY = 0.05  # by which share conditions are missed by an answer that is only a first demand
 TIGHT = 1e-5  # a bound within this share needs no other one
 
 
@@ -225,15 +223,11 @@ def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> O
 def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float) -> Optimum | None:
     """The local optimum below the answer for a start time close by, as it is or scaled in time, if any."""
     search, firsts = Descent(problem), []
-    even = search.even
     for share in (1.0, scale):
         demand = TorqueProfile(near.time * share, near.torque)
-        far = np.abs(even[:, None] - demand.time).min(axis=1) > APART * even[1]
-        far[[0, -1]] = True
-        search.even = even[far]
         start = search.play(search.onto(demand), search.latest)
-        firsts += [] if start is None else [(start.merit, share, demand, search.even)]
-    for *_, demand, search.even in sorted(firsts, key=lambda one: one[:2])[:1]:
+        firsts += [] if start is None else [(start.merit, share, demand)]
+    for *_, demand in sorted(firsts, key=lambda one: one[:2])[:1]:
         found = search.down(demand, search.latest, least=ROUGH)
         found = None if found is None else search.finished(search.refined(found, 1))
         if found is not None and found.missed <= MISSED:
@@ -275,17 +269,9 @@ def searched(
     """
     search = Descent(problem)
     several = len(problem.machines) > 1
-    if several and near is None and not quick:
-        for share in RUNGS:
-            rung = replace(problem, start_time=share * search.latest)
-            hopeless = share * search.latest <= momentum_shortest_time(rung)
-            below = None if hopeless else searched(rung, near, quick=True)
-            near = near if below is None or below[1].missed > MISSED else below[2]
-    if not several and near is None and _rattles(problem.drive):
-        for ratio in DAMPED:
-            damped = replace(problem, drive=problem.drive.with_damping_ratio(ratio))
-            like = searched(replace(damped, base=problem.base or problem.drive), near, quick=True)
-            near = near if like is None or like[1].missed > MISSED else like[2]
+    if near is None and not quick:
+        for like in _easier(problem):
+            near = _roughly(like, near)
     firsts = _first_demands(search, near)
     if problem.terminal != "reached":  # begin with an easier end
         easier = Descent(replace(problem, terminal="reached"), search.players)
@@ -305,10 +291,34 @@ def searched(
     return min(done, key=lambda one: (one[1].missed > MISSED, one[1].objective), default=None)
 
 
-def _rattles(machine: Machine) -> bool:
-    """Whether it is an undamped chain: strategies lead to poor local optima, those of a damped one do not."""
-    shafts = rows_of(machine).shafts[0].view(at.SHAFT)[:, 0]
-    return shafts.size > 1 and not shafts["d"].any()
+def _easier(problem: Problem) -> Iterator[Problem]:
+    """Problems whose answers lead to a good one of this: shorter starts of several machines, damped chains.
+
+    From strategies an undamped chain comes to poor local optima, and one torque for several machines often.
+    """
+    assert problem.start_time is not None
+    shafts = rows_of(problem.machines[0]).shafts[0].view(at.SHAFT)[:, 0]
+    if len(problem.machines) > 1:
+        for share in RUNGS:
+            shorter = replace(problem, start_time=share * problem.start_time)
+            if share * problem.start_time > momentum_shortest_time(shorter):
+                yield shorter
+    elif shafts.size > 1 and not shafts["d"].any():
+        base = problem.base or problem.drive
+        for ratio in DAMPED:
+            yield replace(problem, drive=problem.drive.with_damping_ratio(ratio), base=base)
+
+
+def _roughly(problem: Problem, near: TorqueProfile | None) -> TorqueProfile | None:
+    """A local optimum that misses its conditions by little, quickly found; `near` if there is none."""
+    search = Descent(problem)
+    for _, demand in _tasted(search, _first_demands(search, near))[:1]:
+        found = search.down(demand, search.latest, least=1e-3, dear=False)
+        if found is not None and len(problem.machines) > 1:
+            found = search.around(found, FEW)
+        if found is not None and found.missed < NEARLY:
+            return TorqueProfile(search.time, found.torques).simplified()
+    return near
 
 
 def _tasted(search: Descent, firsts: list[tuple[str, TorqueProfile]]) -> list[tuple[str, TorqueProfile]]:

@@ -26,7 +26,7 @@ from softstart.kernel.motor import M_TIME, NEW_STATE
 from softstart.start.recorded import Recorder
 from softstart.start.status import Status, status_of
 
-SILENCE = 10.0  # s after which a controller that has not returned is named
+SILENCE = 60.0  # s after which a controller that has not returned is named
 _watched: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
 _watcher: list[threading.Thread] = []
 
