@@ -168,7 +168,8 @@ def _machine(sheet: Sheet, folder: Path) -> tuple[str, list[str]]:
         return "", []
     what = machine.WHAT.removeprefix("a ")
     write_text(folder / f"{what}.toml", machine.to_toml())
-    about = f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n```toml\n{machine.to_toml()}```"
+    text = f"```toml\n{machine.to_toml()}```"
+    about = f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n{text}"
     if sheet.fitted_to is not None:
         write_text(folder / FITTED_TO, sheet.fitted_to.to_toml())
         set_up = controllers_set_up(None if sheet.varied else machine, sheet.fitted_to)
