@@ -264,7 +264,7 @@ def event_table(run: Run) -> Table:
 def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
     """What is shown of a start."""
     assert run.controller is not None
-    several = len(run.drive.shaft_names) > 1
+    several, stem = len(run.drive.shaft_names) > 1, file_stem(run.controller_name)
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     return Sheet(
         f"{run.drive.name}: start under {run.controller_name}",
@@ -273,9 +273,9 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         figure_rows(run),
         [*([shaft_table(run)] if several else []), stage_table(run), event_table(run)],
         notes=run.drive.warnings,
-        figures={"run": run.plot},
+        figures={f"run-{stem}": run.plot},
         files={
-            "trace.csv": run.to_csv,
+            f"trace-{stem}.csv": run.to_csv,
             "stages.csv": rows_file(STAGE_COLUMNS, stage_rows(run)),
             "events.csv": rows_file(EVENT_COLUMNS, event_rows(run)),
             "figures.csv": records_file([summary]),
