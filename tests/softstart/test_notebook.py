@@ -23,7 +23,7 @@ def optimum() -> Any:
 MADE: dict[str, tuple[Callable[[], Any], bool]] = {
     "run": (lambda: simulate(DAMPED, "ramp"), True),
     "chain": (lambda: simulate(Chain.load("crane-4-mass"), "ramp"), True),
-    "comparison": (lambda: compare(DAMPED, ["direct", "ramp", "shaped"]), False),
+    "comparison": (lambda: compare(DAMPED, ["direct", "ramp", "shaped"]), True),
     "optimum": (optimum, True),
     "front": (lambda: pareto(DAMPED.replace(damping=0.0), [0.45, 0.5], controllers=["direct"]), True),
     "fatigue": (lambda: fatigue([simulate(DAMPED, "direct"), simulate(DAMPED, "ramp")]), True),

@@ -20,7 +20,6 @@ from softstart.cli.optimal_options import (
 )
 from softstart.cli.options import (
     choice,
-    command_line,
     drive_argument,
     json_option,
     named_as_options,
@@ -29,32 +28,19 @@ from softstart.cli.options import (
     read_machine,
     set_option,
 )
-from softstart.cli.running import Attributed, working
+from softstart.cli.running import Attributed, answering, working
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import OBJECTIVES, StartTime
-from softstart.views.markdown import output_folder
-from softstart.views.terminal import (
-    present,
-    print_conclusion,
-    print_figures,
-    print_lines,
-    print_table,
-    sentence,
-)
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from softstart import controller
     from softstart.optimal.result import Optimum
     from softstart.start.run import Run
     from softstart.views import optima as views
-    from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
     controller, views = late("softstart.controller"), late("softstart.views.optima")
-    starts = late("softstart.views.starts")
 
 
 @click.command(cls=Command)
@@ -121,22 +107,16 @@ def optimize(
     bounds = {name: value for name, value in given.items() if value is not None}
     bounds["start_time"] = typed("start_time")
     varied = {"gaps": gaps or (), "inertias": inertias or (), "load_torques": load_torques or ()}
-    with no_solution_reported(as_json), output_folder(out) as folder:
+    with no_solution_reported(as_json), answering(as_json, out) as answer:
         with working("looking for the gentlest start ..."), named_as_options():
             others = softstart.scenarios_of(drive, **varied)[1:]
             best = softstart.optimize(drive, scenarios=others, **bounds)
         with working("starting the drive under the shipped controllers ..."):
             beside = [] if others else runs_beside(best)
-        if folder is not None:
-            with working("drawing the figure ..."):
-                views.write_optimum(best, beside, folder, command_line())
-
-    present(
-        lambda: {**best.summary(), "controllers": [views.controller_summary(run) for run in beside]},
-        lambda to: _show(to, best, beside),
-        as_json,
-        out and f"{out}: report.md, the profile (CSV, TOML, C), figure and traces",
-    )
+        answer(
+            lambda: {**best.summary(), "controllers": [views.controller_summary(run) for run in beside]},
+            views.optimum_sheet(best, beside),
+        )
 
 
 def runs_beside(best: Optimum) -> list[Run]:
@@ -147,16 +127,3 @@ def runs_beside(best: Optimum) -> list[Run]:
         with suppress(InputError, SimulationError), Attributed(name):
             runs.append(softstart.simulate(drive, name, base=base))
     return runs
-
-
-def _show(to: Console, best: Optimum, beside: Sequence[Run]) -> None:
-    print_lines(to, starts.machine_lines(best.problem.drive))
-    sentence(to, f"  asked  {views.question(best)}")
-    sentence(to, f"  method {best.method}: {best.why}")
-    to.print()
-    print_figures(to, views.figure_rows(best))
-    if best.problem.scenarios:
-        to.print()
-        print_table(to, views.scenario_table(best), bold=[best.worst])
-    notes = [*views.known_sentences(best), views.bound_sentence(best)]
-    print_conclusion(to, [views.comparison(best, beside)], notes)

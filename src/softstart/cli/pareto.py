@@ -20,7 +20,6 @@ from softstart.cli.optimal_options import (
 )
 from softstart.cli.options import (
     as_option,
-    command_line,
     controller_option,
     count,
     drive_argument,
@@ -31,22 +30,19 @@ from softstart.cli.options import (
     scheduler_option,
     set_option,
 )
-from softstart.cli.running import Attributed, make_controllers, working
+from softstart.cli.running import Attributed, answering, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
 from softstart.optimal.problem import StartTime
-from softstart.views.markdown import kept_state, output_folder
-from softstart.views.terminal import present, print_conclusion, print_json, print_lines, print_tables
+from softstart.views.markdown import kept_state
+from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from softstart.optimal import optimize as optima
     from softstart.views import optima as views
-    from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
-    starts, views = late("softstart.views.starts"), late("softstart.views.optima")
+    views = late("softstart.views.optima")
     optima = late("softstart.optimal.optimize")
 
 STATE = "pareto.jsonl"
@@ -97,24 +93,15 @@ def pareto(
     """
     with (
         no_solution_reported(as_json),
-        output_folder(out) as folder,
         kept_state(out, STATE, "finished points") as state,
+        answering(as_json, out) as answer,
     ):
         found = _computed(drive, start_times, controllers, bounds, state)
-        if folder is not None and any(point.found for point in found.points):
-            with working("drawing the figure ..."):
-                views.write_front(found, folder, command_line())
-
-    if not any(point.found for point in found.points):
-        if as_json:
-            print_json(found.summary())
-        raise SimulationError(as_option(found.points[-1].status_text))
-    present(
-        found.summary,
-        lambda to: _show(to, found),
-        as_json,
-        out and f"{out}: report.md, the figure, the table and the finished points",
-    )
+        if not any(point.found for point in found.points):
+            if as_json:
+                print_json(found.summary())
+            raise SimulationError(as_option(found.points[-1].status_text))
+        answer(found.summary, views.front_sheet(found))
 
 
 def _computed(
@@ -133,9 +120,3 @@ def _computed(
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)
-
-
-def _show(to: Console, found: softstart.Front) -> None:
-    print_lines(to, starts.machine_lines(found.drive))
-    print_tables(to, views.front_tables(found))
-    print_conclusion(to, [views.front_conclusion(found)], views.footnotes(found))

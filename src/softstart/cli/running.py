@@ -7,12 +7,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from softstart.cli.options import code_allowed
+from softstart.cli.options import code_allowed, command_line
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
+from softstart.views.markdown import output_folder
+from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
     import rich.console as rich_console
@@ -20,9 +22,11 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from softstart import controller
+    from softstart.views import sheet
+    from softstart.views.sheet import Sheet
 else:
     rich_console, event = late("rich.console"), late("numba.core.event")
-    controller = late("softstart.controller")
+    controller, sheet = late("softstart.controller"), late("softstart.views.sheet")
 
 LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 EVERY = 30.0  # s between two lines of progress in a pipe
@@ -126,6 +130,29 @@ class Attributed:
                 place = f"{traceback.tb_frame.f_code.co_filename}, line {traceback.tb_lineno}"
             traceback = traceback.tb_next
         return place
+
+
+@contextmanager
+def answering(as_json: bool, out: str | None) -> Iterator[Callable[[Callable[[], Any], Sheet], None]]:
+    """The answer of a command: the block gives the data for JSON and the sheet to what is yielded.
+
+    That the folder of --out can be written is found before the block begins; it is filled at its end. Then
+    the answer is printed.
+    """
+    given: list[tuple[Callable[[], Any], Sheet]] = []
+    with output_folder(out) as folder:
+        yield lambda data, shown: given.append((data, shown))
+        if folder is not None:
+            with working("drawing the figures ..."):
+                for _, shown in given:
+                    sheet.export(shown, folder, command_line())
+    for data, shown in given:
+        if as_json:
+            print_json(data())
+        else:
+            sheet.show(shown)
+            if out is not None:
+                print(f"\nWritten to {out}: report.md, figures and tables.")
 
 
 def make_controllers(

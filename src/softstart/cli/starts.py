@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,7 +13,6 @@ from softstart.chain.model import Chain
 from softstart.cli.commands import Command, Reading, typed
 from softstart.cli.options import (
     check_name,
-    command_line,
     controller_names,
     controller_option,
     drive_argument,
@@ -27,26 +26,13 @@ from softstart.cli.options import (
     set_option,
     until_option,
 )
-from softstart.cli.running import Attributed, make_controllers, working
+from softstart.cli.running import Attributed, answering, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.quantities import whole_number
-from softstart.views.markdown import output_folder
-from softstart.views.terminal import (
-    present,
-    print_commands,
-    print_conclusion,
-    print_figures,
-    print_lines,
-    print_table,
-    print_tables,
-    sentence,
-)
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from softstart.identification.result import Identification
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
@@ -55,9 +41,6 @@ if TYPE_CHECKING:
 else:
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
     recommendation = late("softstart.start.recommendation")
-
-SHOWN = 24  # rows of stages and events shown; files and JSON hold all
-
 
 strategies_option = controller_option(
     "--controllers", "A,B,...",
@@ -118,45 +101,16 @@ def compare(
     drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, or a
     file of tuned gains.
     """
-    with output_folder(out) as folder:
+    with answering(as_json, out) as answer:
         with working("starting the drive ..."):
             made = make_controllers(controllers, params, prefix=True)
             with Attributed():
-                comparison = softstart.compare(
+                found = softstart.compare(
                     drive, made, until=until, fitted_to=fitted_to, worst_case=worst_case
                 )
-        if folder is not None:
-            with working("drawing the figures ..."):
-                starts.write_comparison(comparison, folder, command_line())
-
-    present(
-        comparison.summary,
-        lambda to: _show_comparison(to, comparison, controllers is None, details),
-        as_json,
-        out and f"{out}: report.md, figures, traces and the table",
-    )
-
-
-def _show_comparison(to: Console, comparison: Comparison, by_peak: bool, details: bool) -> None:
-    rows = list(comparison.rows)
-    if by_peak:
-        rows.sort(key=lambda row: row.run.k_dyn)
-    best = [rows.index(row) for row in comparison.recommendation.shown]
-    print_lines(to, starts.machine_lines(comparison.drive, comparison.fitted_to))
-    to.print()
-    print_table(to, starts.comparison_table(rows, (*starts.GENTLE, *starts.QUICK)), bold=best)
-    more: list[tuple[str, tuple[starts.Figure, ...]]] = []
-    if rows[0].intervals:
-        more.append(("Intervals of 95 %", starts.INTERVALS))
-    if details:
-        events = "Events in the backlash" if len(comparison.drive.shaft_names) == 1 else "Shafts"
-        more += [("Times", starts.TIMES), (events, starts.details(comparison.drive))]
-    for title, figures in more:
-        to.print()
-        print_table(to, starts.comparison_table(rows, figures, title), bold=best)
-    legend = starts.definitions(comparison) if details else [f"{starts.LEGEND} More: --details."]
-    print_conclusion(to, [comparison.recommendation.text], [*legend, *starts.remarks(comparison)])
-    print_commands(to, _next_steps(comparison))
+        rows = sorted(found.rows, key=lambda row: row.run.k_dyn) if controllers is None else list(found.rows)
+        sheet = starts.comparison_sheet(found, rows, details or out is not None)
+        answer(found.summary, replace(sheet, commands=_next_steps(found)))
 
 
 def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
@@ -208,22 +162,13 @@ def simulate(
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like).
     """
-    with output_folder(out) as folder:
+    with answering(as_json, out) as answer:
         with working("starting the drive ..."):
             (made,) = make_controllers([controller], {controller: params}, prefix=False)
             with Attributed():
                 run: Any = softstart.simulate(drive, made, until, fitted_to=fitted_to)
                 _ = run.settled_time  # it may ask the controller on
-        if folder is not None:
-            with working("drawing the figure ..."):
-                starts.write_start(run, folder, command_line(), fitted_to)
-
-    present(
-        lambda: _start_data(run, fitted_to),
-        lambda to: _show_start(to, run, fitted_to),
-        as_json,
-        out and f"{out}: report.md, figure, traces, stages and events",
-    )
+        answer(lambda: _start_data(run, fitted_to), starts.run_sheet(run, fitted_to))
 
 
 def _start_data(run: Any, fitted_to: Drive | None) -> dict[str, Any]:
@@ -233,24 +178,6 @@ def _start_data(run: Any, fitted_to: Drive | None) -> dict[str, Any]:
         "stages": [{**asdict(stage), "duration": stage.duration} for stage in run.stages],
         "events": [event._asdict() for event in run.events],
     }
-
-
-def _show_start(to: Console, run: Any, fitted_to: Drive | None) -> None:
-    print_lines(to, starts.machine_lines(run.drive, fitted_to))
-    values = ", ".join(f"{key} = {_value(value)}" for key, value in run.controller.parameters.items())
-    sentence(to, f"  under  {run.controller_name}{' (' + values + ')' if values else ''}")
-    to.print()
-    sentence(to, run.status.value, "bold")
-    print_figures(to, starts.figure_rows(run))
-    for table in starts.start_tables(run, SHOWN):
-        to.print()
-        print_table(to, table)
-    if run.drive.warnings:
-        print_conclusion(to, [], run.drive.warnings)
-
-
-def _value(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _gears_and_couplings(text: str, option: str) -> dict[str, int]:
@@ -313,7 +240,7 @@ def fatigue(
     lives are relative to that of direct. Every shaft needs damping; those of a chain are evaluated
     separately.
     """
-    with output_folder(out) as folder:
+    with answering(as_json, out) as answer:
         with working("starting the machine ..."):
             made = make_controllers(controllers, params, prefix=True)
             with Attributed():
@@ -321,13 +248,5 @@ def fatigue(
                 found = softstart.fatigue(
                     runs, slope=slope, worn_gap=worn_gap, estimate_damping=estimate_damping
                 )
-        if folder is not None:
-            with working("drawing the figure ..."):
-                lives.write_fatigue(found, folder, command_line(), fitted_to)
-
-    def show(to: Console) -> None:
-        print_lines(to, starts.machine_lines(found.drive, fitted_to))
-        print_tables(to, lives.fatigue_tables(found, found.ranked if controllers is None else found.rows))
-        print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
-
-    present(found.summary, show, as_json, out and f"{out}: report.md, figure, cycles and turning points")
+        rows = found.ranked if controllers is None else found.rows
+        answer(found.summary, lives.fatigue_sheet(found, rows, fitted_to))

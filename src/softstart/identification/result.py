@@ -26,7 +26,6 @@ from softstart.start.comparison import INTERVAL, intervals
 from softstart.start.simulation import simulate
 
 views = late("softstart.views.identification")  # above this module; see softstart.late
-notebook = late("softstart.views.notebook")
 
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 CONFIDENCE = 0.95
@@ -331,7 +330,9 @@ class Identification:
         return views.figure(self)
 
     def _repr_html_(self) -> str:
-        return str(notebook.of_identification(self))
+        from softstart.views import sheet
+
+        return sheet.as_html(views.identification_sheet(self))
 
 
 def _or_nan(value: Any) -> Any:

@@ -26,7 +26,6 @@ from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
 
-notebook = late("softstart.views.notebook")
 optima = late("softstart.views.optima")  # it draws results of this module
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
@@ -212,7 +211,9 @@ class Front:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        return notebook.of_front(self)
+        from softstart.views import sheet
+
+        return sheet.as_html(optima.front_sheet(self))
 
     def plot(self) -> Any:
         """The curve with its bound, and the controllers as points."""

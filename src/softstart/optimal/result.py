@@ -10,13 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.kernel import records as at
-from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin
 from softstart.start.run import Run
-
-notebook = late("softstart.views.notebook")
 
 Method = Literal["closed-form", "descent", "collocation"]
 BoundKind = Literal["certificate", "momentum", "none"]
@@ -210,7 +207,9 @@ class Optimum:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        return notebook.of_optimum(self)
+        from softstart.views import optima, sheet
+
+        return sheet.as_html(optima.optimum_sheet(self))
 
     def __repr__(self) -> str:
         """One line with the main figures."""

@@ -18,13 +18,10 @@ from softstart.drive import Drive
 from softstart.drive.doubts import doubts
 from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
-from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-
-notebook = late("softstart.views.notebook")
 
 DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
@@ -129,7 +126,10 @@ class Comparison:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        return notebook.of_comparison(self)
+        from softstart.views import sheet, starts
+
+        rows = sorted(self.rows, key=lambda row: row.run.k_dyn)
+        return sheet.as_html(starts.comparison_sheet(self, rows))
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""

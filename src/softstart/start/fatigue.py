@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 else:
     rainflow = late("rainflow")
 
-notebook = late("softstart.views.notebook")
 views = late("softstart.views.fatigue")  # above this module; see softstart.late
 
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
@@ -204,7 +203,9 @@ class Fatigue:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        return notebook.of_fatigue(self)
+        from softstart.views import sheet
+
+        return sheet.as_html(views.fatigue_sheet(self))
 
     def plot(self) -> Any:
         """Ranges of the cycles over how many there are, for each strategy, and lives beside `direct`."""

@@ -177,9 +177,9 @@ class Run:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        from softstart.views import notebook
+        from softstart.views import sheet, starts
 
-        return notebook.of_run(self)
+        return sheet.as_html(starts.run_sheet(self))
 
     @property
     def controller_name(self) -> str:

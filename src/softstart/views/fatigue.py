@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,17 +19,11 @@ from softstart.views.drawing import (
     entitle,
     head,
     new_figure,
-    save_figure,
 )  # fmt: skip
-from softstart.views.markdown import (
-    file_stem,
-    markdown,
-    markdown_table,
-    write_columns,
-    write_drive_report,
-    write_rows,
-)  # fmt: skip
+from softstart.views.markdown import file_stem
 from softstart.views.numbers import Table, column_of, number, short
+from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
+from softstart.views.starts import machine_lines
 
 SPECTRUM = ("range N m", "mean N m", "count")
 EQUIVALENT = (
@@ -236,37 +229,27 @@ def fatigue_figure(found: Fatigue) -> Any:
     return figure
 
 
-def write_fatigue(found: Fatigue, folder: Path, command: str, fitted_to: Any = None) -> None:
-    """Everything about these lives: figure, tables, spectrum and turning points of each shaft."""
-    save_figure(found.plot(), folder, "fatigue")
+def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Any = None) -> Sheet:
+    """What is shown of lives; `rows` are its rows in another order."""
+    files: dict[str, str | Writer] = {}
     stems: list[str] = []
     several = len(found.drive.shaft_names) > 1
     for row in found.rows:
         shaft = f" shaft {row.shaft + 1}" if several else ""
-        stems.append(file_stem(f"{row.run.controller_name}{shaft}", stems))
-        columns = dict(zip(SPECTRUM, row.spectrum.T.tolist(), strict=True))
-        write_columns(folder / f"spectrum-{stems[-1]}.csv", columns)
+        stems.append(stem := file_stem(f"{row.run.controller_name}{shaft}", stems))
         times, torques = row.turning_points.T.tolist()
-        write_columns(
-            folder / f"turning-points-{stems[-1]}.csv", {"time s": times, "shaft torque N m": torques}
-        )
-    write_rows(
-        folder / "fatigue.csv",
-        [
-            {k: v for k, v in row.summary().items() if k not in {"spectrum", "relative_life_range"}}
-            for row in found.rows
-        ],
+        files[f"spectrum-{stem}.csv"] = rows_file(SPECTRUM, row.spectrum.tolist())
+        files[f"turning-points-{stem}.csv"] = columns_file({"time s": times, "shaft torque N m": torques})
+    left_out = {"spectrum", "relative_life_range"}
+    records = [{k: v for k, v in row.summary().items() if k not in left_out} for row in found.rows]
+    return Sheet(
+        f"{found.drive.name}: life of the shaft line",
+        machine_lines(found.drive, fitted_to),
+        tables=fatigue_tables(found, rows or found.rows),
+        found=[conclusion(found)],
+        notes=notes(found),
+        figures={"fatigue": found.plot},
+        files={"fatigue.csv": records_file(records), **files},
+        machine=found.drive,
+        fitted_to=fitted_to,
     )
-    parts = [
-        f"# {markdown(found.drive.name)}: life of the shaft line",
-        conclusion(found),
-        *(
-            part
-            for one in fatigue_tables(found, found.rows)
-            for part in ([f"**{one.title}**"] if one.title else []) + [markdown_table(one)]
-        ),
-        *map(markdown, notes(found)),
-        "![life](fatigue.svg)",
-        "Cycles: " + ", ".join(f"[{stem}](spectrum-{stem}.csv)" for stem in stems) + ".",
-    ]
-    write_drive_report(folder, parts, found.drive, command, fitted_to)

@@ -21,17 +21,21 @@ class Column(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A titled table of text cells."""
+    """A titled table of text cells; rows numbered in `bold` stand out, a terminal shows the first `most`."""
 
     title: str
     columns: list[Column]
     rows: Sequence[Sequence[str]]
+    bold: Sequence[int] = ()
+    most: int | None = None
 
     @classmethod
-    def of(cls, title: str, cells: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Table:
+    def of(
+        cls, title: str, cells: Mapping[str, Sequence[str]], texts: Sequence[str] = (), **options: Any
+    ) -> Table:
         """From the cells below each heading; columns named in `texts` hold text, the others numbers."""
         columns = [Column(heading, heading not in texts) for heading in cells]
-        return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)])
+        return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)], **options)
 
     @classmethod
     def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

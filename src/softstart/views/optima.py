@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,18 +27,12 @@ from softstart.views.drawing import (
     name_points,
     new_figure,
     plain_ticks,
-    save_figure,
     shade_open_gap,
-)
-from softstart.views.markdown import (
-    figure_table,
-    markdown,
-    markdown_table,
-    write_drive_report,
-    write_rows,
 )
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
 from softstart.views.printed import units_of
+from softstart.views.sheet import Sheet, records_file
+from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
     from matplotlib import ticker
@@ -50,6 +43,9 @@ else:
 AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
 REPLAY = "softstart simulate {what}.toml --controller profile --param file=profile.csv"
 FEW = 8  # masses and shafts with a name each in a figure
+UNRECORDED = (
+    "profile", "seconds", "tried", "k_dyn_if_position_known", "k_dyn_each", "start_times", "scenarios",
+)  # fmt: skip
 TALL = 4.0  # largest over smallest K_dyn from which on the axis is logarithmic
 TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 
@@ -93,7 +89,6 @@ def figure_rows(best: Optimum) -> list[list[str]]:
             if not problem.scenarios
         ],
         *([["answers of the searches", _searches(best)]] if len(best.tried) > 1 else []),
-        ["computed in", f"{best.seconds:.2g} s"],
     ]
 
 
@@ -201,7 +196,7 @@ def scenario_table(best: Optimum) -> Table:
         "K_dyn": [number(k, 4) for k in best.k_dyn_each],
         "start\ntime s": column_of(list(best.start_times), 5),
     }
-    return Table.of("", columns)
+    return Table.of("", columns, bold=[best.worst])
 
 
 def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
@@ -387,29 +382,13 @@ def _twist(axes: Axes, best: Optimum) -> None:
     _legend(axes, 4)
 
 
-def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: str) -> None:
-    """Everything about an optimal start."""
-    drive = best.problem.drive
-    save_figure(optimum_figure(best), folder, "optimum")
-    best.profile.to_csv(folder / "profile.csv")
-    best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
-    best.profile.to_c(folder / "profile.c")
-    numbers = [f"-{index}" for index in range(1, len(best.runs) + 1)] if best.problem.scenarios else [""]
-    traces = [f"trace-optimum{number}.csv" for number in numbers]
-    for name, run in zip(traces, best.runs, strict=True):
-        run.to_csv(folder / name)
-    left_out = {
-        "profile",
-        "seconds",
-        "tried",
-        "k_dyn_if_position_known",
-        "k_dyn_each",
-        "start_times",
-        "scenarios",
-    }
-    summary = {key: value for key, value in best.summary().items() if key not in left_out}
-    write_rows(folder / "figures.csv", [summary])
-    rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
+def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
+    """What is shown of an optimal start; `others` are the same machine under strategies."""
+    problem = best.problem
+    drive, several = problem.drive, bool(problem.scenarios)
+    numbers = [f"-{index}" for index in range(1, len(best.runs) + 1)] if several else [""]
+    traces = {f"trace-optimum{n}.csv": run.to_csv for n, run in zip(numbers, best.runs, strict=True)}
+    record = {k: v for k, v in best.summary().items() if k not in UNRECORDED}
     others = sorted(others, key=lambda run: run.k_dyn)
     beside = {
         "strategy": [run.controller_name for run in others],
@@ -417,23 +396,33 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "start time s": [number(run.start_time, 5) for run in others],
     }
     replay = REPLAY.format(what=drive.WHAT.removeprefix("a "))
-    parts = [
-        f"# {markdown(drive.name)}: {'one profile for all' if best.problem.scenarios else best_start(drive)}",
-        f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
-        markdown(comparison(best, others)),
-        figure_table(rows),
-        *([markdown_table(scenario_table(best))] if best.problem.scenarios else []),
-        *map(markdown, known_sentences(best)),
-        markdown(bound_sentence(best)),
-        "![optimum](optimum.svg)",
-        "## The profile",
-        "[profile.csv](profile.csv), [profile.toml](profile.toml) and, as an interpolating function in C, "
-        f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{replay}\n```\n\n"
-        f"Traces of the start: {', '.join(f'[{name}]({name})' for name in traces)}.",
-    ]
-    if others:
-        parts += ["## The controllers on this drive", markdown_table(Table.of("", beside, ("strategy",)))]
-    write_drive_report(folder, parts, drive, command)
+    return Sheet(
+        f"{drive.name}: {'one profile for all' if several else best_start(drive)}",
+        [
+            *machine_lines(drive),
+            f"  asked  {question(best)}",
+            f"  method {best.method}: {best.why}",
+        ],
+        facts=figure_rows(best),
+        tables=[
+            *([scenario_table(best)] if several else []),
+            Table.of("The strategies on this drive", beside, ("strategy",)),
+        ],
+        found=[comparison(best, others)],
+        notes=[*known_sentences(best), bound_sentence(best)],
+        figures={"optimum": lambda: optimum_figure(best)},
+        files={
+            "profile.csv": best.profile.to_csv,
+            "profile.toml": lambda path: best.profile.to_toml(
+                path, about={"drive": drive.name, "k_dyn": best.k_dyn}
+            ),
+            "profile.c": best.profile.to_c,
+            "figures.csv": records_file([record]),
+            **traces,
+        },
+        machine=drive,
+        behind=[f"## The profile\n\nPlayed again it gives the same K\\_dyn:\n\n```sh\n{replay}\n```"],
+    )
 
 
 # a front ----------------------------------------------------------------------------------------------------
@@ -597,22 +586,15 @@ def _scale(axes: Axes, values: Sequence[float]) -> None:
     axes.margins(x=0.04)
 
 
-def write_front(front: Front, folder: Path, command: str) -> None:
-    """Everything about a curve over start times, but its saved state."""
-    save_figure(front.plot(), folder, "pareto")
-    front.to_csv(folder / "pareto.csv")
-    parts = [
-        f"# {markdown(front.drive.name)}: {markdown(best_k_dyn(front.drive))} against start time",
-        f"Terminal {front.terminal}.",
-        markdown(front_conclusion(front)),
-        "![pareto](pareto.svg)",
-    ]
-    for title, table in zip(("The curve", "The controllers"), front_tables(front), strict=True):
-        if table.rows:
-            parts += [f"## {title}", markdown_table(table)]
-    parts += [
-        *map(markdown, footnotes(front)),
-        "All numbers with their digits: [pareto.csv](pareto.csv). Points with their torque profiles, from "
-        "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
-    ]
-    write_drive_report(folder, parts, front.drive, command)
+def front_sheet(front: Front) -> Sheet:
+    """What is shown of a curve over start times."""
+    return Sheet(
+        f"{front.drive.name}: {best_k_dyn(front.drive)} against start time, terminal {front.terminal}",
+        machine_lines(front.drive),
+        tables=front_tables(front),
+        found=[front_conclusion(front)],
+        notes=footnotes(front),
+        figures={"pareto": front.plot},
+        files={"pareto.csv": front.to_csv},
+        machine=front.drive,
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
@@ -24,21 +23,13 @@ from softstart.views.drawing import (
     head,
     legend_above,
     new_figure,
-    save_figure,
     shade_open_gap,
 )
 from softstart.views.drives import controllers_set_up, drive_lines
-from softstart.views.markdown import (
-    figure_table,
-    file_stem,
-    markdown,
-    markdown_table,
-    write_drive_report,
-    write_rows,
-    write_table,
-)
-from softstart.views.numbers import Table, column_of, first_of, number, short
+from softstart.views.markdown import file_stem, markdown
+from softstart.views.numbers import Table, column_of, number, short
 from softstart.views.printed import units_of
+from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +40,7 @@ STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
 OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
 FEW = 8  # masses
+SHOWN = 24  # stages and events on a terminal
 SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 
@@ -165,12 +157,6 @@ def shaft_table(run: Run) -> Table:
     return Table.of("Shafts", cells, ("shaft",))
 
 
-def start_tables(run: Run, most: int) -> list[Table]:
-    """Each shaft where there are several, and the first stages and events."""
-    several = [shaft_table(run)] if len(run.drive.shaft_names) > 1 else []
-    return [*several, stage_table(run, most), event_table(run, most)]
-
-
 def run_figure(run: Run) -> Any:
     """Torques, speeds and twists over time; of a single shaft grey where its gap is open."""
     single = len(run.drive.shaft_names) == 1
@@ -252,9 +238,9 @@ def _twists(axes: Axes, run: Run) -> None:
     head(axes, title, unit)
 
 
-def stage_table(run: Run, most: int) -> Table:
-    """The first stages."""
-    stages = run.stages[:most]
+def stage_table(run: Run) -> Table:
+    """The stages."""
+    stages = run.stages
     cells = (
         [str(stage.number) for stage in stages],
         [SIDES[stage.side] for stage in stages],
@@ -263,53 +249,48 @@ def stage_table(run: Run, most: int) -> Table:
         column_of([stage.peak_torque for stage in stages], 5),
         column_of([stage.peak_time for stage in stages], 5),
     )
-    title = f"Stages{first_of(len(run.stages), most)}"
-    return Table.of(title, dict(zip(STAGE_COLUMNS, cells, strict=True)), ("gap",))
+    return Table.of("Stages", dict(zip(STAGE_COLUMNS, cells, strict=True)), ("gap",), most=SHOWN)
 
 
-def event_table(run: Run, most: int) -> Table:
-    """The first events: time, what happened, and of several shafts where."""
-    rows: list[Any] = event_rows(run)[:most]
+def event_table(run: Run) -> Table:
+    """The events: time, what happened, and of several shafts where."""
+    rows: list[Any] = event_rows(run)
     cells = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
     if len(run.drive.shaft_names) > 1:
         cells["at"] = [row[2] for row in rows]
-    return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event", "at"))
+    return Table.of("Events", cells, ("event", "at"), most=SHOWN)
 
 
-def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
-    """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
-    stem = file_stem(run.controller_name)
-    _write_run(run, folder, stem)
-    write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
-    write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
-    summary = {key: value for key, value in run.summary().items() if key != "parameters"}
-    write_rows(folder / "figures.csv", [summary])
-    parts = [
-        f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
-        run.status.value,
-        figure_table(figure_rows(run)),
-        *([markdown_table(shaft_table(run))] if len(run.drive.shaft_names) > 1 else []),
-        *run.drive.warnings,
-        _strategy(run, stem),
-        "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
-    ]
-    write_drive_report(folder, parts, run.drive, command, fitted_to)
-
-
-def _write_run(run: Run, folder: Path, stem: str) -> None:
-    save_figure(run.plot(), folder, f"run-{stem}")
-    run.to_csv(folder / f"trace-{stem}.csv")
-
-
-def _strategy(run: Run, stem: str) -> str:
+def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
+    """What is shown of a start."""
     assert run.controller is not None
-    cls = type(run.controller)
-    values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
-    summary = f": {markdown(cls.summary)}" if cls.summary else ""
-    return (
-        f"### {markdown(stem)}\n\n{markdown(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
-        f"![{stem}](run-{stem}.svg)\n\nTraces: [trace-{stem}.csv](trace-{stem}.csv)"
+    several, stem = len(run.drive.shaft_names) > 1, file_stem(run.controller_name)
+    summary = {key: value for key, value in run.summary().items() if key != "parameters"}
+    return Sheet(
+        f"{run.drive.name}: start under {run.controller_name}",
+        [*machine_lines(run.drive, fitted_to), f"  under  {_strategy(run)}"],
+        run.status.value,
+        figure_rows(run),
+        [*([shaft_table(run)] if several else []), stage_table(run), event_table(run)],
+        notes=run.drive.warnings,
+        figures={f"run-{stem}": run.plot},
+        files={
+            f"trace-{stem}.csv": run.to_csv,
+            "stages.csv": rows_file(STAGE_COLUMNS, stage_rows(run)),
+            "events.csv": rows_file(EVENT_COLUMNS, event_rows(run)),
+            "figures.csv": records_file([summary]),
+        },
+        machine=run.drive,
+        fitted_to=fitted_to,
     )
+
+
+def _strategy(run: Run) -> str:
+    """The strategy of a start and its parameters."""
+    assert run.controller is not None
+    given = run.controller.parameters.items()
+    values = ", ".join(f"{key} = {short(v) if isinstance(v, float) else v}" for key, v in given)
+    return f"{run.controller_name}{' (' + values + ')' if values else ''}"
 
 
 # a comparison --------------------------------------------------------------------------------------------
@@ -367,7 +348,7 @@ AT_THE_GAP = (
 )
 
 
-def details(machine: Any) -> tuple[Figure, ...]:
+def at_details(machine: Any) -> tuple[Figure, ...]:
     """The figures of what happens at the gap; of several shafts each over its own mean torque."""
 
     def of_shaft(k: int) -> Callable[[Row], float]:
@@ -382,10 +363,12 @@ def details(machine: Any) -> tuple[Figure, ...]:
     return (*shafts, *of_limit, AT_THE_GAP[-1])
 
 
-def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "") -> Table:
+def comparison_table(
+    rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "", bold: Sequence[int] = ()
+) -> Table:
     """The strategies and these figures, by default all; beside K_dyn also flags and limits, where needed."""
     uncertain = INTERVALS if rows[0].intervals else ()
-    figures = figures or (*GENTLE, *QUICK, *uncertain, *TIMES, *details(rows[0].run.drive))
+    figures = figures or (*GENTLE, *QUICK, *uncertain, *TIMES, *at_details(rows[0].run.drive))
     judged = GENTLE[0] in figures
     cells = {"strategy": [row.marked if judged else row.name for row in rows]}
     for figure in figures:
@@ -396,7 +379,7 @@ def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title:
             cells[figure.heading] = [number(value, figure.decimals) for value in values]
     if judged and any(row.against_limits for row in rows):
         cells["limits"] = [row.against_limits for row in rows]
-    return Table.of(title, cells, ("strategy", "limits"))
+    return Table.of(title, cells, ("strategy", "limits"), bold=bold)
 
 
 INTERVALS_NOTE = (
@@ -528,40 +511,48 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
     return figure
 
 
-def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
-    """Everything about a comparison."""
-    rows = comparison.rows
-    runs = [row.run for row in rows]
-    name = comparison.drive.name
-    pictures = {"comparison": comparison_figure(rows, name)}
+def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: bool = True) -> Sheet:
+    """What is shown of a comparison; `rows` are its rows in another order."""
+    machine, rows = comparison.drive, rows or comparison.rows
+    bold = [rows.index(row) for row in comparison.recommendation.shown]
+    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*GENTLE, *QUICK))]
+    if rows[0].intervals:
+        parts.append(("Intervals of 95 %", INTERVALS))
+    if details:
+        several = len(machine.shaft_names) > 1
+        parts += [("Times", TIMES), ("Shafts" if several else "Events in the backlash", at_details(machine))]
     reached = [row for row in rows if not math.isnan(row.run.start_time)]
     points = [(row.marked, row.run.start_time, row.run.k_dyn) for row in reached]
+    figures = {"comparison": lambda: comparison_figure(rows, machine.name)}
     if points:
-        pictures["trade-off"] = trade_off_figure(points, name)
-    for stem, figure in pictures.items():
-        save_figure(figure, folder, stem)
+        figures["trade-off"] = lambda: trade_off_figure(points, machine.name)
+    files: dict[str, str | Writer] = {"comparison.csv": records_file(list(map(_record, rows)))}
     stems: list[str] = []
-    for row in rows:
-        stems.append(file_stem(row.run.controller_name, stems))
-        _write_run(row.run, folder, stems[-1])
+    behind = ["## The strategies"]
+    for run in (row.run for row in rows):
+        stems.append(stem := file_stem(run.controller_name, stems))
+        figures[f"run-{stem}"] = run.plot
+        files[f"trace-{stem}.csv"] = run.to_csv
+        behind.append(f"### {markdown(stem)}\n\n{markdown(_strategy(run))}\n\n![{stem}](run-{stem}.svg)")
+    return Sheet(
+        f"{machine.name}: soft-start strategies compared",
+        machine_lines(machine, comparison.fitted_to),
+        tables=[comparison_table(rows, which, title, bold) for title, which in parts],
+        found=[comparison.recommendation.text],
+        notes=[
+            *(definitions(comparison) if details else [f"{LEGEND} More: --details."]),
+            *remarks(comparison),
+        ],
+        figures=figures,
+        files=files,
+        machine=machine,
+        fitted_to=comparison.fitted_to,
+        behind=behind,
+    )
 
-    summaries = [row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)} for row in rows]
-    for one in summaries:
-        one |= {
-            f"margin_{limit['limit'].replace(' ', '_')}": limit["margin"] for limit in one.get("limits", ())
-        }
-    keys = [key for key in summaries[0] if key not in ("parameters", "status_text", "limits")]
-    write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
 
-    parts = [
-        f"# {markdown(name)}: soft-start strategies compared",
-        *(f"Doubt: {markdown(one)}" for one in doubts(comparison.drive)),
-        comparison.recommendation.text,
-        markdown_table(comparison_table(rows)),
-        *definitions(comparison),
-        *remarks(comparison),
-        *(f"![{stem}]({stem}.svg)" for stem in pictures),
-    ]
-    each = (_strategy(run, stem) for run, stem in zip(runs, stems, strict=True))
-    behind = ["## The strategies", *each]
-    write_drive_report(folder, parts, comparison.drive, command, comparison.fitted_to, behind=behind)
+def _record(row: Row) -> dict[str, Any]:
+    """The figures of a strategy under the names of JSON, each limit with a column of its own."""
+    found = row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)}
+    found |= {f"margin_{one['limit'].replace(' ', '_')}": one["margin"] for one in found.get("limits", ())}
+    return {key: value for key, value in found.items() if key not in ("parameters", "status_text", "limits")}

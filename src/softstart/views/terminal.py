@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from softstart.late import late
-from softstart.views.numbers import Table, plain, printable
+from softstart.views.numbers import Column, Table, first_of, plain, printable
 
 if TYPE_CHECKING:
     import rich.console as rich_console
@@ -46,23 +46,47 @@ def print_json(data: Any) -> None:
     print(json.dumps(plain(data), indent=2, allow_nan=False))
 
 
-def present(
-    data: Callable[[], Any], show: Callable[[rich_console.Console], None], as_json: bool, written: str | None
-) -> None:
-    """A command's answer: the JSON object of `data`, or what `show` prints and which files are `written`."""
-    if as_json:
-        print_json(data())
-        return
-    show(console())
-    if written is not None:
-        print(f"\nWritten to {written}.")
+def print_table(to: rich_console.Console, shown: Table, *, headings: bool = True) -> None:
+    """A table; bold rows stand out on a terminal. Text is wrapped, numbers are never cut.
+
+    Of a table that is too wide the first columns, as far as they hold text, are printed again before those
+    that have no room beside them.
+    """
+    rows = shown.rows[: shown.most]
+    cut = first_of(len(shown.rows), len(rows))
+    for index, block in enumerate(_blocks(shown._replace(rows=rows), to.width)):
+        if index:
+            to.print()
+        title = f"{shown.title}, continued" if index else shown.title + cut
+        _print_block(to, block._replace(title=title), headings)
 
 
-def print_table(
-    to: rich_console.Console, shown: Table, *, bold: Sequence[int] = (), headings: bool = True
-) -> None:
-    """A table; rows numbered in `bold` stand out on a terminal. Text is wrapped, numbers are never cut."""
-    title, columns, rows = shown
+def _blocks(table: Table, width: int) -> list[Table]:
+    """The table in blocks of columns that fit; the text columns on the left stand in each of them."""
+    columns, rows = table.columns, table.rows
+    needed = [_least(column, [row[i] for row in rows], i) + GUTTER for i, column in enumerate(columns)]
+    keys = next((i for i, column in enumerate(columns) if column.number), len(columns)) or 1
+    blocks, used = [list(range(keys))], sum(needed[:keys])
+    for i in range(keys, len(columns)):
+        if used + needed[i] - GUTTER > width and len(blocks[-1]) > keys:
+            blocks.append(list(range(keys)))
+            used = sum(needed[:keys])
+        blocks[-1].append(i)
+        used += needed[i]
+    return [
+        table._replace(columns=[columns[i] for i in block], rows=[[row[i] for i in block] for row in rows])
+        for block in blocks
+    ]
+
+
+def _least(column: Column, cells: Sequence[str], index: int) -> int:
+    """Letters that a column needs at least: numbers all, text may be wrapped."""
+    width = column.width(cells)
+    return width if column.number else min(width, LONGEST_NAME if index == 0 else SHORTEST_TEXT)
+
+
+def _print_block(to: rich_console.Console, shown: Table, headings: bool) -> None:
+    columns, rows = shown.columns, shown.rows
     framed = to.is_terminal and not to.options.ascii_only
     table = rich_table.Table(
         box=box.SIMPLE_HEAD if framed else None,
@@ -73,22 +97,20 @@ def print_table(
         header_style="",
     )
     depth = max(column.heading.count("\n") for column in columns)
-    needed = GUTTER * (len(columns) - 1)
-    for index, column in enumerate(columns):
-        width = column.width([row[index] for row in rows])
-        least = width if column.number else min(width, LONGEST_NAME if index == 0 else SHORTEST_TEXT)
-        needed += least
+    least = [_least(column, [row[i] for row in rows], i) for i, column in enumerate(columns)]
+    for column, width in zip(columns, least, strict=True):
         table.add_column(
             "\n" * (depth - column.heading.count("\n")) + column.heading,
             justify="right" if column.number else "left",
             no_wrap=column.number,
             overflow="fold",
-            min_width=least,
+            min_width=width,
         )
     for index, row in enumerate(rows):
-        table.add_row(*row, style="bold" if index in bold else "")
-    if title:
-        to.print(rich_text.Text(title, style="bold"))
+        table.add_row(*row, style="bold" if index in shown.bold else "")
+    if shown.title:
+        to.print(rich_text.Text(shown.title, style="bold"))
+    needed = sum(least) + GUTTER * (len(least) - 1)
     before, to.width = to.width, max(to.width, needed)  # print(width=...) keeps to the console's own
     try:
         if framed:
@@ -107,12 +129,6 @@ def print_tables(to: rich_console.Console, tables: Sequence[Table]) -> None:
         if table.rows:
             to.print()
             print_table(to, table)
-
-
-def fits(to: rich_console.Console, table: Table) -> bool:
-    """Whether a table has room as it is."""
-    widths = [column.width([row[i] for row in table.rows]) for i, column in enumerate(table.columns)]
-    return sum(widths) + GUTTER * (len(widths) - 1) <= to.width
 
 
 def sentence(to: rich_console.Console, text: str, style: str = "") -> None:

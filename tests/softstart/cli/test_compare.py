@@ -141,7 +141,7 @@ FILES = {
 def test_the_files(place, done):
     asked = ("--controllers", "direct,own.py:Good", "--set", "gap=0.6", "--out", "deep/results")
     out = done("compare", "good.toml", *asked)
-    assert out.endswith("Written to deep/results: report.md, figures, traces and the table.\n")
+    assert out.endswith("Written to deep/results: report.md, figures and tables.\n")
     folder = place / "deep" / "results"
     assert {path.name for path in folder.iterdir()} == FILES
     assert [path.name for path in (place / "deep").iterdir()] == ["results"]

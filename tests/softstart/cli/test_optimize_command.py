@@ -84,7 +84,7 @@ FILES = {
 
 def test_the_files_which_the_same_command_writes_again(run, place, done):
     out = done(*ANCHOR, "--out", "deep/best")
-    assert out.endswith("Written to deep/best: report.md, the profile (CSV, TOML, C), figure and traces.\n")
+    assert out.endswith("Written to deep/best: report.md, figures and tables.\n")
     folder = place / "deep" / "best"
     assert {path.name for path in folder.iterdir()} == FILES
     assert [path.name for path in (place / "deep").iterdir()] == ["best"]

@@ -1,0 +1,231 @@
+"""What is shown of a result, the same on a terminal, in the folder of --out and in a notebook: a `Sheet`."""
+
+from __future__ import annotations
+
+import html
+import io
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from softstart import __version__
+from softstart.views.drawing import drawing, save_figure
+from softstart.views.drives import controllers_set_up
+from softstart.views.markdown import markdown, write_columns, write_table, write_text
+from softstart.views.numbers import Column, Table
+from softstart.views.terminal import (
+    console,
+    print_commands,
+    print_conclusion,
+    print_figures,
+    print_lines,
+    print_tables,
+    sentence,
+)
+
+FITTED_TO = "fitted-to.toml"
+
+Writer = Callable[[Path], object]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What is shown of a result, in the order in which it is shown.
+
+    Attributes
+    ----------
+    title : str
+        The heading of report.md.
+    lines : sequence of str
+        The machine and what was asked, the first line a title.
+    status : str
+        How it ended, a sentence.
+    facts : sequence of (str, str)
+        Figures, each a name and its value.
+    tables : sequence of Table
+        Those without rows are left out.
+    found, notes : sequence of str
+        What came out; what the figures mean.
+    figures : mapping of str to callable
+        By the stem of their files, each drawn when it is needed; the first one is that of a notebook.
+    files : mapping of str to str or callable
+        Further files of --out by their names: a text, or what writes a path.
+    machine : Drive or Chain, optional
+        Its parameters close report.md, and its TOML file is written.
+    fitted_to : Drive or Chain, optional
+        For which machine the controllers are set up, if another.
+    varied : bool
+        Whether parameters of the machine are varied.
+    behind : sequence of str
+        Further sections of report.md, Markdown.
+    commands : sequence of (str, str)
+        What to type next, and what it gives.
+    """
+
+    title: str
+    lines: Sequence[str] = ()
+    status: str = ""
+    facts: Sequence[Sequence[str]] = ()
+    tables: Sequence[Table] = ()
+    found: Sequence[str] = ()
+    notes: Sequence[str] = ()
+    figures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+    files: Mapping[str, str | Writer] = field(default_factory=dict)
+    machine: Any = None
+    fitted_to: Any = None
+    varied: bool = False
+    behind: Sequence[str] = ()
+    commands: Sequence[tuple[str, str]] = ()
+
+
+# terminal --------------------------------------------------------------------------------------------------
+
+
+def show(sheet: Sheet) -> None:
+    """Print a sheet."""
+    to = console()
+    print_lines(to, sheet.lines)
+    if sheet.status or sheet.facts:
+        to.print()
+    if sheet.status:
+        sentence(to, sheet.status, "bold")
+    if sheet.facts:
+        print_figures(to, sheet.facts)
+    print_tables(to, sheet.tables)
+    print_conclusion(to, sheet.found, sheet.notes)
+    if sheet.commands:
+        print_commands(to, sheet.commands)
+
+
+# folder ----------------------------------------------------------------------------------------------------
+
+
+def rows_file(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Writer:
+    """A CSV file of rows; numbers with all their digits, None as an empty cell."""
+    return lambda path: write_table(path, columns, rows)
+
+
+def columns_file(columns: Mapping[str, Sequence[object]]) -> Writer:
+    """A CSV file of columns by their headings; NaN as an empty cell."""
+    return lambda path: write_columns(path, columns)
+
+
+def records_file(records: Sequence[Mapping[str, object]]) -> Writer:
+    """A CSV file of records with the same keys."""
+    return rows_file(list(records[0]), [list(one.values()) for one in records])
+
+
+def export(sheet: Sheet, folder: Path, command: str) -> None:
+    """Write a sheet into a folder: report.md, figures (SVG, PNG), further files, and the machine (TOML)."""
+    for stem, draw in sheet.figures.items():
+        save_figure(draw(), folder, stem)
+    for name, content in sheet.files.items():
+        if isinstance(content, str):
+            write_text(folder / name, content)
+        else:
+            content(folder / name)
+    links = ", ".join(f"[{name}]({name})" for name in sheet.files)
+    about, machine = _machine(sheet, folder)
+    parts = [
+        f"# {markdown(sheet.title)}",
+        "\n".join(f"- {markdown(line.strip())}" for line in sheet.lines[1:]),
+        markdown(sheet.status),
+        *map(markdown, sheet.found),
+        facts_table(sheet.facts) if sheet.facts else "",
+        *(f"![{stem}]({stem}.svg)" for stem in sheet.figures),
+        *(part for one in sheet.tables if one.rows for part in table_parts(one)),
+        *map(markdown, sheet.notes),
+        f"Files: {links}." if links else "",
+        *machine,
+        *sheet.behind,
+        "## Where this comes from",
+        f"softstart {__version__}, Python {platform.python_version()}, with the command",
+        f"```sh\n{command}\n```",
+        about,
+    ]
+    write_text(folder / "report.md", "\n\n".join(part for part in parts if part) + "\n")
+
+
+def table_parts(table: Table) -> list[str]:
+    """A table and its title in Markdown; numbers are set to the right."""
+    headings = [column.heading for column in table.columns]
+    rule = ["---:" if column.number else "---" for column in table.columns]
+    rows = "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
+    return [f"## {markdown(table.title)}", rows] if table.title else [rows]
+
+
+def facts_table(facts: Sequence[Sequence[str]]) -> str:
+    """Figures in Markdown, each a name and its value."""
+    return table_parts(Table("", [Column("figure", False), Column("value")], facts))[0]
+
+
+def _machine(sheet: Sheet, folder: Path) -> tuple[str, list[str]]:
+    """The files of the machine, what is said of them, and the section with its parameters."""
+    machine = sheet.machine
+    if machine is None:
+        return "", []
+    what = machine.WHAT.removeprefix("a ")
+    write_text(folder / f"{what}.toml", machine.to_toml())
+    text = f"```toml\n{machine.to_toml()}```"
+    about = f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n{text}"
+    if sheet.fitted_to is not None:
+        write_text(folder / FITTED_TO, sheet.fitted_to.to_toml())
+        set_up = controllers_set_up(None if sheet.varied else machine, sheet.fitted_to)
+        about += (
+            f"\n\nThe {markdown(set_up)}. That drive is in "
+            f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{sheet.fitted_to.to_toml()}```"
+        )
+    return about, [f"## The {what}", *table_parts(_parameters(machine))]
+
+
+def _parameters(machine: Any) -> Table:
+    """All parameters of a machine that are set."""
+    rows = []
+    for path, (parameter, value) in machine.by_path().items():
+        if value is not None and value != "" and path != "name":
+            values = value if isinstance(value, tuple) else (value,)
+            shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
+            unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
+            rows.append([path, parameter.symbol, shown, unit, parameter.meaning])
+    return Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows)
+
+
+# notebook --------------------------------------------------------------------------------------------------
+
+
+def as_html(sheet: Sheet) -> str:
+    """A sheet as the cell of a notebook shows it: facts, tables, the first figure, and what came out."""
+    facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
+    parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
+    parts += [_html(table) for table in (*facts, *sheet.tables) if table.rows]
+    parts += [_svg(draw()) for draw in tuple(sheet.figures.values())[:1]]
+    parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found, *sheet.notes) if text]
+    return "\n".join(parts)
+
+
+def _html(table: Table) -> str:
+    """A table; numbers are set to the right, line breaks in headings kept."""
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        written = (
+            f'<{tag} style="text-align: {"right" if column.number else "left"}">'
+            f"{html.escape(text).replace(chr(10), '<br>')}</{tag}>"
+            for column, text in zip(table.columns, cells, strict=True)
+        )
+        return f"<tr>{''.join(written)}</tr>"
+
+    headings = [column.heading for column in table.columns]
+    head = f"<thead>{row(headings, 'th')}</thead>" if any(headings) else ""
+    caption = f"<caption>{html.escape(table.title)}</caption>" if table.title else ""
+    return f"<table>{caption}{head}<tbody>{''.join(row(cells, 'td') for cells in table.rows)}</tbody></table>"
+
+
+def _svg(figure: Any) -> str:
+    """A figure within a page."""
+    written = io.StringIO()
+    with drawing():
+        figure.savefig(written, format="svg", metadata={"Date": None}, bbox_inches="tight")
+    text = written.getvalue()
+    return text[text.index("<svg") :]
