@@ -23,11 +23,7 @@ Progress = Callable[[str], None]  # called with a few words on what is being don
 
 
 class Verdict(StrEnum):
-    """What became of a claim; the value is the word shown.
-
-    >>> Verdict("partly")
-    <Verdict.PARTLY: 'partly'>
-    """
+    """What became of a claim; the value is the word shown."""
 
     CONFIRMED = "confirmed"
     REFUTED = "refuted"
@@ -86,11 +82,7 @@ class Table:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found: tables, claims, and figures by file stem.
-
-    >>> StudyResult(claims=[Claim("A wider gap raises K_dyn.", "confirmed", "3.12 becomes 4.87.")]).tables
-    ()
-    """
+    """What a study found: tables, claims, and figures by file stem."""
 
     tables: Sequence[Table] = ()
     claims: Sequence[Claim] = ()

@@ -10,8 +10,7 @@ from softstart.balancing import Engine
 from softstart.balancing import balance as compute
 from softstart.balancing.engine import LIBRARY, TABLES
 from softstart.cli.commands import Command, Reading
-from softstart.cli.completion import table_keys
-from softstart.cli.options import changes_option, drive_argument, json_option, out_option, read_changes
+from softstart.cli.options import file_options, json_option, out_option
 from softstart.cli.running import answering
 from softstart.errors import InputError
 from softstart.input.parameters import bare
@@ -36,12 +35,7 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
 
 
 @click.command(cls=Command)
-@drive_argument(
-    lambda name, settings: Engine.load(name, also=read_changes(settings)),
-    name="engine",
-    default="vaz-11113",
-    names=LIBRARY.names,
-)
+@file_options(Engine, "vaz-11113", LIBRARY, TABLES, "masses.reciprocating='0.6 kg' or operation.load=0.5")
 @click.option(
     "--speed",
     "speeds",
@@ -49,10 +43,6 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     multiple=True,
     type=Reading(_read_speeds),
     help="Speed to show, for example 4500rpm. May be repeated. Default: round values over the speed range.",
-)
-@changes_option(
-    lambda: table_keys(TABLES),
-    "Change a parameter of the engine, for example masses.reciprocating='0.6 kg' or operation.load=0.5.",
 )
 @json_option
 @out_option("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import click
 
 from softstart.cli.commands import Command, Reading, did_you_mean
-from softstart.cli.completion import names_or_files, table_keys
-from softstart.cli.options import changes_option, count, json_option, out_option, quantity, read_changes
+from softstart.cli.completion import names_or_files
+from softstart.cli.options import count, file_options, json_option, out_option, quantity
 from softstart.cli.running import answering, working
 from softstart.clutch import LAWS, Clutch, engage, optimize_engagement
 from softstart.clutch.laws import read_law
@@ -19,37 +19,27 @@ from softstart.views import clutches as views
 DEFAULT_POINTS = 8
 
 
-def _read_clutch(name: str, option: str, settings: Sequence[str], law: str | None) -> Clutch:
-    """The clutch asked for, with its changes and its law."""
-    changes = read_changes(settings)
-    if law in LAWS:
-        changes |= {"law.kind": law, "law.times": None, "law.torques": None}
-    elif law is not None:
-        if "." not in law and "/" not in law:
-            raise InputError(f'--law = "{law}": there is no such law; {did_you_mean(law, LAWS)}')
-        times, torques = read_law(law)
-        changes |= {"law.kind": "table", "law.times": times, "law.torques": torques}
-    return Clutch.load(name, also=changes)
+def _read_law(text: str, option: str) -> dict[str, Any]:
+    """The parameters of a clutch with this law: a name, or a file."""
+    if text in LAWS:
+        return {"law": text, "law_times": None, "law_torques": None}
+    if "." not in text and "/" not in text:
+        raise InputError(f'{option} = "{text}": there is no such law; {did_you_mean(text, LAWS)}')
+    times, torques = read_law(text)
+    return {"law": "table", "law_times": times, "law_torques": torques}
 
 
 @click.command(cls=Command)
-@click.argument(
-    "clutch",
-    metavar="[CLUTCH]",
-    default="paper-c",
-    type=Reading(_read_clutch, "settings", "law"),
-    shell_complete=names_or_files(LIBRARY.names, ".toml"),
+@file_options(
+    Clutch, "paper-c", LIBRARY, Clutch.TABLES, "clutch.engagement_time='0.5 s' or shaft.gap='1 deg'"
 )
 @click.option(
     "--law",
     metavar="NAME|FILE",
+    type=Reading(_read_law),
     shell_complete=names_or_files(lambda: LAWS, ".csv"),
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
     "and friction torque. Default: that of the clutch file.",
-)
-@changes_option(
-    lambda: table_keys(Clutch.TABLES),
-    "Change a parameter of the clutch, for example clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
 )
 @click.option(
     "--until",
@@ -76,6 +66,7 @@ def _read_clutch(name: str, option: str, settings: Sequence[str], law: str | Non
 def clutch(
     *,
     clutch: Clutch,
+    law: dict[str, Any] | None,
     until: float | None,
     optimal: bool,
     points: int | None,
@@ -93,6 +84,7 @@ def clutch(
     if not optimal and (points is not None or nondecreasing):
         what = "--nondecreasing" if points is None else f'--points = "{points}"'
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
+    clutch = clutch.replace(**law) if law else clutch
     with answering(as_json, out) as answer:
         if optimal:
             with working("looking for the best laws ...") as progress:

@@ -96,14 +96,10 @@ def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
 
 
 def _all(found: list[dict[str, Any]], broken: list[str]) -> Sheet:
+    sees = [", ".join(one["sensors"][2:]) for one in found]
     rows = [
-        [
-            one["name"],
-            printable(one["summary"]),
-            ", ".join(one["sensors"][2:]) or "-",
-            printable(one["source"]) or "-",
-        ]
-        for one in found
+        [printable(cell) or "-" for cell in (one["name"], one["summary"], also, one["source"])]
+        for one, also in zip(found, sees, strict=True)
     ]
     table = Table.of_texts(("controller", "what it does", "also sees", "source"), rows)
     see = "All see time, the motor's encoder and its torque. Parameters of one: softstart controllers NAME"

@@ -9,17 +9,14 @@ import click
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
 from softstart.cli.commands import Command
-from softstart.cli.completion import table_keys
 from softstart.cli.options import (
-    changes_option,
     controller_option,
-    drive_argument,
+    file_options,
     json_option,
     named_as_options,
     out_option,
     param_option,
     quantity,
-    read_changes,
 )
 from softstart.cli.running import Attributed, answering, make_controllers, working
 from softstart.errors import InputError
@@ -37,12 +34,7 @@ else:  # no numba for a help, a wrong option or the Tab key; the kernel of start
 
 
 @click.command(cls=Command)
-@drive_argument(
-    lambda name, settings: Chain.load(name, also=read_changes(settings)),
-    name="chain",
-    default="crane-4-mass",
-    names=LIBRARY.names,
-)
+@file_options(Chain, "crane-4-mass", LIBRARY, TABLES, "mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2")
 @click.option(
     "--factor",
     metavar="NUMBER",
@@ -50,10 +42,6 @@ else:  # no numba for a help, a wrong option or the Tab key; the kernel of start
     help="Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.",
 )
 @click.option("--force", is_flag=True, help="Continue where a frequency that is left out is too low.")
-@changes_option(
-    lambda: table_keys(TABLES),
-    "Change a parameter of the chain, for example mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.",
-)
 @controller_option(
     "--verify",
     "A,B,...",

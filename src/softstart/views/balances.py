@@ -12,16 +12,7 @@ import numpy as np
 from softstart.balancing.engine import INDICATOR_FILE
 from softstart.balancing.gas import MeasuredCycle
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.views.drawing import (
-    COLOURS,
-    DASHES,
-    GREY,
-    drawing,
-    entitle,
-    head,
-    legend_above,
-    new_figure,
-)
+from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, entitle, head, legend_above, new_figure
 from softstart.views.numbers import Table, column_of, number, printable, short
 from softstart.views.printed import RPM
 from softstart.views.sheet import Sheet, columns_file, records_file
@@ -78,33 +69,26 @@ def drawings(found: Balance) -> dict[str, Callable[[], Any]]:
 def _lines(found: Balance) -> list[str]:
     """The engine in a few lines."""
     engine, gas, w, of = found.engine, found.engine.gas, found.tuning_speed, found.engine.counterweights
-    bore, stroke, rod = (
-        short(1e3 * getattr(engine.cylinders, key)) for key in ("bore", "stroke", "rod_length")
-    )
-    firing = ", ".join(short(math.degrees(angle)) for angle in engine.cylinders.firing_angles)
+    cylinders, masses, operation = engine.cylinders, engine.masses, engine.operation
+    bore, stroke, rod = (1e3 * one for one in (cylinders.bore, cylinders.stroke, cylinders.rod_length))
+    firing = ", ".join(short(math.degrees(angle)) for angle in cylinders.firing_angles)
     pressure = "none given, so only the inertia shakes"
     if isinstance(gas, MeasuredCycle):
         pressure = f"measured, {len(gas.angles)} points"
     elif gas is not None:
         mean = 1e-5 * engine.indicated_work(w, found.load) / engine.displacement
-        pressure = (
-            f"simple cycle, compression {short(gas.compression_ratio)}, mean indicated pressure {mean:.2f} "
-            f"bar at the tuning speed, load {short(found.load)}"
-        )
-    low, high, tuning = (
-        short(one * RPM) for one in (engine.operation.lowest_speed, engine.operation.highest_speed, w)
-    )
-    fluctuation = engine.speed_fluctuation(w, found.load)
-    uneven = "" if fluctuation is None else f", speed fluctuation there {100 * fluctuation:.2g} %"
+        pressure = f"compression {gas.compression_ratio:g}, mean pressure {mean:.2f} bar, load {found.load:g}"
+    uneven = engine.speed_fluctuation(w, found.load)
+    low, high = operation.lowest_speed * RPM, operation.highest_speed * RPM
     return [
         printable(engine.name),
-        f"  cylinders  {engine.cylinders.count} in line, bore {bore} mm, stroke {stroke} mm, rod {rod} mm, "
+        f"  cylinders  {cylinders.count} in line, bore {bore:g} mm, stroke {stroke:g} mm, rod {rod:g} mm, "
         f"{1e6 * engine.displacement:.1f} cm3, firing at {firing} deg",
-        f"  masses     reciprocating {short(engine.masses.reciprocating)} kg, rotating "
-        f"{short(engine.masses.rotating)} kg per cylinder; on the crank "
-        f"{short(100 * of.reciprocating_share)} % and {short(100 * of.rotating_share)} % of them",
+        f"  masses     reciprocating {masses.reciprocating:g} kg, rotating {masses.rotating:g} kg per "
+        f"cylinder; on the crank {of.reciprocating_share:.0%} and {of.rotating_share:.0%} of them",
         f"  gas        {pressure}",
-        f"  speeds     {low} to {high} rpm, tuning speed {tuning} rpm{uneven}",
+        f"  speeds     {low:g} to {high:g} rpm, tuning speed {w * RPM:g} rpm"
+        f"{'' if uneven is None else f', speed fluctuation there {uneven:.1%}'}",
     ]
 
 

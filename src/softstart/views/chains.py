@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
-from textwrap import fill, shorten
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 MOST_MODES = 12
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
 TALLEST, DISC = 150.0, 16.0  # px, of the discs of the scheme: the tallest, and their thickness
+WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; letters of a mass in it
 LINE: dict[str, Any] = {"color": "black", "lw": 1.2}
 
 
@@ -216,7 +217,8 @@ def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
     with drawing():
         figure, panels = new_figure(1 + bool(modes), 1, squeeze=False, sharex=True)
         middles = _scheme(panels[0, 0], chain)
-        figure.set_size_inches(max(8.0, (middles[-1] + 190.0) / 85.0), 2.8 + 2.4 * bool(modes))
+        width = min(max(8.0, (middles[-1] + 190.0) / 85.0), WIDEST)
+        figure.set_size_inches(width, 2.8 + 2.4 * bool(modes))
         for axes in panels[1:, 0]:
             axes.axhline(0.0, color="black", lw=0.8)
             for m in range(1, min(modes, vibration.Omega.size - 1) + 1):
@@ -230,8 +232,8 @@ def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
             head(axes, "shapes with the gaps closed; circles: nodes", "amplitude at the motor shaft")
             legend_above(axes, modes)
         panels[-1, 0].set_xlabel("at the motor shaft: inertias in kg m2, stiffnesses in N m/rad, gaps in rad")
-        assumed = f"\n{fill(f'assumed: {chain.assumed}', 115)}" if chain.assumed else ""
-        entitle(figure, shorten(chain.name, 100, placeholder=" ...") + assumed)
+        title = [chain.name, f"assumed: {chain.assumed}"] if chain.assumed else [chain.name]
+        entitle(figure, "\n".join(fill(one, 115, max_lines=2, placeholder=" ...") for one in title))
     return figure
 
 
@@ -244,7 +246,10 @@ def _scheme(axes: Axes, chain: Chain) -> list[float]:
     openings = 3.0 + 90.0 * arrays.gap / max(arrays.gap.sum(), 1e-300)
     middles = [0.0]
     for k, mass in enumerate(chain.masses):
-        x, name = middles[k], shorten(mass.name, 28, placeholder=" ...") or mass.name[:28]
+        x, name = (
+            middles[k],
+            mass.name if len(mass.name) <= LONGEST_NAME else f"{mass.name[:LONGEST_NAME]}...",
+        )
         axes.bar(x, tall[k], DISC, bottom=-0.5 * tall[k], color="#B9C6D3", edgecolor="black")
         axes.text(x, 0.5 * tall[k] + 6.0, name, rotation=35, rotation_mode="anchor", parse_math=False)
         below = [short_of(arrays.J[k])]
