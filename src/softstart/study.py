@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -19,15 +19,11 @@ from softstart.plugins import STUDIES, load, registered
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Progress = Callable[[str], None]  # told, in a few words, what is being done now
+Progress = Callable[[str], None]  # called with a few words on what is being done now
 
 
-class Verdict(Enum):
-    """What became of a claim; the value is the word shown.
-
-    >>> Verdict("partly")
-    <Verdict.PARTLY: 'partly'>
-    """
+class Verdict(StrEnum):
+    """What became of a claim; the value is the word shown."""
 
     CONFIRMED = "confirmed"
     REFUTED = "refuted"
@@ -40,9 +36,7 @@ class Verdict(Enum):
         >>> Verdict.of(True, False), Verdict.of(False)
         (<Verdict.PARTLY: 'partly'>, <Verdict.REFUTED: 'refuted'>)
         """
-        if all(held):
-            return cls.CONFIRMED
-        return cls.PARTLY if any(held) else cls.REFUTED
+        return cls.CONFIRMED if all(held) else cls.PARTLY if any(held) else cls.REFUTED
 
 
 @dataclass(frozen=True)
@@ -62,14 +56,6 @@ class Claim:
     def __post_init__(self) -> None:
         object.__setattr__(self, "verdict", Verdict(self.verdict))
 
-    def summary(self) -> dict[str, str]:
-        """Everything as plain data, for JSON."""
-        return {
-            "statement": self.statement,
-            "verdict": Verdict(self.verdict).value,
-            "evidence": self.evidence,
-        }
-
 
 @dataclass(frozen=True)
 class Table:
@@ -88,25 +74,15 @@ class Table:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple(self.columns))
-        object.__setattr__(self, "rows", tuple(tuple(row) for row in self.rows))
+        object.__setattr__(self, "rows", tuple(map(tuple, self.rows)))
         for index, row in enumerate(self.rows, start=1):
-            if len(row) != len(self.columns):
-                raise ValueError(
-                    f"table {self.title}, row {index}: {len(row)} cells for {len(self.columns)} columns."
-                )
-
-    def summary(self) -> dict[str, Any]:
-        """Everything as plain data, for JSON."""
-        return {"title": self.title, "columns": list(self.columns), "rows": [list(row) for row in self.rows]}
+            if (cells := len(row)) != (columns := len(self.columns)):
+                raise ValueError(f"table {self.title}, row {index}: {cells} cells for {columns} columns.")
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found: tables, claims, and figures by file stem.
-
-    >>> StudyResult(claims=[Claim("A wider gap raises K_dyn.", "confirmed", "3.12 becomes 4.87.")]).tables
-    ()
-    """
+    """What a study found: tables, claims, and figures by file stem."""
 
     tables: Sequence[Table] = ()
     claims: Sequence[Claim] = ()
@@ -114,10 +90,7 @@ class StudyResult:
 
     def summary(self) -> dict[str, Any]:
         """Tables and claims as plain data, for JSON."""
-        return {
-            "claims": [claim.summary() for claim in self.claims],
-            "tables": [table.summary() for table in self.tables],
-        }
+        return {"claims": [*map(asdict, self.claims)], "tables": [*map(asdict, self.tables)]}
 
 
 class Study(ABC):
@@ -148,7 +121,7 @@ class Study(ABC):
 
     @abstractmethod
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
-        """Do the study; tell `progress` what is being done.
+        """Do the study; call `progress` with what is being done.
 
         `out` is a folder for files beyond the tables and pictures, which the caller writes; None if nothing
         is to be written. Raises InputError or SimulationError like everything else.
@@ -156,11 +129,7 @@ class Study(ABC):
 
 
 def study_names() -> tuple[str, ...]:
-    """Names of all installed studies, those of other packages too.
-
-    >>> "paper-g" in study_names()
-    True
-    """
+    """Names of all installed studies, those of other packages too."""
     return tuple(registered(STUDIES))
 
 

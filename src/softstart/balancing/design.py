@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 views = late("softstart.views.balances")
 
 NOTHING = 1e-9  # of the forces of all cylinders: rounding, not a force
-RPM = math.pi / 30.0
+RPM = 30.0 / math.pi  # of one rad/s
 POINTS = 96  # speeds over the range
 PHI = np.linspace(0.0, 4.0 * np.pi, 1440, endpoint=False)  # for the largest sums of all orders
 
@@ -293,7 +293,7 @@ class Balance:
             "indicated_work": work,
             "speed_fluctuation": engine.speed_fluctuation(self.tuning_speed, self.load),
             "imbalance": self.imbalance,
-            "force_per_speed_squared": self.imbalance * RPM**2,
+            "force_per_speed_squared": self.imbalance / RPM**2,
             "free_couple": abs(free_couple(engine)) if engine.cylinders.couples_known else None,
             "note": self.note,
             "orders": self.orders(),
@@ -317,12 +317,12 @@ class Balance:
 
     def plot(self) -> Figure:
         """First-order moment, arm and force over the speed, for all designs."""
-        return self.figures()["residual"]
+        figure: Figure = views.residual_figure(self)
+        return figure
 
     def figures(self) -> dict[str, Figure]:
         """All figures by the stem of their file: torque over crank angle, residuals over speed, forces."""
-        found: dict[str, Figure] = views.figures(self)
-        return found
+        return {stem: draw() for stem, draw in views.drawings(self).items()}
 
 
 def balance(
@@ -411,14 +411,15 @@ def balance(
 def _round_speeds(low: float, high: float) -> Vector:
     """The ends of the range and the round speeds between: at most a dozen.
 
-    >>> (_round_speeds(850 * RPM, 3600 * RPM) / RPM).round(6).tolist()
+    >>> (_round_speeds(850 / RPM, 3600 / RPM) * RPM).round(6).tolist()
     [850.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 3600.0]
     """
+    ends = np.array([low, high]) * RPM
     steps = (100.0, 250.0, 500.0, 1000.0, 2500.0, 5000.0)
-    step = next((one for one in steps if (high - low) / RPM / one < 10.0), 1e4)
-    inside = step * np.arange(np.ceil(low / RPM / step), high / RPM / step + 1.0)
-    inside = inside[(inside > low / RPM * 1.02) & (inside < high / RPM * 0.98)]
-    return np.concatenate([[low], inside * RPM, [high]])
+    step = next((one for one in steps if (ends[1] - ends[0]) / one < 10.0), 1e4)
+    inside = step * np.arange(np.ceil(ends[0] / step), ends[1] / step + 1.0)
+    inside = inside[(inside > ends[0] * 1.02) & (inside < ends[1] * 0.98)]
+    return np.concatenate([[low], inside / RPM, [high]])
 
 
 def _residual(

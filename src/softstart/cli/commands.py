@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
@@ -14,61 +13,35 @@ from click.shell_completion import CompletionItem
 
 from softstart import __version__
 from softstart.errors import Mistakes, listed
-from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
     "compare": ("starts", "Compare strategies on a drive or a chain."),
     "simulate": ("starts", "Simulate one start of a drive or a chain."),
-    "fatigue": (
-        "starts",
-        "Estimate the fatigue life of the shaft line under each strategy.",
-    ),
+    "fatigue": ("starts", "Estimate the fatigue life of the shaft line under each strategy."),
     "optimize": (
-        "optimize",
-        "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.",
+        "optimize", "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound."
     ),
     "pareto": (
-        "pareto",
-        "Compute the lowest K_dyn over the start time, and compare the controllers with it.",
+        "pareto", "Compute the lowest K_dyn over the start time, and compare the controllers with it."
     ),
-    "tune": (
-        "tune",
-        "Tune a controller for each gap and load inertia, and one robust set of gains.",
-    ),
+    "tune": ("tune", "Tune a controller for each gap and load inertia, and one robust set of gains."),
     "sweep": ("sweep", "Simulate a grid of drives and controllers of any size."),
     "linear": ("linear", "Linearise the control loop: stability margins, modes, limit cycles."),
-    "reduce": (
-        "reduce",
-        "Compute the natural frequencies of a chain, and reduce it to two masses.",
-    ),
+    "reduce": ("reduce", "Compute the natural frequencies of a chain, and reduce it to two masses."),
     "clutch": ("clutch", "Simulate a clutch engagement: peak shaft torque, friction work, slip time."),
-    "balance": (
-        "balance",
-        "Compute forces and moments of a piston engine by order, and design a balancer.",
-    ),
-    "report": (
-        "report",
-        "Write a report on the start of a drive or a chain as one HTML file.",
-    ),
-    "serve": (
-        "serve",
-        "Open the interactive page in the browser.",
-    ),
+    "balance": ("balance", "Compute forces and moments of a piston engine by order, and design a balancer."),
+    "report": ("report", "Write a report on the start of a drive or a chain as one HTML file."),
+    "serve": ("serve", "Open the interactive page in the browser."),
     "init": ("init", "Create a drive file from data sheet values."),
     "identify": (
-        "identify",
-        "Identify the parameters of a drive, with confidence intervals, from inverter logs.",
+        "identify", "Identify the parameters of a drive, with confidence intervals, from inverter logs."
     ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
     "study": ("study", "List the studies, or run one."),
-    "completion": (
-        "completion",
-        "Print the script for completion with the Tab key.",
-    ),
-}
-
+    "completion": ("completion", "Print the script for completion with the Tab key."),
+}  # fmt: skip
 PURPOSES = {
     "Your own drive": ("init", "identify", "drives", "reduce"),
     "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
@@ -103,41 +76,26 @@ def typed(name: str) -> Any:
     return click.get_current_context().meta[TYPED][name]
 
 
-def all_read(given: Mapping[str, Any]) -> bool:
-    """Whether every option that is given could be read, as a check of several of them together needs."""
-    return all(value is not None or typed(name) is None for name, value in given.items())
+class Reading(click.types.StringParamType):
+    """The type of an option whose command is given what `read(text, option, *others)` returns.
 
-
-class Words(click.types.StringParamType):
-    """Text with the choices of the option's metavar, `a|b|c`; a choice in capitals is a placeholder.
-
-    >>> option = click.Option(["--terminal"], metavar="synchronous|steady|FILE", type=Words())
-    >>> [item.value for item in option.shell_complete(click.Context(click.Command("x")), "s")]
-    ['synchronous', 'steady']
+    `option` is the option's name, and `others` are what the options `needs` have; one of them without a
+    reading, as --set, is text for this one alone, which the command does not see. `words` are offered to
+    complete it.
     """
+
+    def __init__(self, read: Callable[..., Any], *needs: str, words: Sequence[str] = ()) -> None:
+        self.read, self.needs, self.words = read, needs, words
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """The words that begin with `incomplete`."""
-        words = (param.metavar or "").strip("[]").split("|")
-        found = [word for word in words if word.islower() and word.startswith(incomplete)]
-        return [CompletionItem(word) for word in found] if len(words) > 1 else []
-
-
-class Reading(Words):
-    """The type of an option whose command is given what `read(text, option, *others)` returns.
-
-    `option` is the option's name, and `others` are what the options `needs` have; one of them without a
-    reading, as --set, is text for this one alone, which the command does not see.
-    """
-
-    def __init__(self, read: Callable[..., Any], *needs: str) -> None:
-        self.read, self.needs = read, needs
+        return [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
 
 
 class Command(click.Command):
-    """A command that reads its options, names itself in its usage errors, and completes words of options.
+    """A command that reads its options, and names itself in its usage errors.
 
     What is wrong with any option is reported together with what the `checks` find, which are called with all
     values by name; a value that could not be read is None there.
@@ -148,9 +106,6 @@ class Command(click.Command):
     ) -> None:
         super().__init__(*arguments, **keywords)
         self.checks = checks
-        for parameter in self.params:
-            if parameter.type is click.STRING:
-                parameter.type = Words()
 
     def invoke(self, ctx: click.Context) -> Any:
         """Read all options, report all mistakes at once, and run the command with the values."""
@@ -165,27 +120,18 @@ class Command(click.Command):
 
     def _read(self, given: Mapping[str, Any], mistakes: Mistakes) -> dict[str, Any]:
         options = {str(one.name): one for one in self.params if one.name in given}
-        found: dict[str, Any] = {}
+        readings = {name: one.type for name, one in options.items() if isinstance(one.type, Reading)}
+        found = {name: text for name, text in given.items() if name not in readings or text is None}
 
         def value(name: str) -> Any:
             if name not in found:
-                option, text = options[name], given[name]
-                if text is None or not isinstance(option.type, Reading):
-                    found[name] = text
-                else:
-                    found[name] = None  # if it cannot be read
-                    others = [value(other) for other in option.type.needs]
-                    with mistakes.noted():
-                        found[name] = option.type.read(text, option.opts[0], *others)
+                found[name] = None  # if it cannot be read
+                others = [value(other) for other in readings[name].needs]
+                with mistakes.noted():
+                    found[name] = readings[name].read(given[name], options[name].opts[0], *others)
             return found[name]
 
-        texts = {
-            other
-            for one in options.values()
-            if isinstance(one.type, Reading)
-            for other in one.type.needs
-            if not isinstance(options[other].type, Reading)
-        }
+        texts = {other for one in readings.values() for other in one.needs if other not in readings}
         return {name: value(name) for name in options if name not in texts}
 
     def get_help_option_names(self, ctx: click.Context) -> list[str]:
@@ -240,8 +186,7 @@ class Commands(Command, click.Group):
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
-            near = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
-            hint = (None if near else _by_subject(name)) or did_you_mean(name, known, "softstart ")
+            hint = did_you_mean(name, known, "softstart ")
             raise click.UsageError(f'there is no command "{name}"; {hint}', ctx)
         return super().resolve_command(ctx, args)
 
@@ -281,18 +226,6 @@ def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
     return f"there are {listed(known)}." if known else "there are none."
 
 
-def _by_subject(name: str) -> str | None:
-    """The command that a word is about, "chain" or "gains", or a controller of that name."""
-    stem = name.lower().rstrip("s")
-    about = [
-        one for one, (_, text) in COMMANDS.items() if stem in re.findall(r"[a-z]+?(?=s?\b)", text.lower())
-    ]
-    if about:
-        return f"did you mean softstart {about[0]}?"
-    near = get_close_matches(name.lower(), registered(CONTROLLERS), n=1, cutoff=0.6)
-    return f"did you mean softstart simulate DRIVE --controller {near[0]}?" if near else None
-
-
 def usage_sentence(error: click.UsageError) -> str:
     """One sentence for what click refused, with the command it was about and where help is.
 
@@ -301,48 +234,7 @@ def usage_sentence(error: click.UsageError) -> str:
     """
     command = error.ctx.command_path if error.ctx else "softstart"
     place = command.removeprefix("softstart").strip()
-    reason = _reason(error).strip()
+    reason = error.format_message().strip()
     if reason[-1:] not in (".", "?"):
         reason += "."
     return f'{place + ": " if place else ""}{reason} See "{command} --help".'
-
-
-def _reason(error: click.UsageError) -> str:
-    if isinstance(error, click.NoSuchOption):
-        for one in error.ctx.command.params if error.ctx else ():
-            if isinstance(one, click.Argument) and error.option_name == f"--{one.name}":
-                return f"{error.option_name[2:].upper()} is given by itself: leave {error.option_name} out."
-        return f"there is no option {error.option_name}; {did_you_mean(error.option_name, _options(error))}"
-    if isinstance(error, click.MissingParameter) and error.param is not None:
-        return _missing(error.param)
-    if isinstance(error, click.BadOptionUsage):
-        option = _option(error)
-        if option is not None and not option.is_flag:
-            return f"{error.option_name} needs a value, as {error.option_name} {option.metavar or 'VALUE'}."
-        return f"{error.option_name} takes no value."
-    message = error.format_message()
-    return message[:1].lower() + message[1:]
-
-
-def _missing(parameter: click.Parameter) -> str:
-    if isinstance(parameter, click.Option):
-        return f"{parameter.opts[-1]} {parameter.metavar or 'VALUE'} is missing."
-    return f"{parameter.metavar or str(parameter.name).upper()} is missing."
-
-
-def _options(error: click.UsageError) -> list[str]:
-    if error.ctx is None:
-        return []
-    parameters = error.ctx.command.get_params(error.ctx)
-    return [
-        name for p in parameters if isinstance(p, click.Option) for name in p.opts if name.startswith("--")
-    ]
-
-
-def _option(error: click.BadOptionUsage) -> click.Option | None:
-    if error.ctx is None:
-        return None
-    for parameter in error.ctx.command.get_params(error.ctx):
-        if isinstance(parameter, click.Option) and error.option_name in parameter.opts:
-            return parameter
-    return None

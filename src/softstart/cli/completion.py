@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,6 @@ from click.shell_completion import CompletionItem, get_completion_class
 from softstart.cli.commands import Command, did_you_mean
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
-from softstart.input.files import read_text
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, STUDIES, registered
 
@@ -33,25 +31,21 @@ def names_or_files(names: Callable[[], Iterable[str]], *endings: str) -> Complet
     """One of these names, or a file that ends so."""
 
     def complete(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
-        found = [name for name in names() if name.startswith(begun)]
-        return [*map(CompletionItem, found), *map(CompletionItem, files(begun, *endings))]
+        return _items([*names(), *files(begun, *endings)], begun)
 
     return complete
 
 
+def _items(words: Iterable[str], begun: str) -> list[CompletionItem]:
+    return [CompletionItem(word) for word in words if word.startswith(begun)]
+
+
 def controllers(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """One more controller after the last comma: a name not yet named, tuned gains, or a class in a file."""
+    """One more controller after the last comma: a name not yet named, tuned gains, or a Python file."""
     done, comma, begun = incomplete.rpartition(",")
-    path, colon, _ = begun.rpartition(":")
-    if colon:
-        found = [f"{path}:{name}" for name in classes(path)]
-    else:
-        named = done.split(",")
-        found = [name for name in registered(CONTROLLERS) if name not in named]
-        found += [
-            path + ":" if path.endswith(".py") else path for path in files(begun, ".py", ".toml", ".csv")
-        ]
-    return [CompletionItem(done + comma + word) for word in found if word.startswith(begun)]
+    names = [name for name in registered(CONTROLLERS) if name not in done.split(",")]
+    found = [f"{one}:" if one.endswith(".py") else one for one in files(begun, ".py", ".toml", ".csv")]
+    return _items([f"{done}{comma}{word}" for word in (*names, *found)], incomplete)
 
 
 def files_only(*endings: str) -> Completer:
@@ -61,7 +55,7 @@ def files_only(*endings: str) -> Completer:
 
 def studies(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """The name of a study."""
-    return [CompletionItem(name) for name in registered(STUDIES) if name.startswith(incomplete)]
+    return _items(registered(STUDIES), incomplete)
 
 
 def settings(keys: Callable[[], Keys]) -> Completer:
@@ -69,13 +63,10 @@ def settings(keys: Callable[[], Keys]) -> Completer:
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         key, equals, _ = incomplete.partition("=")
-        known = keys()
         if equals:
-            _, values = known.get(key, ("", ()))
-            found = [CompletionItem(f"{key}={value}") for value in values]
-        else:
-            found = [CompletionItem(f"{key}=", help=meaning) for key, (meaning, _) in known.items()]
-        return [item for item in found if item.value.startswith(incomplete)]
+            return _items([f"{key}={value}" for value in keys().get(key, ("", ()))[1]], incomplete)
+        found = keys().items()
+        return [CompletionItem(f"{k}=", help=about) for k, (about, _) in found if k.startswith(key)]
 
     return complete
 
@@ -85,10 +76,7 @@ def axes(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Co
     key, equals, value = incomplete.partition("=")
     if equals and key == "controller":
         return [CompletionItem(f"{key}={item.value}") for item in controllers(ctx, param, value)]
-    found = [CompletionItem("controller=", help="controllers, with commas between")]
-    return [item for item in found if item.value.startswith(incomplete)] + settings(drive_keys)(
-        ctx, param, incomplete
-    )
+    return _items(["controller="], incomplete) + settings(drive_keys)(ctx, param, incomplete)
 
 
 def parameters(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -96,22 +84,21 @@ def parameters(ctx: click.Context, param: click.Parameter, incomplete: str) -> l
 
     Only installed controllers are asked: no file runs because somebody pressed Tab.
     """
-    one, several = ctx.params.get("controller"), ctx.params.get("controllers")
-    names = (one or several or ",".join(registered(CONTROLLERS))).split(",")
+    one, known = ctx.params.get("controller"), registered(CONTROLLERS)
+    several = (ctx.params.get("controllers") or ",".join(known)).split(",")
     if not one and "." not in incomplete:
-        found = [f"{name}." for name in names if name in registered(CONTROLLERS)]
-        return [CompletionItem(word) for word in found if word.startswith(incomplete)]
-    items: list[CompletionItem] = []
-    for name in names:
-        if name in registered(CONTROLLERS) and (one or incomplete.startswith(f"{name}.")):
-            items += _parameters_of(name, "" if one else f"{name}.")
-    return [item for item in items if item.value.startswith(incomplete)]
-
-
-def _parameters_of(name: str, before: str) -> Iterator[CompletionItem]:
-    for field in fields(controllers_found.controller_class(name)):
-        meaning, unit = field.metadata.get("meaning", ""), field.metadata.get("unit", "")
-        yield CompletionItem(f"{before}{field.name}=", help=_with_unit(meaning, unit))
+        return _items([f"{name}." for name in several if name in known], incomplete)
+    name = one or incomplete.partition(".")[0]
+    if name not in known or not (one or name in several):
+        return []
+    keys = {
+        f"{'' if one else f'{name}.'}{field.name}": (
+            _with_unit(field.metadata.get("meaning", ""), field.metadata.get("unit")),
+            (),
+        )
+        for field in fields(controllers_found.controller_class(name))
+    }
+    return settings(lambda: keys)(ctx, param, incomplete)
 
 
 def drive_keys() -> Keys:
@@ -136,27 +123,18 @@ def files(begun: str, *endings: str) -> list[str]:
     False
     """
     folder, slash, head = begun.rpartition("/")
-    place = os.path.expanduser(folder) or slash or "."
-    found: list[tuple[bool, str]] = []
     try:
-        with os.scandir(place) as entries:
-            for entry in entries:
-                name, is_folder = entry.name, entry.is_dir()
-                hidden = name.startswith((".", "__")) and not head.startswith((".", "__"))
-                if name.startswith(head) and not hidden and (is_folder or name.endswith(endings)):
-                    found.append((is_folder, f"{folder}{slash}{name}{'/' if is_folder else ''}"))
+        entries = list(os.scandir(os.path.expanduser(folder) or slash or "."))
     except OSError:
         return []
-    return [path for _, path in sorted(found)]
-
-
-def classes(path: str) -> list[str]:
-    """Names of the classes in a Python file, which is read and not run."""
-    try:
-        body = ast.parse(read_text(os.path.expanduser(path))).body
-    except (RecursionError, SyntaxError, ValueError):
-        return []
-    return [node.name for node in body if isinstance(node, ast.ClassDef)]
+    found = sorted(
+        (entry.is_dir(), f"{folder}{slash}{entry.name}{'/' * entry.is_dir()}")
+        for entry in entries
+        if entry.name.startswith(head)
+        and (head or not entry.name.startswith((".", "__")))
+        and (entry.is_dir() or entry.name.endswith(endings))
+    )
+    return [path for _, path in found]
 
 
 def _with_unit(meaning: str, unit: Any) -> str:

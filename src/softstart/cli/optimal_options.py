@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from softstart.cli.commands import Reading
 from softstart.cli.options import Decorator, as_option, choice, quantity
@@ -22,9 +23,6 @@ else:  # no numba for a help, a wrong option or the Tab key
     result = late("softstart.optimal.result")
 
 
-# reading them --------------------------------------------------------------------------------------------
-
-
 def read_start_times(text: str, option: str = "--start-times") -> list[StartTime]:
     """Start times with commas between, or as from:to:count.
 
@@ -35,25 +33,16 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
     """
     if ":" not in text:
         return _each(text, option, lambda part: StartTime.of(part, option))
-    parts = [part.strip() for part in text.split(":")]
+    parts = text.split(":")
     if len(parts) != 3:
         raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
-    mistakes = Mistakes()
-    ends: list[StartTime] = []
-    for part in parts[:2]:
-        with mistakes.noted():
-            ends.append(StartTime.of(part, option))
-    count = 0
-    with mistakes.noted():
-        count = whole_number(parts[2], f'{option} = "{text}": the count', 2, 1000)
-    mistakes.settle()
-    first, last = ends
+    first, last = (StartTime.of(part.strip(), option) for part in parts[:2])
+    count = whole_number(parts[2].strip(), f'{option} = "{text}": the count', 2, 1000)
     if first.multiple != last.multiple:
         raise InputError(
             f'{option} = "{text}": give both ends as times, or both as multiples of direct (1.2x).'
         )
-    step = (last.value - first.value) / (count - 1)
-    return [StartTime(first.value + index * step, first.multiple) for index in range(count)]
+    return [StartTime(one, first.multiple) for one in np.linspace(first.value, last.value, count).tolist()]
 
 
 def quantities(unit: str) -> Reading:
@@ -94,9 +83,6 @@ def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
     return found
 
 
-# the options ---------------------------------------------------------------------------------------------
-
-
 def terminal_option(usual: str, default: str | None = None) -> Decorator:
     """--terminal; `default` where it is not the drive that decides."""
     return click.option(
@@ -123,9 +109,6 @@ smoothness_option = click.option(
     type=quantity("s", "a weight in s, 0 or more", least=0.0),
     help="Weight of torque smoothness, for example 0.001 (s). Default: 0.",
 )
-
-
-# what comes of them --------------------------------------------------------------------------------------
 
 
 @contextmanager

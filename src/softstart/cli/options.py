@@ -17,12 +17,21 @@ import click
 
 from softstart.chain.model import Chain, is_chain, load_machine
 from softstart.cli.commands import Reading, did_you_mean
-from softstart.cli.completion import Keys, controllers, drive_keys, files_only, names_or_files, parameters
+from softstart.cli.completion import (
+    Keys,
+    controllers,
+    drive_keys,
+    files_only,
+    names_or_files,
+    parameters,
+    table_keys,
+)
 from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError, Mistakes
-from softstart.input.files import read_text, refusal_of
+from softstart.input.documents import Table
+from softstart.input.files import Library, read_text, refusal_of
 from softstart.input.parameter_set import read_settings
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
@@ -77,24 +86,20 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
         return two_masses(Chain.load(name, also=read_changes(settings)), name)
     sheet = _data_sheet(name)
     if sheet is None:
-        drive = Drive.load(name)
-    else:  # its own keys are those of the sheet, at their own parts
-        paths = {path for p in DataSheet.PARAMETERS.values() for path in (p.path, p.formerly)}
-        own = [one for one in settings if one.partition("=")[0].strip() in paths]
-        settings = [one for one in settings if one not in own]
-        found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))
-        drive = found.drive
-        print(
-            f'"{name}" is a data sheet, read as the drive that follows from it; "softstart init {name} '
-            '--out FILE" writes that drive.',
-            file=sys.stderr,
-        )
-    if settings:
-        drive = drive.with_settings(settings)
-        given = read_settings(settings, Drive.PARAMETERS)[0]
-        if sheet is not None and "assumed" not in given:
-            drive = drive.replace(assumed=found.assumed_still(given))
-    return drive
+        return Drive.load(name).with_settings(settings) if settings else Drive.load(name)
+    # its own keys are those of the sheet, at their own parts
+    paths = {path for p in DataSheet.PARAMETERS.values() for path in (p.path, p.formerly)}
+    own = [one for one in settings if one.partition("=")[0].strip() in paths]
+    settings = [one for one in settings if one not in own]
+    found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))
+    print(
+        f'"{name}" is a data sheet, read as the drive that follows from it; "softstart init {name} '
+        '--out FILE" writes that drive.',
+        file=sys.stderr,
+    )
+    drive = found.drive.with_settings(settings) if settings else found.drive
+    given = read_settings(settings, Drive.PARAMETERS)[0]
+    return drive if "assumed" in given else drive.replace(assumed=found.assumed_still(given))
 
 
 def _data_sheet(name: str) -> str | None:
@@ -119,13 +124,6 @@ def two_masses(chain: Chain, name: str) -> Drive:
     return found.drive
 
 
-def _identified(name: str, settings: Sequence[str]) -> Identification | None:
-    """The identification in the folder of this name; None where there is none, as for a drive."""
-    if name in drive_names() or not os.path.isfile(os.path.join(name, "identification.json")):
-        return None
-    return result.Identification.load(name).with_settings(settings)
-
-
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
     if is_chain(name):
@@ -139,16 +137,17 @@ def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
 
 def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Chain | Identification:
     """The one drive, the chain, or the identification in a folder, with its changes."""
-    return _identified(name, settings) or read_machine(name, settings)
+    if name not in drive_names() and os.path.isfile(os.path.join(name, "identification.json")):
+        return result.Identification.load(name).with_settings(settings)
+    return read_machine(name, settings)
 
 
 def _read_fitted_to(name: str, option: str) -> Drive:
     """The drive of --fitted-to."""
-    mistakes = Mistakes()
-    with mistakes.noted(f"{option}: "):
-        found = read_drive(name, ())
-    mistakes.settle()
-    return found
+    try:
+        return read_drive(name, ())
+    except InputError as error:
+        raise InputError([f"{option}: {sentence}" for sentence in error.sentences]) from None
 
 
 def quantity(unit: str, meaning: str = "", least: float | None = None, above: float | None = None) -> Reading:
@@ -188,20 +187,15 @@ def as_option(sentence: str) -> str:
     ...     as_option("chunk = 3: ...; leave chunk out to go on"), as_option("gap = -1: a gap is 0 or more.")
     ('--chunk = 3: ...; leave --chunk out to go on', 'gap = -1: a gap is 0 or more.')
     """
-    found = re.match(r"(\w+)(?= =|:|,)", sentence)
-    option = found and _options().get(found[1])
-    return re.sub(rf"\b{found[1]}(?= =|:|,| out\b)", option, sentence) if found and option else sentence
-
-
-def _options() -> dict[str, str]:
-    """The options of the command that runs, by the keywords that they stand for."""
-    context = click.get_current_context(silent=True)
-    given = (
-        [] if context is None else [one for one in context.command.params if isinstance(one, click.Option)]
-    )
-    named = {one.opts[0].lstrip("-").replace("-", "_"): one.opts[0] for one in given}
-    others = {keyword: option for keyword, option in KEYWORDS.items() if option in named.values()}
-    return {**others, **{str(one.name): one.opts[0] for one in given}, **named}
+    found, context = re.match(r"(\w+)(?= =|:|,)", sentence), click.get_current_context(silent=True)
+    if found is None or context is None:
+        return sentence
+    options = [one for one in context.command.params if isinstance(one, click.Option)]
+    by_keyword = {str(one.name): one.opts[0] for one in options}
+    by_keyword |= {one.opts[0].lstrip("-").replace("-", "_"): one.opts[0] for one in options}
+    other = KEYWORDS.get(found[1], "")
+    option = by_keyword.get(found[1]) or (other if other in by_keyword.values() else "")
+    return re.sub(rf"\b{found[1]}(?= =|:|,| out\b)", option, sentence) if option else sentence
 
 
 def count(least: int = 1, most: int = 10**15) -> Reading:
@@ -226,7 +220,7 @@ def choice(*words: str) -> Reading:
             raise InputError(f'{option} = "{text}": there is no such choice; {did_you_mean(text, words)}')
         return text
 
-    return Reading(read)
+    return Reading(read, words=words)
 
 
 def read_list(text: str, option: str) -> list[str]:
@@ -240,7 +234,7 @@ def read_list(text: str, option: str) -> list[str]:
 
 def read_names(text: str, option: str = "--controllers") -> list[str]:
     """The controllers of a comma-separated list, each known and named once."""
-    names = [name.strip() for name in text.split(",")]
+    names = read_list(text, option)
     if not all(names):
         raise InputError(
             f'{option} = "{text}": a name is empty; write names with commas between, as direct,ramp.'
@@ -261,21 +255,20 @@ def check_name(name: str, option: str, several: str = "") -> str:
     Such a file holds Python code, or tuned gains as TOML or CSV. `several` says what to do with more than one
     controller, where that can be done in one go.
     """
-    if "," in name and not Path(name.partition(".py")[0] + ".py").is_file():
+    code, python, _ = name.partition(".py")
+    if "," in name and not Path(f"{code}.py").is_file():
         names = ",".join(part.strip() for part in name.split(",") if part.strip())
         remedy = several + names if several else "run the command once for each of them"
         raise InputError(f'{option} = "{name}": give one controller here; {remedy}.')
-    if ".py" in name:
-        path = Path(name[: name.index(".py") + 3])
-        if (reason := refusal_of(path)) is not None:
-            raise InputError(f'{option} = "{name}": {path}: {reason}; give path/to/file.py:ClassName.')
-    elif name.lower().endswith((".toml", ".csv")):
-        path = Path(name)
-        if (reason := refusal_of(path)) is not None:
-            raise InputError(f'{option} = "{name}": {reason}; give one that softstart tune has written.')
-    elif name not in controller_names():
+    if python and (reason := refusal_of(path := Path(f"{code}.py"))) is not None:
+        raise InputError(f'{option} = "{name}": {path}: {reason}; give path/to/file.py:ClassName.')
+    if python or name in controller_names():
+        return name
+    if not name.lower().endswith((".toml", ".csv")):
         hint = did_you_mean(name, controller_names())
         raise InputError(f'{option} = "{name}": there is no controller of this name; {hint}')
+    if (reason := refusal_of(Path(name))) is not None:
+        raise InputError(f'{option} = "{name}": {reason}; give one that softstart tune has written.')
     return name
 
 
@@ -287,7 +280,18 @@ def read_params(
     >>> read_params(["torque=15 N*m"])
     {'torque': '15 N*m'}
     """
-    return _pairs(texts, option, f"a key, an equals sign and a value, as {example}")
+    mistakes = Mistakes()
+    found: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        with mistakes.noted(f'{option} "{text}": '):
+            if not (key and equals and value):
+                raise InputError(f"write a key, an equals sign and a value, as {example}.")
+            if key in found:
+                raise InputError(f"{key} is given twice; keep one of the two.")
+            found[key] = value
+    mistakes.settle()
+    return found
 
 
 def read_params_of(
@@ -299,19 +303,17 @@ def read_params_of(
     {'ramp': {'time': '0.2'}}
     """
     names = controller_names() if names is None else names
-    form = "CONTROLLER.key=value, as ramp.time=0.2"
-
-    def check(whole: str) -> None:
-        name, _, key = whole.rpartition(".")
-        if not (name and key):
-            raise InputError(f"write {form}.")
-        if name not in names:
-            raise InputError(f"{name} is not compared here; {did_you_mean(name, names)}")
-
+    mistakes = Mistakes()
     found: dict[str, dict[str, str]] = {}
-    for whole, value in _pairs(texts, option, form, check).items():
+    for whole, value in read_params(texts, option, "ramp.time=0.2").items():
         name, _, key = whole.rpartition(".")
-        found.setdefault(name, {})[key] = value
+        with mistakes.noted(f'{option} "{whole}={value}": '):
+            if not (name and key):
+                raise InputError("write CONTROLLER.key=value, as ramp.time=0.2.")
+            if name not in names:
+                raise InputError(f"{name} is not compared here; {did_you_mean(name, names)}")
+            found.setdefault(name, {})[key] = value
+    mistakes.settle()
     return found
 
 
@@ -322,8 +324,7 @@ def read_changes(settings: Sequence[str]) -> dict[str, Any]:
     {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
     """
     found: dict[str, Any] = {}
-    form = "a key, an equals sign and a value, as load.inertia=0.07"
-    for key, value in _pairs(settings, "--set", form).items():
+    for key, value in read_params(settings, "--set", "load.inertia=0.07").items():
         try:
             found[key] = tomllib.loads(f"value = {value}")["value"]
         except (RecursionError, ValueError):  # no TOML, or an integer of thousands of digits
@@ -331,41 +332,40 @@ def read_changes(settings: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _pairs(
-    texts: Sequence[str], option: str, form: str, check: Callable[[str], None] = lambda key: None
-) -> dict[str, str]:
-    """The `key=value` texts of an option as a mapping; all errors at once, those of `check(key)` too."""
-    mistakes = Mistakes()
-    found: dict[str, str] = {}
-    for text in texts:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        with mistakes.noted(f'{option} "{text}": '):
-            if not (key and equals and value):
-                raise InputError(f"write {form}.")
-            check(key)
-            if key in found:
-                raise InputError(f"{key} is given twice; keep one of the two.")
-            found[key] = value
-    mistakes.settle()
-    return found
-
-
 # the options -----------------------------------------------------------------------------------------
 
 
-def drive_argument(
-    read: Callable[[str, Sequence[str]], Any], needed: bool = False, name: str = "drive",
-    default: str = DEFAULT_DRIVE, names: Callable[[], Iterable[str]] = drive_names,
-) -> Decorator:  # fmt: skip
-    """DRIVE, a TOML file or the name of a shipped one; the command gets `read(name, changes of --set)`."""
-    usual: dict[str, Any] = {} if needed else {"default": default}
-    return click.argument(
-        name,
-        metavar=name.upper() if needed else f"[{name.upper()}]",
-        **usual,
-        type=Reading(lambda given, _, settings: read(given, settings), "settings"),
-        shell_complete=names_or_files(names, ".toml"),
+def file_argument(
+    name: str,
+    read: Callable[[str, Sequence[str]], Any],
+    names: Callable[[], Iterable[str]],
+    default: str | None,
+) -> Decorator:
+    """A TOML file or the name of a shipped one; the command gets `read(name, changes of --set)`."""
+    given: dict[str, Any] = {"metavar": name.upper()}
+    if default is not None:
+        given = {"metavar": f"[{name.upper()}]", "default": default}
+    kind = Reading(lambda given, _, settings: read(given, settings), "settings")
+    return click.argument(name, type=kind, shell_complete=names_or_files(names, ".toml"), **given)
+
+
+def drive_argument(read: Callable[[str, Sequence[str]], Any], needed: bool = False) -> Decorator:
+    """DRIVE, a file or the name of a shipped one."""
+    return file_argument("drive", read, drive_names, None if needed else DEFAULT_DRIVE)
+
+
+def file_options(
+    kind: Any, default: str, library: Library, tables: Iterable[Table], example: str
+) -> Decorator:
+    """The argument for a file of another kind, and --set with the keys of its tables."""
+    name = kind.__name__.lower()
+    argument = file_argument(
+        name, lambda one, settings: kind.load(one, also=read_changes(settings)), library.names, default
     )
+    changes = changes_option(
+        lambda: table_keys(tables), f"Change a parameter of the {name}, for example {example}."
+    )
+    return lambda command: argument(changes(command))
 
 
 def controller_option(
@@ -383,52 +383,38 @@ def controller_option(
 
 
 _allow_code_option = click.option(
-    "--allow-code",
-    is_flag=True,
-    expose_value=False,
+    "--allow-code", is_flag=True, expose_value=False,
     callback=lambda context, _, given: context.meta.update({CODE: given}),
     help="Allow a file of tuned gains to name a Python file, which is then executed.",
-)
+)  # fmt: skip
 
 
 def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
     """--set, for a file with these keys."""
     return click.option(
-        "--set",
-        "settings",
-        metavar="KEY=VALUE",
-        multiple=True,
-        shell_complete=settings_of(keys),
+        "--set", "settings", metavar="KEY=VALUE", multiple=True, shell_complete=settings_of(keys),
         help=f"{text} May be repeated.",
-    )
+    )  # fmt: skip
 
 
 set_option = changes_option(
     drive_keys, "Change a parameter of the drive, for example load.inertia=0.07 or shaft.gap='2 rad'."
 )
 until_option = click.option(
-    "--until",
-    metavar="TIME",
+    "--until", metavar="TIME",
     type=quantity("s", 'the end of the run is a time above 0 s, as 0.5 or "500 ms"', above=0.0),
     help="End of the simulation, for example 0.5 (s) or '500 ms'. Default: one elastic period after the "
     "start time.",
-)
+)  # fmt: skip
 fitted_to_option = click.option(
-    "--fitted-to",
-    metavar="DRIVE",
-    type=Reading(_read_fitted_to),
+    "--fitted-to", metavar="DRIVE", type=Reading(_read_fitted_to),
     shell_complete=names_or_files(drive_names, ".toml"),
     help="Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check "
     "their robustness. --set changes DRIVE only.",
-)
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-
-
 workers_option = click.option(
-    "--workers",
-    metavar="N",
-    type=count(),
-    help="Number of parallel workers. Default: one per processor.",
+    "--workers", metavar="N", type=count(), help="Number of parallel workers. Default: one per processor."
 )
 scheduler_option = click.option(
     "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler."

@@ -1,48 +1,77 @@
-"""Chains in words, tables and figures: vibration, reduction, and starts beside the reduced drive."""
+"""What is shown of a chain: its vibration, its reduction, and starts beside the reduced drive."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.views.drawing import COLOURS, drawing, new_figure
+from softstart.views.drawing import COLOURS, drawing, entitle, head, legend_above, new_figure
+from softstart.views.drives import drive_lines
 from softstart.views.numbers import Table, column_of, number, short
+from softstart.views.sheet import Sheet, records_file, rows_file
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from softstart.chain.elements import Shaft
+    from softstart.chain.model import Chain
     from softstart.chain.two_masses import TwoMassError, Verification
+    from softstart.drive import Drive
     from softstart.vibration import Reduction, Vibration
 
 MOST_MODES = 12
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
+TALLEST, DISC = 150.0, 16.0  # px, of the discs of the scheme: the tallest, and their thickness
+WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; letters of a mass in it
+LINE: dict[str, Any] = {"color": "black", "lw": 1.2}
+
+
+# sheets ----------------------------------------------------------------------------------------------------
+
+
+def vibration_sheet(found: Vibration) -> Sheet:
+    """The natural frequencies of a chain."""
+    masses = [mass.name for mass in found.chain.masses]
+    modes = range(found.Omega.size)
+    frequencies = [[m, float(found.Omega[m]), float(found.frequency[m])] for m in modes]
+    return Sheet(
+        title=f"{found.chain.name}: natural frequencies",
+        lines=drive_lines(found.chain),
+        tables=[frequencies_table(found)],
+        figures={"shapes": lambda: shapes_figure(found)},
+        files={
+            "frequencies.csv": rows_file(("mode", "Omega [rad/s]", "frequency [Hz]"), frequencies),
+            "shapes.csv": rows_file(("mode", *masses), [[m, *found.shape[m].tolist()] for m in modes]),
+        },
+        machine=found.chain,
+    )
+
+
+def reduction_sheet(found: Reduction, off: TwoMassError | None = None) -> Sheet:
+    """Natural frequencies, the two masses beside the chain, and how far their K_dyn is off."""
+    shown = vibration_sheet(found.vibration)
+    starts, files = off.verified if off else (), dict(shown.files)
+    if starts:
+        rows = [{key: value for key, value in one.summary().items() if key != "chain"} for one in starts]
+        files["verified.csv"] = records_file(rows)
+    if (drive := drive_of(found)) is not None:
+        files["drive.toml"] = drive.to_toml()
+    return replace(
+        shown,
+        title=f"{shown.title} and reduction",
+        tables=[*shown.tables, two_masses_table(found), verified_table(starts)],
+        found=[enough(off)] if off else [],
+        notes=[note[0].upper() + note[1:] + "." for note in found.notes],
+        files=files,
+    )
 
 
 # words -----------------------------------------------------------------------------------------------------
-
-
-def conclusion(found: Reduction) -> str:
-    """What came out."""
-    masses, kept = len(found.chain.masses), f"first natural frequency {found.whole.Omega:.6g} rad/s"
-    if masses == 2:
-        return f"The chain has two masses already: {kept}."
-    off = 100.0 * (found.reduced.participation / found.whole.participation - 1.0)
-    said = (
-        f"{masses} masses became 2, with the {kept}, the node and the inertia of the chain; the "
-        f"participation of the motor is {off:+.2g} % off."
-    )
-    if found.forced:
-        said += f" The condition fails: its least ratio is {found.least_ratio:.3g}, below {found.factor:g}."
-    return said
-
-
-def footnotes(found: Reduction) -> list[str]:
-    """What a reader must know."""
-    notes = [note[0].upper() + note[1:] + "." for note in found.notes]
-    if found.chain.assumed:
-        notes.append(f"Assumed: {found.chain.assumed}.")
-    return notes
 
 
 def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification] | None:
@@ -50,86 +79,88 @@ def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification]
 
     Of several the one that differs most on the chain; strategies that are alike are no pair.
     """
-    pairs = []
-    for one, other in combinations(done, 2):
-        gentler, harder = sorted((one, other), key=lambda v: v.chain_k_dyn)
-        if (
-            gentler.chain_k_dyn < (1.0 - ALIKE) * harder.chain_k_dyn
-            and harder.drive.k_dyn < (1.0 - ALIKE) * gentler.drive.k_dyn
-        ):
-            pairs.append((gentler, harder))
+    less = 1.0 - ALIKE
+    ordered = sorted(done, key=lambda one: one.chain_k_dyn)
+    pairs = [
+        (a, b)
+        for a, b in combinations(ordered, 2)
+        if a.chain_k_dyn < less * b.chain_k_dyn and b.drive.k_dyn < less * a.drive.k_dyn
+    ]
     return max(pairs, key=lambda pair: pair[1].chain_k_dyn / pair[0].chain_k_dyn, default=None)
 
 
 def enough(found: TwoMassError) -> str:
     """Whether two masses are enough, and for what they are not, in a few sentences."""
-    limit = f"{100.0 * found.LIMIT:g} %"
+    limit, worst, pair = f"(limit {100.0 * found.LIMIT:g} %)", found.worst, reordered(found.verified)
     if found.enough:
-        torques = f"and under {found.TORQUES} torques over time "
         return (
-            f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} {torques}"
-            f"is off by {_percent(found.error)} at most (limit {limit})."
+            f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} and under "
+            f"{found.TORQUES} torques over time is off by {_percent(found.error)} at most {limit}."
         )
     said = [f"{name} does not start the chain" for name in found.failed]
-    worst = found.worst
     if worst is not None and abs(worst.error) > found.LIMIT:
         said.append(
             f"{worst.name} has K_dyn {worst.chain_k_dyn:.3g} on the chain and {worst.drive.k_dyn:.3g} on them"
         )
     if found.of_torques > found.LIMIT:
         said.append(f"of {found.TORQUES} torques over time the worst is {_percent(found.of_torques)} off")
-    text = f"Two masses are not enough: {'; '.join(said)} (limit {limit})."
-    pair = reordered(found.verified)
-    if pair is not None:
-        gentler, harder = pair
-        text += (
-            f" On the chain {gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain_k_dyn:.3g} "
-            f"and {harder.chain_k_dyn:.3g}), on two masses it is the other way round "
-            f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})."
-        )
-    return f"{text} Choose by the chain: simulate, compare, optimize, tune, sweep, linear and others take it."
+    order = pair and (
+        f" On the chain {pair[0].name} is gentler than {pair[1].name} (K_dyn {pair[0].chain_k_dyn:.3g} and "
+        f"{pair[1].chain_k_dyn:.3g}), on two masses it is the other way round ({pair[0].drive.k_dyn:.3g} and "
+        f"{pair[1].drive.k_dyn:.3g})."
+    )
+    choose = "Choose by the chain: simulate, compare, optimize, tune, sweep, linear and others take it."
+    return f"Two masses are not enough: {'; '.join(said)} {limit}.{order or ''} {choose}"
 
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
-def verdict(found: TwoMassError | None) -> dict[str, Any]:
-    """The same as plain data; nothing where no drive comes out."""
-    if found is None:
-        return {"verified": [], "verdict": None}
-    done = found.verified
-    orders = {
-        "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
-        "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain_k_dyn)],
-        "order_differs": reordered(done) is not None,
-        "said": enough(found),
+def drive_of(found: Reduction) -> Drive | None:
+    """The drive that comes out where the chain has a motor and a target speed."""
+    complete = found.chain.motor is not None and found.chain.target_speed is not None
+    return found.to_drive() if complete else None
+
+
+def summary(found: Reduction, off: TwoMassError | None) -> dict[str, Any]:
+    """All of it as plain data, in SI."""
+    drive, done = drive_of(found), off.verified if off else ()
+    orders = (
+        {}
+        if off is None
+        else {
+            "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
+            "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain_k_dyn)],
+            "order_differs": reordered(done) is not None,
+            "said": enough(off),
+        }
+    )
+    return {
+        **found.summary(),
+        "vibration": found.vibration.summary(),
+        "drive": drive and dict(drive.given()),
+        "verified": [one.summary() for one in done],
+        "verdict": off and off.summary() | orders,
     }
-    return {"verified": [one.summary() for one in done], "verdict": {**found.summary(), **orders}}
 
 
 # tables ----------------------------------------------------------------------------------------------------
 
 
-def tables(found: Reduction, off: TwoMassError | None = None) -> list[Table]:
-    """Frequencies, the two masses beside the chain, and the starts on both."""
-    shown = [frequencies_table(found.vibration), two_masses_table(found)]
-    return shown if off is None or not off.verified else [*shown, verified_table(off.verified)]
-
-
 def frequencies_table(vibration: Vibration) -> Table:
     """The lowest natural frequencies with their nodes."""
-    count = min(vibration.Omega.size, MOST_MODES)
-    nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) for m in range(count)]
-    more = vibration.Omega.size - count
-    title = f"Natural frequencies, gaps closed{f' (and {more} above)' if more else ''}"
+    shown = vibration.nodes[:MOST_MODES]
+    nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in of_mode) or "-" for of_mode in shown]
+    more = len(vibration.nodes) - len(shown)
     of_nodes = "nodes (7.30: behind mass 7, at 0.30 of the twist to mass 8)"
     cells = {
-        of_nodes: [node or "-" for node in nodes],
-        "mode": [str(m) for m in range(count)],
-        "Omega\nrad/s": column_of([float(w) for w in vibration.Omega[:count]], 6),
-        "Hz": column_of([float(f) for f in vibration.frequency[:count]], 5),
+        of_nodes: nodes,
+        "mode": [str(m) for m in range(len(nodes))],
+        "Omega\nrad/s": column_of(vibration.Omega[:MOST_MODES].tolist(), 6),
+        "Hz": column_of(vibration.frequency[:MOST_MODES].tolist(), 5),
     }
+    title = f"Natural frequencies, gaps closed{f' (and {more} above)' if more else ''}"
     return Table.of(title, cells, texts=[of_nodes])
 
 
@@ -151,8 +182,11 @@ def two_masses_table(found: Reduction) -> Table:
         "two masses": [*map(short, two), short(found.J1), short(found.J2)],
         "off\n%": [*(f"{one:+.1f}" if abs(one) > 1e-6 else "0" for one in off), "-", "-"],
     }
-    condition = f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}"
-    return Table.of(f"Two masses ({condition})", cells, texts=["at the motor shaft"])
+    condition = (
+        f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}{', fails' * found.forced}"
+    )
+    title = f"Two masses instead of {len(found.chain.masses)} ({condition})"
+    return Table.of(title, cells, texts=["at the motor shaft"])
 
 
 def verified_table(done: Sequence[Verification]) -> Table:
@@ -166,64 +200,115 @@ def verified_table(done: Sequence[Verification]) -> Table:
         "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
         "start time\nchain s": column_of([one.chain.start_time for one in done], 4),
     }
-    title = "Designed on the two masses, verified on the chain"
-    return Table.of(title, cells, texts=["strategy", "largest in"])
+    return Table.of("Designed on the two masses, verified on the chain", cells, ["strategy", "largest in"])
 
 
-def files(found: Reduction, off: TwoMassError | None) -> dict[str, tuple[Sequence[str], list[list[Any]]]]:
-    """The tables of --out with all digits: headings and rows by file name."""
-    vibration, names = found.vibration, [mass.name for mass in found.chain.masses]
-    modes = range(vibration.Omega.size)
-    frequencies = [[m, float(vibration.Omega[m]), float(vibration.frequency[m])] for m in modes]
-    made: dict[str, tuple[Sequence[str], list[list[Any]]]] = {
-        "frequencies.csv": (("mode", "Omega [rad/s]", "frequency [Hz]"), frequencies),
-        "shapes.csv": (("mode", *names), [[m, *vibration.shape[m].tolist()] for m in modes]),
-    }
-    if off is not None and off.verified:
-        rows = [{k: v for k, v in one.summary().items() if k != "chain"} for one in off.verified]
-        made["verified.csv"] = (list(rows[0]), [list(row.values()) for row in rows])
-    return made
-
-
-# figures ---------------------------------------------------------------------------------------------------
+# figure ----------------------------------------------------------------------------------------------------
 
 
 def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
-    """The lowest elastic shapes along the compliance of the chain, with their nodes; grey where gaps are."""
-    arrays = vibration.chain.at_motor_shaft()
-    place = np.concatenate([[0.0], np.cumsum(1.0 / arrays.c)])
-    place = place / place[-1]
-    shown = min(modes, vibration.Omega.size - 1)
+    """The chain at the motor shaft to scale, and below it the lowest elastic shapes with their nodes.
+
+    The height of a disc goes with the fourth root of its inertia, as that of steel discs of one thickness;
+    the length of a spring with its compliance, as in the centre-of-mass analogy of [R]; the opening of a gap
+    with its angle. Without `modes` the chain alone.
+    """
+    chain = vibration.chain
     with drawing():
-        figure, axes = new_figure(size=(8.0, 4.2))
-        for k in np.flatnonzero(arrays.gap > 0.0):
-            axes.axvspan(place[k], place[k + 1], color="#E8ECEF", lw=0, zorder=0)
-        axes.axhline(0.0, color="black", lw=0.8)
-        for m in range(1, shown + 1):
-            colour = COLOURS[(m - 1) % len(COLOURS)]
-            label = f"mode {m}: {vibration.frequency[m]:.4g} Hz"
-            axes.plot(place, vibration.shape[m], "o-", ms=4, color=colour, label=label)
-            nodes = [
-                place[n.shaft] + n.share * (place[n.shaft + 1] - place[n.shaft]) for n in vibration.nodes[m]
-            ]
-            axes.plot(nodes, np.zeros(len(nodes)), "o", ms=8, mfc="white", mec=colour, mew=1.6, zorder=4)
-        _name_masses(axes, place, [mass.name for mass in vibration.chain.masses])
-        axes.set_ylabel("amplitude at the motor shaft")
-        axes.set_title(f"{vibration.chain.name}: shapes with the gaps closed")
-        axes.legend()
+        figure, panels = new_figure(1 + bool(modes), 1, squeeze=False, sharex=True)
+        middles = _scheme(panels[0, 0], chain)
+        width = min(max(8.0, (middles[-1] + 190.0) / 85.0), WIDEST)
+        figure.set_size_inches(width, 2.8 + 2.4 * bool(modes))
+        for axes in panels[1:, 0]:
+            axes.axhline(0.0, color="black", lw=0.8)
+            for m in range(1, min(modes, vibration.Omega.size - 1) + 1):
+                colour, label = COLOURS[(m - 1) % len(COLOURS)], f"mode {m}: {vibration.frequency[m]:.4g} Hz"
+                axes.plot(middles, vibration.shape[m], "o-", ms=4, color=colour, label=label)
+                nodes = [n.shaft + n.share for n in vibration.nodes[m]]
+                at = np.interp(nodes, range(len(middles)), middles)
+                axes.plot(at, 0.0 * at, "o", ms=8, mfc="white", mec=colour, mew=1.6, zorder=4)
+            axes.grid(False)
+            axes.tick_params("x", length=0, labelbottom=False)
+            head(axes, "shapes with the gaps closed; circles: nodes", "amplitude at the motor shaft")
+            legend_above(axes, modes)
+        panels[-1, 0].set_xlabel("at the motor shaft: inertias in kg m2, stiffnesses in N m/rad, gaps in rad")
+        title = [chain.name, f"assumed: {chain.assumed}"] if chain.assumed else [chain.name]
+        entitle(figure, "\n".join(fill(one, 115, max_lines=2, placeholder=" ...") for one in title))
     return figure
 
 
-def _name_masses(axes: Any, place: np.ndarray[Any, Any], names: list[str]) -> None:
-    """Names below the axis; masses at nearly one place share a tick."""
-    ticks: list[float] = []
-    labels: list[list[str]] = []
-    for x, name in zip(place.tolist(), names, strict=True):
-        if ticks and x - ticks[-1] < 0.05:
-            labels[-1].append(name)
-        else:
-            ticks.append(x)
-            labels.append([name])
-    texts = [group[0] if len(group) == 1 else f"{group[0]} ... {group[-1]}" for group in labels]
-    axes.set_xticks(ticks, texts, rotation=30, ha="right")
-    axes.set_xlabel("place along the chain, by compliance (grey: shafts with a gap)")
+def _scheme(axes: Axes, chain: Chain) -> list[float]:
+    """Draw the row of discs and shafts; where the discs are. Lengths are those of a screen, in pixels."""
+    arrays = chain.at_motor_shaft()
+    grounded = np.where(np.isinf(arrays.J), arrays.moving_J.max(), arrays.moving_J)
+    tall = TALLEST * (grounded / grounded.max()) ** 0.25
+    springs = 44.0 + 420.0 / arrays.c / (1.0 / arrays.c).sum()
+    openings = 3.0 + 90.0 * arrays.gap / max(arrays.gap.sum(), 1e-300)
+    middles = [0.0]
+    for k, mass in enumerate(chain.masses):
+        x, name = (
+            middles[k],
+            mass.name if len(mass.name) <= LONGEST_NAME else f"{mass.name[:LONGEST_NAME]}...",
+        )
+        axes.bar(x, tall[k], DISC, bottom=-0.5 * tall[k], color="#B9C6D3", edgecolor="black")
+        axes.text(x, 0.5 * tall[k] + 6.0, name, rotation=35, rotation_mode="anchor", parse_math=False)
+        below = [short_of(arrays.J[k])]
+        below += ["motor"] if k == arrays.motor and chain.motor is not None else []
+        below += [f"Mc {short_of(arrays.Mc[k])} N m"] if arrays.Mc[k] else []
+        axes.text(x, -0.5 * TALLEST - 6.0, "\n".join(below), ha="center", va="top")
+        if k < len(chain.shafts):
+            shaft, gap = chain.shafts[k], bool(arrays.gap[k])
+            says = ["rigid" if arrays.rigid[k] else short_of(arrays.c[k])]
+            says += [f"gap {short_of(arrays.gap[k])}"] if gap else []
+            says += [f"{short_of(shaft.ratio)} : 1"] if shaft.ratio != 1.0 else []
+            says += [f"efficiency {shaft.efficiency:.3g}"] if shaft.efficiency < 1.0 else []
+            start = x + 0.5 * DISC
+            end = _shaft(axes, start, springs[k], openings[k] if gap else 0.0, shaft, bool(arrays.rigid[k]))
+            axes.text(0.5 * (start + end), -18.0, "\n".join(says), ha="center", va="top", fontsize=7.5)
+            middles.append(end + 0.5 * DISC)
+    axes.set_ylim(-0.5 * TALLEST - 55.0, 0.5 * TALLEST + 75.0)
+    axes.set_xlim(-50.0, middles[-1] + 140.0)
+    axes.grid(False)
+    axes.set_yticks([])
+    axes.tick_params("x", length=0, labelbottom=False)
+    axes.spines[:].set_visible(False)
+    return middles
+
+
+def _shaft(axes: Axes, x: float, length: float, opening: float, shaft: Shaft, rigid: bool) -> float:
+    """Draw spring, gap and gear from x on; where they end."""
+
+    def gear(x: float) -> float:
+        if shaft.ratio == 1.0 and shaft.efficiency == 1.0:
+            return x
+        first = 20.0 / (1.0 + min(max(shaft.ratio, 0.25), 4.0))  # wheels in mesh, seen from the side
+        axes.plot([x, x + 27.0], [0.0, 0.0], **LINE)
+        axes.vlines([x + 10.0, x + 17.0], [-first, first - 20.0], [first, 20.0 - first], COLOURS[0], lw=5)
+        return x + 27.0
+
+    x = gear(x) if shaft.side == "after" else x
+    end = x + length
+    coil: Any = [] if rigid else np.linspace(x + 6.0, end - 6.0, 4 * max(3, round(length / 14.0)) + 1)[1::2]
+    teeth = np.resize([7.0, -7.0], len(coil))
+    axes.plot(
+        [x, x + 6.0, *coil, end - 6.0, end],
+        [0.0, 0.0, *teeth, 0.0, 0.0],
+        **LINE | {"lw": 4.0 if rigid else 1.2},
+    )
+    if opening:  # a claw of the shaft behind between two stops of the shaft before
+        right, claw, x = end + opening + 5.0, end + 0.5 * (opening + 5.0), end + opening + 11.0
+        axes.plot([end, end, right, right], [-5.0, 14.0, 14.0, -5.0], color=COLOURS[1], lw=1.5)
+        axes.plot([claw, claw, x, x], [0.0, -12.0, -12.0, 0.0], **LINE)
+        axes.plot([claw, claw], [-5.0, 10.0], **LINE | {"lw": 4.0})
+        end = x
+    return gear(end) if shaft.side == "before" else end
+
+
+def short_of(value: float) -> str:
+    """A number of three digits for a label.
+
+    >>> short_of(20100.0), short_of(0.0301)
+    ('20.1k', '0.0301')
+    """
+    size, letter = next((one for one in ((1e6, "M"), (1e3, "k")) if abs(value) >= one[0]), (1.0, ""))
+    return f"{value / size:.3g}{letter}"

@@ -36,11 +36,12 @@ class PaperR(Study):
         """All of it; `out` receives the chain with its assumed values and its scheme."""
         if out is not None:
             from softstart.input.files import write_whole
-            from softstart.views.chain_schemes import scheme_svg
+            from softstart.vibration import natural_vibration
+            from softstart.views.drawing import save_figure
 
             chain = free.tractor()
             write_whole(out / "tractor-like.toml", lambda stream: stream.write(chain.to_toml()))
-            write_whole(out / "tractor-like.svg", lambda stream: stream.write(scheme_svg(chain)))
+            save_figure(natural_vibration(chain).plot(), out, "tractor-like")
         progress("reducing four masses to two")
         errors = four_to_two.error_map()
         progress("letting the tractor-like chain swing")

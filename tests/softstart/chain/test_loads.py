@@ -18,7 +18,6 @@ from softstart.errors import InputError
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.problem import Problem
 from softstart.vibration import natural_vibration, reduce_chain
-from softstart.views.chain_schemes import scheme_svg
 from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
 
 SEEDS = settings(
@@ -186,7 +185,7 @@ def test_a_file_with_all_of_them():
 def test_ground_is_drawn_and_the_rest_is_said():
     """The scheme draws it; what has no place for it, or for load curves, says so."""
     chain = Chain.from_toml(FILE)
-    assert "nan" not in scheme_svg(chain)
+    natural_vibration(chain).plot().draw_without_rendering()
     notes = " ".join(reduce_chain(chain, force=True).notes)
     assert "stays at rest" in notes
     assert "load curves of mass 2" in notes

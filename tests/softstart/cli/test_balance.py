@@ -32,7 +32,14 @@ def test_json_is_the_summary(as_json):
 
 def test_the_tables_are_shown_and_fit(table):
     flat = table("balance", "--speed", "4500rpm")
-    for words in ("VAZ-11113", "bore 82 mm*", "* assumed", "fixed-h-e", "constant speed", "inertia-only"):
+    for words in (
+        "VAZ-11113",
+        "bore 82 mm",
+        "Assumed: cylinders.bore",
+        "fixed-h-e",
+        "constant speed",
+        "inertia-only",
+    ):
         assert words in flat
 
 
@@ -105,16 +112,27 @@ lowest_speed = "1000 rpm"
 highest_speed = "6000 rpm"
 """)
     out = done("balance", "three.toml", "--out", "three")
-    assert "takes the first-order couple at 6000 rpm from 1094 to 547 N m" in " ".join(out.split())
+    assert "One shaft against the crank with two opposite imbalances" in " ".join(out.split())
     found = as_json("balance", "three.toml")
     couples = {row["order"]: row["couple"] for row in found["orders"]}
     assert couples[1.0] == pytest.approx(1094.0, abs=0.5)
+    assert [round(one["at_tuning_speed"]["first_order_couple"]) for one in found["designs"]] == [1094, 547, 0]
     assert couples[2.0] == pytest.approx(324.0 * (1 + (40 / 135) ** 2 / 4), rel=2e-3)  # A_2, not lambda alone
     assert found["indicated_work"] is None
     told = as_json("balance", "three.toml", "--set", "cylinders.spacing=0")
     assert told["free_couple"] is told["orders"][0]["couple"] is told["designs"][0]["largest_couple"] is None
     assert "forces of the cylinders cancel one another: no balancer" in told["note"]
     assert not (place / "three" / "torque.csv").exists()
+
+
+def test_an_engine_without_gas_data_gets_its_balancer_and_figures(place, done):
+    text = Engine.load("vaz-11113").to_toml()
+    text = text[: text.index("assumed")] + text[text.index("[cylinders]") : text.index("[cycle]")]
+    (place / "two.toml").write_text(
+        text + '[operation]\nlowest_speed = "1000 rpm"\nhighest_speed = "5000 rpm"\n'
+    )
+    assert "Two shafts of 0.02414 kg m together" in done("balance", "two.toml", "--out", "two")
+    assert {"residual.svg", "forces.svg"} <= {path.name for path in (place / "two").iterdir()}
 
 
 ONE_SENTENCE = {

@@ -189,7 +189,7 @@ def test_interrupted_between_files_leaves_whole_files_only(run, place, monkeypat
         written.extend(folder.iterdir())
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("softstart.views.starts.write_start", lambda run_, folder, *_: stop(folder))
+    monkeypatch.setattr("softstart.views.sheet.export", lambda shown, folder, command: stop(folder))
     code, out, err = run("simulate", "good.toml", "--controller", "direct", "--out", "results")
     assert (code, out) == (130, "")
     assert "interrupted" in err

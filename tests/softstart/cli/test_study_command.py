@@ -100,8 +100,8 @@ def test_files(run, place, as_json):
     assert code == 0
     names = {path.name for path in (place / "results").iterdir()}
     listed = {one["name"]: one["files"] for one in as_json("study", "--list")["studies"]}
-    assert set(listed["example"]) == {name for name in names if not name.endswith(".csv")}
-    assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv"}
+    assert set(listed["example"]) == {name for name in names if not name.endswith((".csv", ".md"))}
+    assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv", "report.md"}
     table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")
     assert table == '"gap, rad",K_dyn,note\n0.5,3.1179,[G]\n2.0,,\n'
     assert "Written to results" in out
