@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import date, time
 from decimal import Decimal
 from functools import lru_cache
@@ -125,8 +125,10 @@ metric_horsepower = 735.49875 * watt = PS
 """
 
 # Spellings that are offered for an unknown one.
-_USUAL = """m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf
-lbf J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA"""
+_USUAL = """
+m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf
+J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
+"""
 
 # Factors of what most drive files write; pint, which says the same, takes a fifth of a second to import.
 ORDINARY = {
@@ -160,7 +162,9 @@ _WITHOUT_DOTS = re.compile(
 )
 # What pint may see: names, "1/" and one-digit powers. Its own grammar evaluates whatever stands there.
 _NAME = re.compile(r"(?:[^\W\d]|°)+")
-_WRITTEN = re.compile(rf"(?:(?:{_NAME.pattern}|\))(?:\s*(?:\*\*|\^)\s*[+-]?[1-9](?![\w.]))?|1(?=\s*/)|[\s*/(])+")
+_WRITTEN = re.compile(
+    rf"(?:(?:{_NAME.pattern}|\))(?:\s*(?:\*\*|\^)\s*[+-]?[1-9](?![\w.]))?|1(?=\s*/)|[\s*/(])+"
+)
 LONGEST = 80  # characters of a unit: products of a thousand factors are no unit, and take time
 
 
@@ -280,6 +284,8 @@ def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
         value = np.asarray(value)
     if not isinstance(value, list | tuple | np.ndarray):
         return _single(value, unit, infinite)
+    if isinstance(value, list | tuple) and all(type(one) is float for one in value):
+        value = np.array(value)
     if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
         numbers = value.astype(np.float64)
         if np.all(np.isfinite(numbers)) and numbers.size:
@@ -406,7 +412,9 @@ def _single(value: object, unit: str, infinite: bool) -> float:
         raise RefusedError("the rows of a list must all have the same length")
     if not isinstance(value, Real | Decimal):
         kind = type(value).__name__
-        a = {"dict": "a table", "complex": "a complex number"}.get(kind, f"a{'n' * (kind[0] in 'aeiou')} {kind}")
+        a = {"dict": "a table", "complex": "a complex number"}.get(
+            kind, f"a{'n' * (kind[0] in 'aeiou')} {kind}"
+        )
         raise RefusedError(f"{a} is no quantity; {_remedy(unit)}")
     try:
         return _checked(float(value), unit, infinite)

@@ -37,9 +37,9 @@ from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, librar
 from softstart.drive.checks import wrong_units
 from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, made, read_document, read_table
+from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import ABSENT, read_text, refusal_of
-from softstart.input.parameters import Wording
+from softstart.input.parameters import Wording, read_values, sentences_of
 from softstart.quantities import RefusedError, nearest, show
 
 BRANCHES = (
@@ -134,16 +134,16 @@ class Chain(Words):
         numbered = enumerate(masses, start=1)
         masses = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in numbered)
         shafts = tuple(shafts)
-        if target_speed is not None:
-            target_speed = read_table({"target_speed": target_speed}, START)["target_speed"]
-        elif motor is not None:
+        if target_speed is None and motor is not None:
             target_speed = motor.rated_speed
+        start = {"target_speed": target_speed, "position": position}
+        start, mistakes = read_values(start, START.by_key, Wording())
         if masses:
             moving = [mass.name for mass in masses if not math.isinf(mass.inertia)] or [masses[0].name]
             load_mass = load_mass or moving[-1]
             if motor is not None and not motor.mass:
                 motor = motor.replace(mass=moving[0])
-        wrong = _mistakes(masses, shafts, motor, load_mass)
+        wrong = sentences_of(mistakes) + _mistakes(masses, shafts, motor, load_mass)
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
@@ -152,8 +152,8 @@ class Chain(Words):
         put(self, "shafts", shafts)
         put(self, "motor", motor)
         put(self, "load_mass", load_mass)
-        put(self, "target_speed", target_speed)
-        put(self, "position", read_table({"position": position}, START)["position"])
+        put(self, "target_speed", start["target_speed"])
+        put(self, "position", start["position"])
         put(self, "name", name)
         put(self, "source", source)
         put(self, "assumed", assumed)

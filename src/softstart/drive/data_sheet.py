@@ -227,7 +227,9 @@ class DataSheet(ParameterSet):
         wording = Wording(where, style="toml")
         document = parsed(text, wording, cls.WHAT, cls.TABLES)
         if "start" in document and not cls.describes(document):
-            raise InputError(wording.whole("this is the file of a drive already; softstart compare takes it"))
+            raise InputError(
+                wording.sentence("", "this is the file of a drive already; softstart compare takes it")
+            )
         return cls._from_document(document, where, also)
 
     @classmethod
@@ -287,7 +289,8 @@ class DataSheet(ParameterSet):
         given, of = vars(self)["_given"], self.PARAMETERS
         by_ratio = "starting_torque" not in given or "maximum_ratio" in given
         if by_ratio and not {"rated_power", "rated_torque"} & given:
-            yield wording.missing(of["rated_power"], f", or {wording.label(of['rated_torque'])} in its place")
+            other = wording.label(of["rated_torque"])
+            yield wording.missing(of["rated_power"], f", or {other} in its place").sentence
 
     def contradictions(self) -> Iterator[str]:
         """What is missing for this machine, what contradicts something else, and what stands alone."""

@@ -195,7 +195,7 @@ def contradicting_limits(
             "starts_per_hour", f"so many starts of {each} take more than an hour; lower one of the two"
         )
     if values.get("required_life") is not None and starts is None:
-        yield wording.missing(parameters["starts_per_hour"])
+        yield wording.missing(parameters["starts_per_hour"]).sentence
     yield from _contradicting_curve(values, name, wrong)
 
 

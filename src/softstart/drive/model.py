@@ -90,10 +90,9 @@ class Drive(ParameterSet):
     WHAT: ClassVar[str] = "a drive"
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
-    SEVERAL: ClassVar[Mapping[str, str]] = {
-        "": "a drive has one value; for several starts use sweep",
-        "python": "a drive has one value; for several starts write records(drive, {name}={value})",
-    }
+    SEVERAL: ClassVar[str] = (
+        "a drive has one value; for several use sweep, in Python records(drive, {name}=...)"
+    )
     SHEET: ClassVar[Any]  # `DataSheet`, which knows drives
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")

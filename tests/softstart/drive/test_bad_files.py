@@ -226,4 +226,4 @@ def test_a_name_has_room_above_a_figure(sentences):
     crane = Drive.load("crane-4amtkf")
     assert crane.replace(name="x" * 120).name == "x" * 120
     (sentence,) = sentences(lambda: crane.replace(name="x" * 121))
-    assert "121 letters, and at most 120" in sentence
+    assert "121 characters, and at most 120" in sentence
