@@ -37,7 +37,8 @@ def read_profile(path: Path) -> TorqueProfile:
         raise InputError(f"{where}: {refusal.reason}.") from None
     if suffix == ".toml":
         return _from_toml(text, where)
-    return _profile(where, *read_columns(text, where, (TIME, TORQUE)).values)
+    time, torque = read_columns(text, where, (TIME, TORQUE)).values
+    return _profile(where, time, torque)
 
 
 def _profile(where: str, time: Vector, torque: Vector, after: TorqueProfile | None = None) -> TorqueProfile:

@@ -124,7 +124,7 @@ def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -
         ]
         if len(here) > 1:
             raise RefusedError(f"it names {one.names[0]} twice; keep one of the two columns")
-        found |= {k: i for i in here}
+        found.update((k, i) for i in here)
     if headed == "any" and len(heading) == len(wanted):  # other names, in the order wanted
         free = iter(sorted(set(range(len(wanted))) - set(found.values())))
         found |= {k: next(free) for k in range(len(wanted)) if k not in found}

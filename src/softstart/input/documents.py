@@ -105,9 +105,7 @@ def read_document(
             for i, row in enumerate(content or [], start=1):
                 numbered = replace(wording, row=f"[{table.name}] {i}, ")
                 strays = [
-                    _misspelt(
-                        f"{numbered.row}{key} = {wording.show(value)}", key, table, tables, what, wording
-                    )
+                    _unknown(numbered.row, key, value, table, tables, what, wording)
                     for key, value in row.items()
                     if key not in table.by_key
                 ]
@@ -200,12 +198,10 @@ def changed(
             yield f"{path}: {what} file has no such key; {remedy}"
             continue
         table, p = paths[plain]
-        place = document.setdefault(table.name, {}) if table.name else document
+        place: Any = document.setdefault(table.name, {}) if table.name else document
         if table.many:
-            count, row = (
-                len(place) if isinstance(place, list) else 0,
-                path[len(table.name) + 1 : -len(p.key) - 2],
-            )
+            count = len(place) if isinstance(place, list) else 0
+            row = path[len(table.name) + 1 : -len(p.key) - 2]
             if not row.isdecimal() or not 1 <= int(row) <= count:
                 yield f"{path}: write {table.name}[N].{p.key} with N from 1 to {count}."
                 continue
@@ -219,123 +215,83 @@ def placed(
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """What stands in each table, by its name, and every key or table that stands where it should not.
 
-    A misplaced value is returned as if it stood in its table, so that its own mistakes are found in the same
-    go. The keys within the rows of [[tables]] are not looked at.
+    The keys within the rows of [[tables]] are not looked at.
     """
-    reader = _Reader(tables, what, wording)
-    reader.take(reader.named[""], document)
-    for table in tables:
-        rows = reader.given.setdefault(table.name, []) if table.many else None
-        if rows is not None and len(rows) < table.least:
-            needed = f"{what} file needs at least {table.least}, and there are {len(rows)}"
-            reader.note(table.bracket, f"{needed}; add {table.bracket} tables")
-    for parameter, value in reader.misplaced:
-        reader.given.setdefault(parameter.table, {}).setdefault(parameter.key, value)
-    return reader.given, reader.mistakes
+    named = {"": Table("", ())} | {table.name: table for table in tables}
+    everywhere = [p for table in tables for p in table.parameters]
+    former = {p.formerly: p for p in everywhere if p.formerly}
+    given: dict[str, Any] = {}
+    renamed: list[tuple[Parameter, object]] = []
+    mistakes: list[Mistake] = []
 
+    def note(subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
+        mistakes.append(Mistake(wording.sentence(subject, reason), (), tuple(p.path for p in meant)))
 
-class _Reader:
-    """Takes a document table by table."""
-
-    def __init__(self, tables: Sequence[Table], what: str, wording: Wording) -> None:
-        self.tables, self.what, self.wording = tables, what, wording
-        self.named = {"": Table("", ())} | {table.name: table for table in tables}
-        self.everywhere = [p for table in tables for p in table.parameters]
-        self.former = {p.formerly: p for p in self.everywhere if p.formerly}
-        self.given: dict[str, Any] = {}
-        self.misplaced: list[tuple[Parameter, object]] = []
-        self.mistakes: list[Mistake] = []
-
-    def take(self, table: Table, content: object) -> None:
-        """The keys of a table, and the tables in it."""
+    def take(table: Table, content: object) -> None:
         name = table.name
         if table.many:
             rows = isinstance(content, list) and all(isinstance(row, dict) for row in content)
-            self.given[name] = content if rows else None
+            given[name] = content if rows else None
             if not rows:
-                self.note(f"[{name}]", f"there may be several; write {table.bracket} before each")
+                note(f"[{name}]", f"there may be several; write {table.bracket} before each")
             return
         if not isinstance(content, dict):
             form = "one table, not a list of tables" if isinstance(content, list) else "a table"
             reason = f"{name} is {form}; write [{name}] on a line of its own and its keys below"
-            self.note(f"{name} = {self.wording.show(content)}", reason, table.parameters)
+            note(f"{name} = {wording.show(content)}", reason, table.parameters)
             return
-        own = self.given.setdefault(name, {})
+        own = given.setdefault(name, {})
         for key, value in content.items():
             path = f"{name}.{key}" if name else key
-            if path in self.named:
-                self.take(self.named[path], value)
+            if path in named:
+                take(named[path], value)
             elif key in table.by_key:
                 own[key] = value
-            elif path in self.former:
-                self.misplaced.append((self.former[path], value))
-            elif len(self.mistakes) > MOST:
-                self.note(key, "there is no such key")  # in short: it is counted, not shown
-            elif not name and isinstance(value, dict) and not any(p.key == key for p in self.everywhere):
-                self._unknown_table(key, value)
+            elif path in former:
+                renamed.append((former[path], value))
+            elif len(mistakes) > MOST:
+                note(key, "there is no such key")  # in short: it is counted, not shown
+            elif not name and isinstance(value, dict) and not any(p.key == key for p in everywhere):
+                meant = nearest(key, [one for one in named if one])
+                listed = ", ".join(one.bracket for one in tables if one.name)
+                remedy = f"did you mean {named[meant].bracket}?" if meant else f"its tables are {listed}"
+                note(f"[{key}]", f"{what} has no such table; {remedy}")
+                if meant:
+                    take(named[meant], value)
             else:
-                self._stray(f"[{name}] " if name else "", key, value, table)
+                place = f"[{name}] " if name else ""
+                mistakes.append(_unknown(place, key, value, table, tables, what, wording))
 
-    def _unknown_table(self, key: str, value: dict[str, object]) -> None:
-        names = [name for name in self.named if name]
-        near = nearest(key, names)
-        meant = self.named[near] if near else None
-        listed = ", ".join(f"[{name}]" for name in names)
-        remedy = f"did you mean [{meant.name}]?" if meant else f"its tables are {listed}"
-        self.note(f"[{key}]", f"{self.what} has no such table; {remedy}")
-        if meant is None or meant.many:
-            return
-        for inner, content in value.items():
-            if inner in meant.by_key:
-                self.misplaced.append((meant.by_key[inner], content))
-            else:
-                self._stray(f"[{key}] ", inner, content, meant)
-
-    def _stray(self, place: str, key: str, value: object, table: Table) -> None:
-        """A key that this table does not have: another table's, or one that no table has."""
-        subject = f"{place}{key} = {self.wording.show(value)}"
-        flat = [p for p in self.everywhere if p.name == key != p.key]
-        homes = flat or [p for p in self.everywhere if p.key == key]
-        if not homes:
-            self.mistakes.append(_misspelt(subject, key, table, self.tables, self.what, self.wording))
-            return
-        below = [
-            f"below {self.named[p.table].bracket}" if p.table else "above the first table" for p in homes
-        ]
-        reason = (
-            f"in a file it is written {flat[0].key}, {below[0]}"
-            if flat
-            else f"{key} belongs {' or '.join(below)}"
-        )
-        if len(homes) == 1 and not isinstance(value, dict) and not self.named[homes[0].table].many:
-            self.misplaced.append((homes[0], value))
-        self.note(subject, reason, homes[:1] * (len(homes) == 1))
-
-    def note(self, subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
-        """A mistake; those that it leaves out are not called missing."""
-        self.mistakes.append(
-            Mistake(self.wording.sentence(subject, reason), (), tuple(p.path for p in meant))
-        )
+    take(named[""], document)
+    for table in tables:
+        rows = given.setdefault(table.name, []) if table.many else None
+        if rows is not None and len(rows) < table.least:
+            needed = f"{what} file needs at least {table.least}, and there are {len(rows)}"
+            note(table.bracket, f"{needed}; add {table.bracket} tables")
+    for p, value in renamed:
+        own = given.setdefault(p.table, {})
+        if p.key in own:
+            reason = f"it is now {p.place}, which is given as well; leave one out"
+            note(f"{p.formerly} = {wording.show(value)}", reason)
+        own.setdefault(p.key, value)
+    return given, mistakes
 
 
-def _misspelt(
-    subject: str, key: str, table: Table, tables: Iterable[Table], what: str, wording: Wording
+def _unknown(
+    place: str, key: str, value: object, table: Table, tables: Sequence[Table], what: str, wording: Wording
 ) -> Mistake:
-    """A key that no table has: the one that was probably meant."""
-    everywhere = [p for one in tables for p in one.parameters]
-    meant = [p for p in everywhere if p.symbol == key] or [
-        *meant_by(key.removeprefix(f"{table.name}_"), table.parameters),
-        *meant_by(key, everywhere),
+    """That a table has no such key, and those that were probably meant, in this table or in others."""
+    meant = meant_by(key.removeprefix(f"{table.name}_"), table.parameters)
+    meant = meant or meant_by(key, [p for one in tables for p in one.parameters])
+    names = [
+        p.key if p.table == table.name else p.place if p.table else f"{p.key} above the first table"
+        for p in meant
     ]
-    where = f"[{table.name}]" if table.name else f"{what} file"
-    if not meant:
-        names = ", ".join(
-            [*table.by_key, *(f"[{one.name}]" for one in tables if one.name and not table.name)]
-        )
-        return Mistake(wording.sentence(subject, f"{where} has no key {key}; it has {names}"))
-    name = meant[0].key if meant[0].table == table.name else meant[0].place
-    sentence = wording.sentence(subject, f"{where} has no key {key}; did you mean {name}?")
-    return Mistake(sentence, (), (meant[0].path,))
+    listed = [*table.by_key, *(one.bracket for one in tables if one.name and not table.name)]
+    remedy = f"did you mean {' or '.join(names)}?" if meant else f"it has {', '.join(listed)}"
+    reason = f"{f'[{table.name}]' if table.name else f'{what} file'} has no key {key}; {remedy}"
+    sentence = wording.sentence(f"{place}{key} = {wording.show(value)}", reason)
+    return Mistake(sentence, (), tuple(p.path for p in meant) if len(meant) == 1 else ())
 
 
 # ---- writing --------------------------------------------------------------------------------------------

@@ -239,18 +239,11 @@ class ParameterSet:
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuilt, (type(self), self.given())
-
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"{self.WHAT} cannot be changed; make another with replace({name}=...)")
 
     def __delattr__(self, name: str) -> NoReturn:
         raise AttributeError(f"{self.WHAT} cannot be changed")
-
-
-def _rebuilt(cls: type[ParameterSet], given: dict[str, Any]) -> ParameterSet:
-    return cls(**given)
 
 
 def _argument(p: Parameter) -> inspect.Parameter:

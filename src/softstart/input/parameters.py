@@ -287,7 +287,7 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
         _refuse(number, LIMITS[p.limit](number), f"the {p.meaning} must be {p.limit}")
     size = f"its size in {p.unit}" if p.unit != "1" else "it"
     least = LEAST if p.limit == "above 0" else 0.0
-    sizes = abs(number)
+    sizes: Any = abs(number)
     within = (sizes >= least) & ((sizes <= MOST) | (sizes == math.inf))
     _refuse(number, within, f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit")
     if isinstance(number, np.ndarray):
