@@ -558,7 +558,7 @@ def _as_json(value: object) -> str:
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9,]*")
 _POINT = re.compile(r"[0-9]\.|\.[0-9]")
-_DECIMAL_COMMA = re.compile(r"(?<![\w.])(?<!e[+-])([0-9]+),([0-9]+)")
+_DECIMAL_COMMA = re.compile(r"((?:^|,)\s*[+-]?[0-9]+),([0-9]+)")  # a whole number, then a comma
 # 1.000,5 and 12.345,6 but not 0.125,2 or 1.125,2.5: a point of thousands before what may be a decimal comma
 _THOUSANDS_POINT = re.compile(r"(?<![0-9.])[1-9][0-9]{0,2}(?:\.[0-9]{3})+,[0-9]+(?![0-9]*\.[0-9])")
 

@@ -281,8 +281,8 @@ def _unknown(
     place: str, key: str, value: object, table: Table, tables: Sequence[Table], what: str, wording: Wording
 ) -> Mistake:
     """That a table has no such key, and those that were probably meant, in this table or in others."""
-    meant = meant_by(key.removeprefix(f"{table.name}_"), table.parameters)
-    meant = meant or meant_by(key, [p for one in tables for p in one.parameters])
+    everywhere = [p for one in tables for p in one.parameters]
+    meant = meant_by(key.removeprefix(f"{table.name}_"), everywhere, table.parameters)
     names = [
         p.key if p.table == table.name else p.place if p.table else f"{p.key} above the first table"
         for p in meant

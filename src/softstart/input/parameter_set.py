@@ -142,7 +142,8 @@ class ParameterSet:
         for name in (
             () if given.keys() <= parameters.keys() else [one for one in given if one not in parameters]
         ):
-            meant = meant_by(name, parameters.values(), given)
+            free = [p for p in parameters.values() if p.name not in given]
+            meant = meant_by(name, parameters.values(), free)
             names = " or ".join(p.name for p in meant)
             remedy = f"did you mean {names}?" if meant else f"the names are {', '.join(parameters)}"
             reason = f"{self.WHAT} has no parameter {show(name)}; {remedy}"

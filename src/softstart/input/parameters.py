@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -177,22 +177,21 @@ def sentences_of(mistakes: Iterable[Mistake]) -> list[str]:
     return list(dict.fromkeys(m.sentence for m in mistakes if not misspelt.intersection(m.missing)))
 
 
-def meant_by(name: str, parameters: Iterable[Parameter], given: Collection[str] = ()) -> list[Parameter]:
-    """The parameters that an unknown name may mean: by key, symbol, name or path, or by likeness.
+def meant_by(name: str, parameters: Iterable[Parameter], near: Sequence[Parameter] = ()) -> list[Parameter]:
+    """The parameters that an unknown name may mean: by key, symbol, name or path, or else by likeness.
 
-    Those that are not `given` go before.
+    Those that are `near` go before the others.
 
     >>> from softstart.drive import PARAMETERS
     >>> [[p.name for p in meant_by(one, PARAMETERS.values())] for one in ("inertia", "J2", "gapp")]
     [['motor_inertia', 'load_inertia'], ['load_inertia'], ['gap']]
     """
-    everyone = list(parameters)
-    free = [p for p in everyone if p.name not in given] or everyone
-    for among in (free, everyone):
-        if same := [p for p in among if name in (p.key, p.symbol, p.name, p.path)]:
+    groups = (near, list(parameters))
+    for group in groups:
+        if same := [p for p in group if name in (p.key, p.symbol, p.name, p.path)]:
             return same
-    for among in (free, everyone):
-        spelt = {spelling: p for p in among for spelling in (p.key, p.path, p.name)}
+    for group in groups:
+        spelt = {spelling: p for p in group for spelling in (p.key, p.path, p.name)}
         if close := nearest(name, spelt):
             return [spelt[close]]
     return []
