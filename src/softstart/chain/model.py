@@ -136,8 +136,8 @@ class Chain(Words):
         shafts = tuple(shafts)
         if target_speed is None and motor is not None:
             target_speed = motor.rated_speed
-        start = {"target_speed": target_speed, "position": position}
-        start, mistakes = read_values(start, START.by_key, Wording())
+        given = {"target_speed": target_speed, "position": position}
+        start, mistakes = read_values(given, START.by_key, Wording())
         if masses:
             moving = [mass.name for mass in masses if not math.isinf(mass.inertia)] or [masses[0].name]
             load_mass = load_mass or moving[-1]
@@ -147,17 +147,9 @@ class Chain(Words):
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
-        put = object.__setattr__
-        put(self, "masses", masses)
-        put(self, "shafts", shafts)
-        put(self, "motor", motor)
-        put(self, "load_mass", load_mass)
-        put(self, "target_speed", start["target_speed"])
-        put(self, "position", start["position"])
-        put(self, "name", name)
-        put(self, "source", source)
-        put(self, "assumed", assumed)
-        put(self, "units", units)
+        own = {"masses": masses, "shafts": shafts, "motor": motor, "load_mass": load_mass}
+        vars(self).update(own, name=name, source=source, assumed=assumed, units=units)
+        vars(self).update(target_speed=start["target_speed"], position=start["position"])
 
     # ---- where chains come from --------------------------------------------------------------------------
 

@@ -116,6 +116,15 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
         "initial_load_speed", "target_speed", w2 >= target,
         "the load must start below {other}, the speed that it is to reach",
     )  # fmt: skip
+    permitted, longest, starts = get("permissible_torque", "permissible_start_time", "starts_per_hour")
+    yield (
+        "permissible_torque", "load_torque", abs(Mc) >= permitted,
+        "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft",
+    )  # fmt: skip
+    yield (
+        "starts_per_hour", "permissible_start_time", longest * starts > 3600.0,
+        "so many starts of {other} take more than an hour; lower one of the two",
+    )  # fmt: skip
     hangs = isinstance(where := values.get("start_position"), str) and where == "hanging"
     yield (
         "start_position", "load_kind", reactive and hangs,
