@@ -540,17 +540,13 @@ def show(value: object, *, toml: bool = False) -> str:
     try:
         if isinstance(value, str):
             shown = json.dumps(value[:100], ensure_ascii=False)
-        elif toml:
-            shown = str(value) if isinstance(value, date | time) else _as_json(value)
+        elif toml and isinstance(value, bool | list | tuple | dict):
+            shown = json.dumps(value, ensure_ascii=False, default=str)
         else:
-            shown = repr(value)
+            shown = str(value) if isinstance(value, date | time) else repr(value)
     except (RecursionError, ValueError):  # an integer with thousands of digits is not written either
         return "a table" if isinstance(value, dict) else "a list" if isinstance(value, list) else "a number"
     return shown if len(shown) <= 70 else f"{shown[:60]}..."
-
-
-def _as_json(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False, default=str).replace("Infinity", "inf").replace("NaN", "nan")
 
 
 # ---- numbers as people type them ------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -779,12 +780,9 @@ def is_chain(given: str | os.PathLike[str]) -> bool:
     """Whether a name or a path is that of a chain."""
     if isinstance(given, str) and given in LIBRARY.names():
         return given not in library.names()
-    if not isinstance(given, str | os.PathLike) or not os.fspath(given) or refusal_of(given) is not None:
-        return False
-    try:
-        return is_chain_text(read_text(given))
-    except RefusedError:
-        return False
+    with suppress(RefusedError):
+        return isinstance(given, str | os.PathLike) and is_chain_text(read_text(given))
+    return False
 
 
 def is_chain_text(text: str) -> bool:

@@ -198,14 +198,16 @@ def changed(
             yield f"{path}: {what} file has no such key; {remedy}"
             continue
         table, p = paths[plain]
-        place: Any = document.setdefault(table.name, {}) if table.name else document
+        place: Any = document
         if table.many:
-            count = len(place) if isinstance(place, list) else 0
-            row = path[len(table.name) + 1 : -len(p.key) - 2]
+            rows, row = document.get(table.name), path[len(table.name) + 1 : -len(p.key) - 2]
+            count = len(rows) if isinstance(rows, list) else 0
             if not row.isdecimal() or not 1 <= int(row) <= count:
                 yield f"{path}: write {table.name}[N].{p.key} with N from 1 to {count}."
                 continue
-            place = place[int(row) - 1]
+            place = document[table.name][int(row) - 1]
+        elif table.name:
+            place = document.setdefault(table.name, {})
         if isinstance(place, dict):
             place[p.key] = value
 

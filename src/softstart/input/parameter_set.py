@@ -139,9 +139,7 @@ class ParameterSet:
             given, parameters, wording, batch=self.BATCH, known=known, several=self.SEVERAL
         )
         wrong = [*mistakes, *found]
-        for name in (
-            () if given.keys() <= parameters.keys() else [one for one in given if one not in parameters]
-        ):
+        for name in [one for one in given if one not in parameters]:
             free = [p for p in parameters.values() if p.name not in given]
             meant = meant_by(name, parameters.values(), free)
             names = " or ".join(p.name for p in meant)
