@@ -229,7 +229,7 @@ def placed(
     def note(subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
         mistakes.append(Mistake(wording.sentence(subject, reason), (), tuple(p.path for p in meant)))
 
-    def take(table: Table, content: object) -> None:
+    def take(table: Table, content: object, written: str = "") -> None:
         name = table.name
         if table.many:
             rows = isinstance(content, list) and all(isinstance(row, dict) for row in content)
@@ -259,9 +259,9 @@ def placed(
                 remedy = f"did you mean {named[meant].bracket}?" if meant else f"its tables are {listed}"
                 note(f"[{key}]", f"{what} has no such table; {remedy}")
                 if meant:
-                    take(named[meant], value)
+                    take(named[meant], value, key)
             else:
-                place = f"[{name}] " if name else ""
+                place = f"[{written or name}] " if name else ""
                 mistakes.append(_unknown(place, key, value, table, tables, what, wording))
 
     take(named[""], document)

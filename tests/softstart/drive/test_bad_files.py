@@ -110,7 +110,7 @@ def test_all_mistakes_of_a_file_come_at_once(sentences):
     assert [s.removeprefix("d.toml: ").split(":")[0] for s in found] == [
         'gap = "-2 rad"',
         "[moter]",
-        "[motor] startin_torque = true",
+        "[moter] startin_torque = true",
         '[motor] inertia = "5 kg"',
         '[shaft] stiffness = "5 N*m"',
         '[shaft] contact_law = "dead zone"',
