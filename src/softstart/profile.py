@@ -62,7 +62,9 @@ class TorqueProfile:
     ) -> None:
         time, torque = _vector("time", time), _vector("torque", torque)
         if time.size != torque.size:
-            raise InputError(f"profile: {time.size} times for {torque.size} torques; give one torque a time.")
+            raise InputError(
+                f"profile: {time.size} times for {torque.size} torques; give one torque for each time."
+            )
         if time[0] != 0.0:
             raise InputError(f"profile: its first time is {time[0]:g} s; a profile begins at 0 s.")
         falling = np.flatnonzero(np.diff(time) < 0.0)
@@ -260,9 +262,10 @@ class TorqueProfile:
         Raises
         ------
         InputError
-            In one sentence that names the file, the line and the value.
+            In one sentence that names the file, the place and the value.
         """
-        return cls(*profile_files.read_profile(Path(path)))
+        found: TorqueProfile = profile_files.read_profile(Path(path))
+        return found
 
     def heat(self, until: float, reference: float) -> float:
         """I2t heat in s: the integral of (torque/reference)^2 from 0 to `until`; torque as demanded."""
@@ -274,7 +277,7 @@ class TorqueProfile:
 
 def _vector(name: str, values: Any) -> Vector:
     try:
-        vector = np.array(values, dtype=np.float64)
+        vector = np.array(values, dtype=np.float64) + 0.0  # in which -0.0 is 0.0
     except (TypeError, ValueError):
         raise InputError(f"profile: its {name} is {values!r}; give a list of numbers.") from None
     if vector.ndim != 1 or vector.size == 0:

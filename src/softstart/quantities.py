@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import date, time
 from decimal import Decimal
 from functools import lru_cache
@@ -160,13 +160,12 @@ _SYMBOLS = str.maketrans(
 _WITHOUT_DOTS = re.compile(
     r"\b(?:(k?g(?=[cm]?m\^2)|[kMm]?N|kgf|kp)([cm]?m)(s?)|([kMm]?[NWJ])(s))(?![^\W\d_])"
 )
-# Only products, quotients and one-digit powers of names reach pint: its own grammar knows much more.
+# What pint may see: names, "1/" and one-digit powers. Its own grammar evaluates whatever stands there.
 _NAME = re.compile(r"(?:[^\W\d]|°)+")
-_FACTOR = rf"(?:{_NAME.pattern}|1)(?:\s*(?:\*\*|\^)\s*[+-]?[1-9])?(?![\w.])"
-_PRODUCT = rf"\s*{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*\s*"
-
-
-LONGEST = 80  # letters of a unit: products of a thousand factors are no unit, and take time
+_WRITTEN = re.compile(
+    rf"(?:(?:{_NAME.pattern}|\))(?:\s*(?:\*\*|\^)\s*[+-]?[1-9](?![\w.]))?|1(?=\s*/)|[\s*/(])+"
+)
+LONGEST = 80  # characters of a unit: products of a thousand factors are no unit, and take time
 
 
 class Unit(NamedTuple):
@@ -193,24 +192,19 @@ def read_unit(written: str) -> Unit | str:
     text = re.sub(r"(?<=[^\W\d])[.-](?=[^\W\d])", "*", text)  # "N.m", "lbf-ft"
     text = re.sub(r"(?<=[^\W\d_])([+-]?[1-9])(?![\w.])", r"^\1", text)  # "kg m2", "s-1" as in data sheets
     text = _WITHOUT_DOTS.sub(lambda found: "*".join(filter(None, found.groups())), text)
-    if not _is_product(text):
+    if not _WRITTEN.fullmatch(text):
         return f'"{written}" is no unit'
     registry = _registry()
     for name in _NAME.findall(text):
         if not registry.parse_unit_name(name):
             meant = nearest(name, _USUAL.split())
             return f'unknown unit "{name}"' + (f' (did you mean "{meant}"?)' if meant else "")
-    root = registry.Quantity(1.0, registry.parse_units(text)).to_root_units()
+    try:
+        root = registry.Quantity(1.0, registry.parse_units(text)).to_root_units()
+    except Exception:  # of many kinds, as its parser works by evaluation
+        return f'"{written}" is no unit'
     exponents = tuple(sorted((str(k), float(cast("float", v))) for k, v in root.dimensionality.items() if v))
     return Unit(float(root.magnitude), exponents)
-
-
-def _is_product(text: str) -> bool:
-    """Whether the text is well formed, brackets included: they are replaced by a name from the inside out."""
-    inner = ""
-    while inner != text:
-        inner, text = text, re.sub(rf"\({_PRODUCT}\)", " x ", text)
-    return re.fullmatch(_PRODUCT, text) is not None
 
 
 @lru_cache(maxsize=1)
@@ -285,24 +279,30 @@ def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
     array([0.5, 2. ])
     """
     if hasattr(value, "magnitude") and hasattr(value, "units"):  # a quantity of the user's own pint registry
-        one = _text(f"1 {value.units}", unit, infinite)
-        return _finished(parse(value.magnitude, unit, infinite=infinite) * one)
+        return parse(value.magnitude, unit, infinite=infinite) * _text(f"1 {value.units}", unit, infinite)
     if hasattr(value, "__array__") and not isinstance(value, np.generic):
         value = np.asarray(value)
+    if not isinstance(value, list | tuple | np.ndarray):
+        return _single(value, unit, infinite)
+    if isinstance(value, list | tuple) and all(type(one) is float for one in value):
+        value = np.array(value)
     if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
         numbers = value.astype(np.float64)
-        wrong = np.isnan(numbers) if infinite else ~np.isfinite(numbers)
-        if np.any(wrong):
-            index = tuple(int(i) for i in np.argwhere(wrong)[0])
-            _at(index, float(numbers[index]), lambda number: _checked(number, unit, infinite))
-        return _finished(numbers)
-    if isinstance(value, list | tuple | np.ndarray):
-        cells = _cells(value)
-        numbers = np.empty(cells.shape)
-        for index in np.ndindex(cells.shape):
-            numbers[index] = _at(index, cells[index], lambda cell: _single(cell, unit, infinite))
-        return _finished(numbers)
-    return _single(value, unit, infinite)
+        if np.all(np.isfinite(numbers)) and numbers.size:
+            return float(numbers) if numbers.ndim == 0 else numbers + 0.0  # in which -0.0 is 0.0
+    try:
+        cells = np.array(value, dtype=object)
+    except ValueError:
+        raise RefusedError("the rows of a list must all have the same length") from None
+    if cells.size == 0:
+        raise RefusedError("an empty list holds no value; give at least one element")
+    numbers = np.empty(cells.shape)
+    for index, cell in np.ndenumerate(cells):
+        try:
+            numbers[index] = _single(cell, unit, infinite)
+        except RefusedError as refusal:
+            raise RefusedError(refusal.reason, cell, index or None) from None
+    return float(numbers) if numbers.ndim == 0 else numbers
 
 
 def shortest(value: float, unit: str) -> str:
@@ -353,16 +353,18 @@ class Units(NamedTuple):
         for part in filter(None, (one.strip() for one in text.split(","))):
             arc = re.fullmatch(r"mm\s+on\s+(.+)", part)
             if arc:
-                diameter = parse(arc[1], "m")
-                if not isinstance(diameter, float) or not diameter > 0.0:
+                found |= {"angle": "mm", "diameter": parse(arc[1], "m")}
+                if not found["diameter"] > 0.0:
                     raise RefusedError("the diameter of the pitch circle must be above 0")
-                found |= {"angle": "mm", "diameter": diameter}
-            elif part == "rad" or (part, "rad") in ORDINARY:
+            elif part in ("rad", *TYPED["rad"]):
                 found["angle"] = part
-            elif part == "rad/s" or (part, "rad/s") in ORDINARY:
+            elif part in ("rad/s", *TYPED["rad/s"]):
                 found["speed"] = part
             else:
-                raise RefusedError(f"{show(part)} is no unit of an angle or a speed; {UNITS_ARE}")
+                raise RefusedError(
+                    f'{show(part)} is no unit of an angle or a speed; write for example "deg, rpm", or '
+                    '"mm on 80 mm" for the backlash on a pitch circle'
+                )
         for key, si, values in (("angle", "rad", angles), ("speed", "rad/s", speeds)):
             written = {shortest(value, si).partition(" ")[2] for value in values if value}
             found.setdefault(key, written.pop() or si if len(written) == 1 else si)
@@ -399,31 +401,6 @@ class Units(NamedTuple):
         return f"{text.strip()} {self.of(si)}"
 
 
-UNITS_ARE = 'write for example "deg, rpm", or "mm on 80 mm" for the backlash on a pitch circle'
-
-
-def _cells(value: list[Any] | tuple[Any, ...] | NDArray[Any]) -> NDArray[np.object_]:
-    try:
-        return np.array(value, dtype=object)
-    except ValueError:
-        raise RefusedError("the rows of a list must all have the same length") from None
-
-
-def _at(index: tuple[int, ...], cell: object, read: Callable[[Any], float]) -> float:
-    try:
-        return read(cell)
-    except RefusedError as refusal:
-        raise RefusedError(refusal.reason, cell, index or None) from None
-
-
-def _finished(numbers: Value) -> Value:
-    if np.size(numbers) == 0:
-        raise RefusedError("an empty list holds no value; give at least one element")
-    if np.ndim(numbers) == 0:
-        return float(numbers)
-    return numbers + 0.0  # a copy, in which -0.0 is 0.0
-
-
 def _single(value: object, unit: str, infinite: bool) -> float:
     if isinstance(value, str):
         return _text(value, unit, infinite)
@@ -434,12 +411,15 @@ def _single(value: object, unit: str, infinite: bool) -> float:
     if isinstance(value, list | tuple):
         raise RefusedError("the rows of a list must all have the same length")
     if not isinstance(value, Real | Decimal):
-        raise RefusedError(f"{_a_type(value)} is no quantity; {_remedy(unit)}")
+        kind = type(value).__name__
+        a = {"dict": "a table", "complex": "a complex number"}.get(
+            kind, f"a{'n' * (kind[0] in 'aeiou')} {kind}"
+        )
+        raise RefusedError(f"{a} is no quantity; {_remedy(unit)}")
     try:
-        number = float(value)
+        return _checked(float(value), unit, infinite)
     except OverflowError:
         raise RefusedError(f"the number is too large; {_remedy(unit)}") from None
-    return _checked(number, unit, infinite)
 
 
 def _checked(number: float, unit: str, infinite: bool) -> float:
@@ -497,8 +477,7 @@ def _factor(written: str, number: str, unit: str) -> float:
     if isinstance(found, str):
         raise RefusedError(f"{found}; {_remedy(unit)}")
     if unit == "rad/s" and "min" in written and found.dimensions == _known("Hz").dimensions:
-        found = read_unit(f"({written})*turn")  # 1/min, min-1: revolutions, ISO 80000-3
-        assert isinstance(found, Unit)
+        found = Unit(found.size * 2.0 * math.pi, _known(unit).dimensions)  # 1/min: revolutions, ISO 80000-3
     for form in (unit, *quantity.others):
         wanted = _known(form)
         if wanted.dimensions == found.dimensions:
@@ -509,32 +488,25 @@ def _factor(written: str, number: str, unit: str) -> float:
 
 
 def _wrong_kind(written: str, number: str, found: Unit, quantity: Quantity) -> str:
-    unit = quantity.unit
-    other = next((noun for form, noun in _nouns() if _known(form).dimensions == found.dimensions), None)
+    unit, remedy = quantity.unit, _remedy(quantity.unit)
+    nouns = [(form, q.noun) for q in QUANTITIES.values() for form in (q.unit, *q.others)]
+    nouns = [*((q.unit, q.noun) for q in QUANTITIES.values()), *OTHER_NOUNS.items(), *nouns]
+    other = next((noun for form, noun in nouns if _known(form).dimensions == found.dimensions), None)
     if other is None:
-        return f"{written} is not a unit of {quantity.noun}; {_remedy(unit)}"
-    is_what = f"{written} is {other}"
+        return f"{written} is not a unit of {quantity.noun}; {remedy}"
+    what = f"not {quantity.noun}"
     if unit == "rad/s" and other == "a frequency":
         amount = f"{float(number) * found.size:.12g}"
-        return f'{is_what}, which may count turns or radians; write "{amount} turn/s" or "{amount} rad/s"'
-    if unit == "kg*m^2" and other == "a flywheel moment":
-        return f"{is_what} (GD^2); divide it by 4 g and write the inertia in kg*m^2"
-    if unit in ("N*m/rad", "N*m*s/rad") and other == _noun_of(unit.removesuffix("/rad")):
-        per = f'"{number} {written}/rad" or "{number} {written}/deg"'
-        return f"{is_what}, but {quantity.noun} is per angle; write {per}"
-    if unit == "N*m" and other in ("a stiffness", "an energy"):
-        return f'{is_what}, not a torque; write "{number} N*m" if that is meant'
-    return f"{is_what}, not {quantity.noun}; {_remedy(unit)}"
-
-
-def _nouns() -> Iterable[tuple[str, str]]:
-    yield from ((q.unit, q.noun) for q in QUANTITIES.values())
-    yield from OTHER_NOUNS.items()
-    yield from ((form, q.noun) for q in QUANTITIES.values() for form in q.others)
-
-
-def _noun_of(unit: str) -> str:
-    return next(noun for form, noun in _nouns() if form == unit)
+        what = "which may count turns or radians"
+        remedy = f'write "{amount} turn/s" or "{amount} rad/s"'
+    elif unit == "kg*m^2" and other == "a flywheel moment":
+        return f"{written} is {other} (GD^2); divide it by 4 g and write the inertia in kg*m^2"
+    elif found.dimensions == _known(unit.removesuffix("/rad")).dimensions:
+        what = f"but {quantity.noun} is per angle"
+        remedy = f'write "{number} {written}/rad" or "{number} {written}/deg"'
+    elif unit == "N*m" and other in ("a stiffness", "an energy"):
+        remedy = f'write "{number} N*m" if that is meant'
+    return f"{written} is {other}, {what}; {remedy}"
 
 
 def _quantity(unit: str) -> Quantity:
@@ -555,38 +527,25 @@ def _remedy(unit: str) -> str:
     return f'write {quantity.noun} as "{quantity.example}" or as a bare number in {unit}'
 
 
-def _a_type(value: object) -> str:
-    name = type(value).__name__
-    return {"dict": "a table", "complex": "a complex number"}.get(
-        name
-    ) or f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-
-
 def show(value: object, *, toml: bool = False) -> str:
     """A value as its writer wrote it, cut to a readable length; `toml` writes true, not True.
 
     >>> show("5 m"), show(True, toml=True), show([0.5, 2.0])
     ('"5 m"', 'true', '[0.5, 2.0]')
     """
-    if isinstance(value, str):
-        shown = json.dumps(value[:100], ensure_ascii=False)
-    elif isinstance(value, list | tuple | dict):
-        try:
-            shown = json.dumps(value, ensure_ascii=False, default=str) if toml else repr(value)
-        except (RecursionError, ValueError):  # an integer with thousands of digits is not written either
-            shown = "a table" if isinstance(value, dict) else "a list"
-    elif toml and isinstance(value, date | time):
-        shown = str(value)
-    elif isinstance(value, bool | np.bool_):
-        shown = str(bool(value)).lower() if toml else str(bool(value))
-    elif isinstance(value, np.generic):
-        shown = repr(value.item())
-    elif isinstance(value, np.ndarray):
-        shown = repr(value.tolist()) if value.size <= 8 else f"an array of shape {value.shape}"
-    elif isinstance(value, int) and abs(value) > 10**30:
-        shown = "an integer beyond 10^30" if value > 0 else "an integer below -10^30"
-    else:
-        shown = repr(value)
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist() if value.size <= 8 else f"an array of shape {value.shape}"
+        if isinstance(value, str):
+            return value
+    try:
+        if isinstance(value, str):
+            shown = json.dumps(value[:100], ensure_ascii=False)
+        elif toml and isinstance(value, bool | list | tuple | dict):
+            shown = json.dumps(value, ensure_ascii=False, default=str)
+        else:
+            shown = str(value) if isinstance(value, date | time) else repr(value)
+    except (RecursionError, ValueError):  # an integer with thousands of digits is not written either
+        return "a table" if isinstance(value, dict) else "a list" if isinstance(value, list) else "a number"
     return shown if len(shown) <= 70 else f"{shown[:60]}..."
 
 
@@ -595,6 +554,7 @@ def show(value: object, *, toml: bool = False) -> str:
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9,]*")
 _POINT = re.compile(r"[0-9]\.|\.[0-9]")
+_DECIMAL_COMMA = re.compile(r"((?:^|,)\s*[+-]?[0-9]+),([0-9]+)")  # a whole number, then a comma
 # 1.000,5 and 12.345,6 but not 0.125,2 or 1.125,2.5: a point of thousands before what may be a decimal comma
 _THOUSANDS_POINT = re.compile(r"(?<![0-9.])[1-9][0-9]{0,2}(?:\.[0-9]{3})+,[0-9]+(?![0-9]*\.[0-9])")
 
@@ -615,47 +575,23 @@ def values_in(text: str, name: str = "value", *, whole: bool = False) -> list[st
     "0, 1, 0, 2" for 4 values, or "0.1, 0.2" for 2.
     """
     try:
-        if ";" in text:
-            parts = with_points([part.strip() for part in text.split(";")])
-        else:
-            raw = text.split(",")
-            parts = [part.strip() for part in raw]
-            merged = _with_decimal_commas(raw)
-            even = len({part[:1].isspace() for part in raw[1:]}) < 2  # "1.5, 2,5" has commas of two kinds
-            settled = whole or (even and _POINT.search(text) is not None)
-            thousands = _THOUSANDS_POINT.search(text)
-            if thousands and not _POINT.search(_THOUSANDS_POINT.sub("", text)):
-                one = thousands[0]
-                raise RefusedError(
-                    f'the point in "{one}" may divide thousands; write "{one.replace(",", ", ")}" for 2 '
-                    f'values, or "{one.replace(".", "").replace(",", ".")}" for 1'
-                )
-            if len(merged) < len(parts) and all(parts) and not settled:
-                raise RefusedError(
-                    f'a comma may divide values or decimals; write "{", ".join(parts)}" for {len(parts)} '
-                    f'values, or "{", ".join(merged)}" for {len(merged)}'
-                )
+        raw = text.split(";" if ";" in text else ",")
+        parts = [part.strip() for part in raw]
         if not all(parts):
             raise RefusedError("a place in the list is empty; write values with commas between")
+        if ";" in text:
+            return with_points(parts)
+        one_kind = len({part[:1].isspace() for part in raw[1:]}) < 2  # "1.5, 2,5" has commas of two kinds
+        without = _THOUSANDS_POINT.sub(lambda one: one[0].replace(".", ""), text)
+        settled = whole or (one_kind and _POINT.search(without))
+        other = [part.strip() for part in _DECIMAL_COMMA.sub(r"\1.\2", without).split(",")]
+        if len(other) < len(parts) and not settled:
+            both = f'"{", ".join(parts)}" for {len(parts)} values, or "{", ".join(other)}" for {len(other)}'
+            both = f"; write {both}" if len(both) < 250 else ""
+            raise RefusedError(f"a comma may divide values or decimals{both}")
     except RefusedError as refusal:
-        shown = show(text)
-        reason = refusal.reason if len(refusal.reason) < 300 else "a comma may divide values or decimals"
-        raise InputError(f"{name} = {shown}: {reason}.") from None
+        raise InputError(f"{name} = {show(text)}: {refusal.reason}.") from None
     return parts
-
-
-def _with_decimal_commas(raw: Sequence[str]) -> list[str]:
-    """The parts between commas, with those put together that a decimal comma may have divided."""
-    merged: list[str] = []
-    open_end = False
-    for part in raw:
-        if open_end and part[:1].isdigit():
-            merged[-1] += f".{part.strip()}"
-            open_end = False
-        else:
-            merged.append(part.strip())
-            open_end = re.fullmatch(r"\s*[+-]?[0-9]+", part) is not None
-    return merged
 
 
 def with_points(texts: Sequence[str]) -> list[str]:
@@ -690,9 +626,5 @@ def whole_number(text: str, name: str, least: int = 1, most: int = 10**15) -> in
     digits = re.fullmatch(r"\s*0*([0-9]{1,16})\s*", text)
     if digits and least <= int(digits[1]) <= most:
         return int(digits[1])
-    bound = (
-        f"of {least} or more"
-        if most >= 10**15
-        else f"from {least} to {most if most < 10_000 else f'{most:,}'}"
-    )
+    bound = f"from {least} to {most:,}" if most < 10**15 else f"of {least} or more"
     raise InputError(f"{name} = {show(text)}: give a whole number {bound}.")

@@ -3,7 +3,7 @@
 import pytest
 
 from softstart.errors import InputError
-from softstart.input.documents import Table, read_document, read_table
+from softstart.input.documents import Table, read_document
 from softstart.input.parameters import Parameter
 
 TOP = Table("", (Parameter("name", "", "name", '"my chain"', default="unnamed"),))
@@ -98,12 +98,3 @@ def test_changes_go_before_what_the_file_says():
     assert only == "mass[3].inertia: write mass[N].inertia with N from 1 to 2."
     (only,) = sentences(GOOD, also={"mass.inertai": 1.0})
     assert only == "mass.inertai: a chain file has no such key; did you mean mass.inertia?"
-
-
-def test_values_from_python_are_checked_alike():
-    with pytest.raises(InputError) as caught:
-        read_table({"inertia": -1, "knid": "free"}, MASS)
-    assert caught.value.sentences == (
-        "inertia = -1: the inertia must be above 0.",
-        'knid = "free": there is no parameter knid; did you mean kind?',
-    )

@@ -346,7 +346,7 @@ DOUBTFUL = {
     "1,2,4": '"1, 2, 4" for 3 values, or "1.2, 4" for 2',
     "1,500; 2,000": "may divide thousands",
     "1.000,5": '"1.000, 5" for 2 values, or "1000.5" for 1',
-    "12.345.678,9 rad": '"12.345.678, 9" for 2 values, or "12345678.9" for 1',
+    "12.345.678,9 rad": '"12.345.678, 9 rad" for 2 values, or "12345678.9 rad" for 1',
     "1,000,000; 0,5": "may divide thousands",
     "1,5; 2.5": "has a comma",
     "1.234,5; 2": "has a comma",

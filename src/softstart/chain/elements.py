@@ -59,38 +59,25 @@ class Mass(ParameterSet):
 
     WHAT: ClassVar[str] = "a mass"
 
+    # fmt: off
     name: str = parameter("mass.name", "", "name of the mass", '"drum"', default="")
-    inertia: Number = parameter(
-        "mass.inertia", "kg*m^2", "inertia on its own shaft", '"0.035 kg*m^2"', "above 0",
-        infinite=True, kw_only=False,
-    )  # fmt: skip
-    damping: Number = parameter(
-        "mass.damping", "N*m*s/rad", "damping to the ground", '"0.01 N*m*s/rad"', "0 or more", default=0.0
-    )
-    torque: Number = parameter(
-        "mass.torque", "N*m", "load torque on its own shaft", '"7.16 N*m"', default=0.0
-    )
-    kind: LoadKind = parameter(
-        "mass.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
-    )
-    initial_speed: Number = parameter(
-        "mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"', default=0.0
-    )
-    curve_speed: MaybeSeries = parameter(
-        "mass.curve_speed",
-        "rad/s",
-        "rising speeds of its load curve",
-        "[0, 50, 100]",
-        default=None,
-        many=True,
-    )
-    curve_angle: MaybeSeries = parameter(
-        "mass.curve_angle", "rad", "rising angles of its load curve", "[0, 1.5, 3]", default=None, many=True
-    )
-    curve_torque: MaybeSeries = parameter(
-        "mass.curve_torque", "N*m", "load torques at these speeds or angles", "[0, 10, 40]",
-        default=None, many=True,
-    )  # fmt: skip
+    inertia: Number = parameter("mass.inertia", "kg*m^2", "inertia on its own shaft", '"0.035 kg*m^2"',
+        "above 0", infinite=True, kw_only=False)
+    damping: Number = parameter("mass.damping", "N*m*s/rad", "damping to the ground", '"0.01 N*m*s/rad"',
+        "0 or more", default=0.0)
+    torque: Number = parameter("mass.torque", "N*m", "load torque on its own shaft", '"7.16 N*m"',
+        default=0.0)
+    kind: LoadKind = parameter("mass.kind", "", "kind of the load torque", '"active"', default="active",
+        choices=get_args(LoadKind))
+    initial_speed: Number = parameter("mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"',
+        default=0.0)
+    curve_speed: MaybeSeries = parameter("mass.curve_speed", "rad/s", "rising speeds of its load curve",
+        "[0, 50, 100]", default=None, many=True)
+    curve_angle: MaybeSeries = parameter("mass.curve_angle", "rad", "rising angles of its load curve",
+        "[0, 1.5, 3]", default=None, many=True)
+    curve_torque: MaybeSeries = parameter("mass.curve_torque", "N*m",
+        "load torques at these speeds or angles", "[0, 10, 40]", default=None, many=True)
+    # fmt: on
 
     def contradictions(self) -> Iterable[str]:
         """Sentences on values that contradict one another."""
@@ -144,50 +131,33 @@ class Shaft(ParameterSet):
 
     WHAT: ClassVar[str] = "a shaft"
 
-    stiffness: Number = parameter(
-        "shaft.stiffness", "N*m/rad", "stiffness", '"368 N*m/rad"', "above 0",
-        default=None, infinite=True, kw_only=False,
-    )  # fmt: skip
-    damping: Number = parameter(
-        "shaft.damping", "N*m*s/rad", "damping", '"1.5 N*m*s/rad"', "0 or more", default=0.0
-    )
-    damping_ratio: MaybeNumber = parameter(
-        "shaft.damping_ratio", "1", "damping ratio of its two masses alone, instead of `damping`", "0.02",
-        "0 or more", default=None,
-    )  # fmt: skip
+    # fmt: off
+    stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness", '"368 N*m/rad"', "above 0",
+        default=None, infinite=True, kw_only=False)
+    damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping", '"1.5 N*m*s/rad"', "0 or more",
+        default=0.0)
+    damping_ratio: MaybeNumber = parameter("shaft.damping_ratio", "1",
+        "damping ratio of its two masses alone, instead of `damping`", "0.02", "0 or more", default=None)
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None)
-    backlash: MaybeNumber = parameter(
-        "shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"', "0 or more", default=None
-    )
-    diameter: MaybeNumber = parameter(
-        "shaft.diameter", "m", "pitch diameter", '"185 mm"', "above 0", default=None
-    )
-    ratio: Number = parameter(
-        "shaft.ratio", "1", "gear ratio, speed before over speed after", "3", "above 0", default=1.0
-    )
-    side: Side = parameter(
-        "shaft.side", "", "side of the gear on which shaft and gap lie", '"before"',
-        default="before", choices=get_args(Side),
-    )  # fmt: skip
-    efficiency: Number = parameter(
-        "shaft.efficiency", "1", "efficiency of the gear", "0.97", "above 0 and at most 1", default=1.0
-    )
-    restitution: MaybeNumber = parameter(
-        "shaft.restitution", "1", "restitution of a rigid gap", "0.8", "from 0 to 1", default=None
-    )
-    contact_law: ContactLaw = parameter(
-        "shaft.contact_law", "", "law of the torque in contact", '"no-pull"',
-        default="no-pull", choices=get_args(ContactLaw),
-    )  # fmt: skip
-    permissible_torque: MaybeNumber = parameter(
-        "shaft.permissible_torque", "N*m", "permissible peak torque of shaft, coupling or gear", '"800 N*m"',
-        "above 0", default=None,
-    )  # fmt: skip
-    start_position: MaybeNumber = parameter(
-        "shaft.start_position", "rad", "twist at the start (0 is mid-gap); else by `start.position`",
-        '"0 rad"',
-        default=None,
-    )  # fmt: skip
+    backlash: MaybeNumber = parameter("shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"',
+        "0 or more", default=None)
+    diameter: MaybeNumber = parameter("shaft.diameter", "m", "pitch diameter", '"185 mm"', "above 0",
+        default=None)
+    ratio: Number = parameter("shaft.ratio", "1", "gear ratio, speed before over speed after", "3", "above 0",
+        default=1.0)
+    side: Side = parameter("shaft.side", "", "side of the gear on which shaft and gap lie", '"before"',
+        default="before", choices=get_args(Side))
+    efficiency: Number = parameter("shaft.efficiency", "1", "efficiency of the gear", "0.97",
+        "above 0 and at most 1", default=1.0)
+    restitution: MaybeNumber = parameter("shaft.restitution", "1", "restitution of a rigid gap", "0.8",
+        "from 0 to 1", default=None)
+    contact_law: ContactLaw = parameter("shaft.contact_law", "", "law of the torque in contact", '"no-pull"',
+        default="no-pull", choices=get_args(ContactLaw))
+    permissible_torque: MaybeNumber = parameter("shaft.permissible_torque", "N*m",
+        "permissible peak torque of shaft, coupling or gear", '"800 N*m"', "above 0", default=None)
+    start_position: MaybeNumber = parameter("shaft.start_position", "rad",
+        "twist at the start (0 is mid-gap); else by `start.position`", '"0 rad"', default=None)
+    # fmt: on
 
     def contradictions(self) -> Iterable[str]:
         """Sentences on values that contradict one another."""
@@ -268,10 +238,10 @@ class Motor(ParameterSet):
 
     WHAT: ClassVar[str] = "a motor"
 
+    # fmt: off
     mass: str = parameter("motor.mass", "", "name of the mass on which the motor acts", '"rotor"', default="")
-    starting_torque: Number = parameter(
-        "motor.starting_torque", "N*m", "starting torque of the motor", '"62 N*m"', "above 0", kw_only=False
-    )
+    starting_torque: Number = parameter("motor.starting_torque", "N*m", "starting torque of the motor",
+        '"62 N*m"', "above 0", kw_only=False)
     maximum_torque: Number = like(Drive, "maximum_torque")
     minimum_torque: Number = like(Drive, "minimum_torque")
     rated_power: MaybeNumber = like(Drive, "rated_power")
@@ -279,15 +249,14 @@ class Motor(ParameterSet):
     rated_torque: MaybeNumber = like(Drive, "rated_torque")
     torque_lag: Number = like(Drive, "torque_lag")
     torque_rate: Number = like(Drive, "torque_rate")
-    initial_torque: Number = parameter(
-        "motor.initial_torque", "N*m", "torque at t = 0, from which lag and rate limit begin", '"10 N*m"',
-        default=0.0,
-    )  # fmt: skip
+    initial_torque: Number = parameter("motor.initial_torque", "N*m",
+        "torque at t = 0, from which lag and rate limit begin", '"10 N*m"', default=0.0)
     encoder_lines: Number = like(Drive, "encoder_lines")
     encoder_phase: Number = like(Drive, "encoder_phase")
     torque_noise: Number = like(Drive, "torque_noise")
     noise_seed: Number = like(Drive, "noise_seed")
     computing_delay: Number = like(Drive, "computing_delay")
+    # fmt: on
 
     def contradictions(self) -> Iterable[str]:
         """Sentences on values that contradict one another."""

@@ -11,6 +11,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -37,9 +38,9 @@ from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, librar
 from softstart.drive.checks import wrong_units
 from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, made, read_document, read_table
+from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import ABSENT, read_text, refusal_of
-from softstart.input.parameters import Wording
+from softstart.input.parameters import Wording, read_values, sentences_of
 from softstart.quantities import RefusedError, nearest, show
 
 BRANCHES = (
@@ -134,30 +135,22 @@ class Chain(Words):
         numbered = enumerate(masses, start=1)
         masses = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in numbered)
         shafts = tuple(shafts)
-        if target_speed is not None:
-            target_speed = read_table({"target_speed": target_speed}, START)["target_speed"]
-        elif motor is not None:
+        if target_speed is None and motor is not None:
             target_speed = motor.rated_speed
+        given = {"target_speed": target_speed, "position": position}
+        start, mistakes = read_values(given, START.by_key, Wording())
         if masses:
             moving = [mass.name for mass in masses if not math.isinf(mass.inertia)] or [masses[0].name]
             load_mass = load_mass or moving[-1]
             if motor is not None and not motor.mass:
                 motor = motor.replace(mass=moving[0])
-        wrong = _mistakes(masses, shafts, motor, load_mass)
+        wrong = sentences_of(mistakes) + _mistakes(masses, shafts, motor, load_mass)
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
-        put = object.__setattr__
-        put(self, "masses", masses)
-        put(self, "shafts", shafts)
-        put(self, "motor", motor)
-        put(self, "load_mass", load_mass)
-        put(self, "target_speed", target_speed)
-        put(self, "position", read_table({"position": position}, START)["position"])
-        put(self, "name", name)
-        put(self, "source", source)
-        put(self, "assumed", assumed)
-        put(self, "units", units)
+        own = {"masses": masses, "shafts": shafts, "motor": motor, "load_mass": load_mass}
+        vars(self).update(own, name=name, source=source, assumed=assumed, units=units)
+        vars(self).update(target_speed=start["target_speed"], position=start["position"])
 
     # ---- where chains come from --------------------------------------------------------------------------
 
@@ -787,12 +780,9 @@ def is_chain(given: str | os.PathLike[str]) -> bool:
     """Whether a name or a path is that of a chain."""
     if isinstance(given, str) and given in LIBRARY.names():
         return given not in library.names()
-    if not isinstance(given, str | os.PathLike) or not os.fspath(given) or refusal_of(given) is not None:
-        return False
-    try:
-        return is_chain_text(read_text(given))
-    except RefusedError:
-        return False
+    with suppress(RefusedError):
+        return isinstance(given, str | os.PathLike) and is_chain_text(read_text(given))
+    return False
 
 
 def is_chain_text(text: str) -> bool:

@@ -37,5 +37,3 @@ __all__ = [
     "SNCurve",
     "library",
 ]  # fmt: skip
-
-Drive.SHEET = DataSheet

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from softstart.input.parameters import Parameter, Wording
-from softstart.quantities import RefusedError, Units, Value, show
+from softstart.quantities import RefusedError, Units, show
 
 __all__ = ["FRICTIONS", "contradictions", "elastic_frequency", "wrong_units"]
 
@@ -45,142 +45,97 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
 
     `values` holds those parameters that are valid in themselves; checks on others are left out.
     """
-    arrays = {name: value.shape for name, value in values.items() if isinstance(value, np.ndarray)}
+    shapes = {name: value.shape for name, value in values.items() if isinstance(value, np.ndarray)}
     try:
-        shape = np.broadcast_shapes(*arrays.values()) if arrays else ()
+        shape = np.broadcast_shapes(*shapes.values()) if shapes else ()
     except ValueError:
-        listed = ", ".join(
-            f"{wording.label(parameters[name])} has shape {shape}" for name, shape in arrays.items()
-        )
-        yield wording.sentence(listed, BROADCAST)
+        listed = (f"{wording.label(parameters[name])} has shape {one}" for name, one in shapes.items())
+        yield wording.sentence(", ".join(listed), BROADCAST)
         return
-    both = _Pairs(values, parameters, wording, shape)
-    yield from both.broken(
-        "maximum_torque", "starting_torque", lambda most, Ms: most < Ms,
+
+    def at(name: str, index: tuple[int, ...]) -> str:
+        """A parameter and its value at this index of the broadcast shape."""
+        value, label = values[name], wording.label(parameters[name])
+        if isinstance(value, str):
+            return f"{label} = {show(value)}"
+        array = np.asarray(value)
+        own = tuple(
+            0 if n == 1 else i for n, i in zip(array.shape, index[len(index) - array.ndim :], strict=True)
+        )
+        place = f"[{', '.join(map(str, own))}]" if own else ""
+        return f"{label}{place} = {float(array[own]):.6g} {parameters[name].unit}"
+
+    for name, other, wrong, reason in _rules(values):
+        if wrong is not False and np.any(wrong):
+            index = tuple(np.argwhere(np.broadcast_to(wrong, shape))[0].tolist())
+            yield wording.sentence(at(name, index), reason.format(other=at(other, index)))
+
+
+def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
+    """Two parameters, whether their values contradict each other, and why; NaN, never true, where unknown."""
+
+    def get(*names: str) -> list[Any]:
+        return [math.nan if values.get(name) is None else values[name] for name in names]
+
+    J1, J2, Ms, most, Mc = get(
+        "motor_inertia", "load_inertia", "starting_torque", "maximum_torque", "load_torque"
+    )
+    friction, b1, b2 = (values.get(name, 0.0) for name in FRICTIONS)
+    target, w1, w2 = get("target_speed", "initial_motor_speed", "initial_load_speed")
+    torque, power, speed = get("rated_torque", "rated_power", "rated_speed")
+    reactive = values.get("load_kind") == "reactive"
+    yield (
+        "maximum_torque", "starting_torque", most < Ms,
         "the largest torque must not be below {other}; raise it, or leave it out",
     )  # fmt: skip
-    yield from both.broken(
-        "starting_torque", "load_torque", lambda Ms, Mc: Ms <= Mc,
+    yield (
+        "starting_torque", "load_torque", Ms <= Mc,
         "the starting torque cannot move the load against {other}; raise the one or lower the other",
     )  # fmt: skip
-    yield from _friction_too_large(both)
-    if values.get("load_kind") == "reactive":
-        yield from both.broken(
-            "load_torque", "load_kind", lambda Mc, _: Mc < 0.0,
-            'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"',
-        )  # fmt: skip
-    yield from both.broken(
-        "rated_torque", "rated_power", lambda torque, power: _unequal(values, torque, power),
-        "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong",
-    )  # fmt: skip
-    yield from both.broken(
-        "initial_load_speed", "target_speed", lambda w2, target: w2 >= target,
-        "the load must start below {other}, the speed that it is to reach",
-    )  # fmt: skip
-    yield from _impossible_starts(both)
-    yield from _impossible_dynamics(values, parameters, wording)
-
-
-def _unequal(values: Values, torque: Value, power: Value) -> Any:
-    """Whether torque times speed is not the power, beyond what a data sheet rounds."""
-    speed = values.get("rated_speed")
-    if speed is None:
-        return False
-    with np.errstate(over="ignore"):
-        return np.abs(np.multiply(torque, speed) - power) > 0.05 * np.asarray(power)
-
-
-class _Pairs:
-    """Checks of one parameter against another, element by element."""
-
-    def __init__(
-        self, values: Values, parameters: Mapping[str, Parameter], wording: Wording, shape: tuple[int, ...]
-    ) -> None:
-        self.values, self.parameters, self.wording, self.shape = values, parameters, wording, shape
-
-    def broken(self, name: str, other: str, bad: Callable[[Any, Any], Any], reason: str) -> Iterator[str]:
-        a, b = self.values.get(name), self.values.get(other)
-        if a is None or b is None:
-            return
-        wrong = bad(a, b)
-        if wrong is False or not np.any(wrong):
-            return
-        first = np.argwhere(np.broadcast_to(wrong, self.shape))[0]
-        at = tuple(int(i) for i in first)
-        there = f"{self._named(other, at)} = {self._shown(other, at)}"
-        subject = f"{self._named(name, at)} = {self._shown(name, at)}"
-        yield self.wording.sentence(subject, reason.format(other=there))
-
-    def _own(self, name: str, at: tuple[int, ...]) -> tuple[int, ...]:
-        """The index within the parameter's own array of the element used at `at` of the broadcast shape."""
-        shape = np.shape(self.values[name])
-        return tuple(0 if n == 1 else i for n, i in zip(shape, at[len(at) - len(shape) :], strict=True))
-
-    def _named(self, name: str, at: tuple[int, ...]) -> str:
-        own = self._own(name, at)
-        index = f"[{', '.join(map(str, own))}]" if own else ""
-        return self.wording.label(self.parameters[name]) + index
-
-    def _shown(self, name: str, at: tuple[int, ...]) -> str:
-        value = self.values[name]
-        if isinstance(value, str):
-            return show(value)
-        number = float(np.asarray(value)[self._own(name, at)])
-        return f"{number:.6g} {self.parameters[name].unit}"
-
-
-def _impossible_starts(both: _Pairs) -> Iterator[str]:
-    """Positions and brakes that do not go with the load or its speed."""
-    if both.values.get("load_kind") == "reactive" and _is(both.values.get("start_position"), "hanging"):
-        yield from both.broken(
-            "start_position", "load_kind", lambda *_: True,
-            'only an active load hangs; friction holds a reactive one where it stands, write "unknown"',
-        )  # fmt: skip
-    if both.values.get("brake") == "motor":
-        yield from both.broken(
-            "initial_motor_speed", "brake", lambda w1, _: w1 != 0.0,
-            'a motor that is held stands still; leave the speed out, or write brake "none"',
-        )  # fmt: skip
-
-
-def _friction_too_large(both: _Pairs) -> Iterator[str]:
-    """Friction against which the motor cannot start, or not reach the target speed of the load."""
-    needed = ("starting_torque", "maximum_torque", "load_torque", "target_speed")
-    Ms, most, Mc, target = (both.values.get(name) for name in needed)
-    friction, b1, b2 = (both.values.get(name, 0.0) for name in FRICTIONS)
-    if Ms is None or Mc is None:
-        return
-    yield from both.broken(
-        "motor_friction", "starting_torque", lambda one, Ms: (one > 0.0) & (Ms - one <= Mc) & (Ms > Mc),
+    push = Ms - friction
+    yield (
+        "motor_friction", "starting_torque", (friction > 0.0) & (push <= Mc) & (Ms > Mc),
         "with this friction {other} cannot move the load; lower the friction, or raise the torque",
     )  # fmt: skip
-    if target is None:
-        return
-    left = np.maximum(Ms, Ms if most is None else most) - friction - Mc
-    slow = (left > 0.0) & ((np.add(b1, b2)) * target >= left)
-    for name in FRICTIONS[1:]:
-        yield from both.broken(
-            name, "target_speed", lambda one, _: (one > 0.0) & slow,
+    left = np.fmax(most, Ms) - friction - Mc
+    slow = (left > 0.0) & ((b1 + b2) * target >= left)
+    for name, b in zip(FRICTIONS[1:], (b1, b2), strict=True):
+        yield (
+            name, "target_speed", (b > 0.0) & slow,
             "at {other} this takes more torque than the motor has left; lower the one or the other",
         )  # fmt: skip
-
-
-def _is(value: object, word: str) -> bool:
-    return isinstance(value, str) and value == word
-
-
-def _impossible_dynamics(
-    values: Values, parameters: Mapping[str, Parameter], wording: Wording
-) -> Iterator[str]:
-    needed = ("motor_inertia", "load_inertia", "starting_torque", "load_torque")
-    if any(name not in values for name in needed):
-        return
-    J1, J2, Ms, Mc = (values[name] for name in needed)
-    Ms = Ms - values.get("motor_friction", 0.0)
-    mean = (Ms + Mc * (J1 / J2)) / (1.0 + J1 / J2)
-    if np.any(~np.asarray(mean > 0.0) & np.asarray(Ms > Mc)):
-        yield wording.sentence(
-            f"{wording.label(parameters['load_torque'])} = {show(values['load_torque'])}",
-            "this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), "
-            "which K_dyn is measured against, is not above 0; use a weaker one",
-        )
+    yield (
+        "load_torque", "load_kind", reactive & (Mc < 0.0),
+        'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"',
+    )  # fmt: skip
+    yield (
+        "rated_torque", "rated_power", abs(torque * speed - power) > 0.05 * power,
+        "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong",
+    )  # fmt: skip
+    yield (
+        "initial_load_speed", "target_speed", w2 >= target,
+        "the load must start below {other}, the speed that it is to reach",
+    )  # fmt: skip
+    permitted, longest, starts = get("permissible_torque", "permissible_start_time", "starts_per_hour")
+    yield (
+        "permissible_torque", "load_torque", abs(Mc) >= permitted,
+        "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft",
+    )  # fmt: skip
+    yield (
+        "starts_per_hour", "permissible_start_time", longest * starts > 3600.0,
+        "so many starts of {other} take more than an hour; lower one of the two",
+    )  # fmt: skip
+    hangs = isinstance(where := values.get("start_position"), str) and where == "hanging"
+    yield (
+        "start_position", "load_kind", reactive and hangs,
+        'only an active load hangs; friction holds a reactive one where it stands, write "unknown"',
+    )  # fmt: skip
+    yield (
+        "initial_motor_speed", "brake", (values.get("brake") == "motor") & (abs(w1) > 0.0),
+        'a motor that is held stands still; leave the speed out, or write brake "none"',
+    )  # fmt: skip
+    yield (
+        "load_torque", "starting_torque", (push > Mc) & ((push + Mc * (J1 / J2)) / (1.0 + J1 / J2) <= 0.0),
+        "against {other} this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), to "
+        "which K_dyn refers, is not above 0; use a weaker one",
+    )  # fmt: skip

@@ -55,10 +55,10 @@ def in_contact(drive: Drive) -> control.StateSpace:
     >>> in_contact(Drive.load("crane-4amtkf")).output_labels
     ['z', 'w1', 'w2', 'shaft_torque']
     """
-    J1, J2, c, d = (float(value) for value in (drive.J1, drive.J2, drive.c, drive.d))
+    J1, J2, c, d = drive.J1, drive.J2, drive.c, drive.d
     torque = np.array([[c, d, -d]])
     states = ["z", "w1", "w2"]
-    _, b1, b2 = map(float, drive.frictions)
+    _, b1, b2 = drive.frictions
     return control.StateSpace(
         np.vstack([[[0.0, 1.0, -1.0]], -torque / J1, torque / J2]) - np.diag([0.0, b1 / J1, b2 / J2]),
         np.array([[0.0, 0.0], [1.0 / J1, 0.0], [0.0, -1.0 / J2]]),
@@ -105,9 +105,9 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     """
     states = _states(drive)
     actuator = _actuator(drive, states)
-    smoothing = _SMOOTHING * float(drive.elastic_period)
-    stuck = _STUCK * float(drive.target_speed)
-    reactive, drag = drive.load_kind == "reactive", float(drive.motor_friction)
+    smoothing = _SMOOTHING * drive.elastic_period
+    stuck = _STUCK * drive.target_speed
+    reactive, drag = drive.load_kind == "reactive", drive.motor_friction
     law = drive.contact_law
 
     def rate(torque: float, speed: float, friction: float, inertia: float, *, sticks: bool) -> float:
@@ -139,7 +139,7 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
         states=states,
         name=_system_name(drive),
         params={symbol: float(getattr(drive, symbol)) for symbol in ("J1", "J2", "c", "d", "gap", "Mc")}
-        | {"b1": float(drive.motor_viscous_friction), "b2": float(drive.load_viscous_friction)},
+        | {"b1": drive.motor_viscous_friction, "b2": drive.load_viscous_friction},
     )
     return system
 
@@ -151,29 +151,24 @@ def initial_state(drive: Drive) -> Vector:
     >>> initial_state(Drive.load("crane-4amtkf").replace(start_position=-0.25))
     array([-0.25,  0.  ,  0.  ,  0.  ])
     """
-    mechanical = [
-        float(drive.theta0),
-        float(drive.initial_motor_speed),
-        0.0,
-        float(drive.initial_load_speed),
-    ]
+    mechanical = [drive.theta0, drive.initial_motor_speed, 0.0, drive.initial_load_speed]
     return np.array([*mechanical, *(0.0 for _ in _states(drive)[4:])])
 
 
 def _states(drive: Drive) -> list[str]:
     states = ["phi1", "w1", "phi2", "w2"]
-    if math.isfinite(float(drive.torque_rate)):
+    if math.isfinite(drive.torque_rate):
         states.append("reference")
-    if float(drive.torque_lag) > 0.0:
+    if drive.torque_lag > 0.0:
         states.append("u")
     return states
 
 
 def _actuator(drive: Drive, states: list[str]) -> Callable[[Vector, float], tuple[float, list[float]]]:
     """The function that gives motor torque and the rates of the actuator's states."""
-    low, high = float(drive.minimum_torque), float(drive.maximum_torque)
-    lag, rate = float(drive.torque_lag), float(drive.torque_rate)
-    follow = _SMOOTHING * float(drive.elastic_period)
+    low, high = drive.minimum_torque, drive.maximum_torque
+    lag, rate = drive.torque_lag, drive.torque_rate
+    follow = _SMOOTHING * drive.elastic_period
     limited, lagging = "reference" in states, "u" in states
 
     def actuator(x: Vector, demand: float) -> tuple[float, list[float]]:

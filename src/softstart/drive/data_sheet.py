@@ -127,92 +127,68 @@ class DataSheet(ParameterSet):
 
     WHAT: ClassVar[str] = "a data sheet"
 
+    # fmt: off
     name: str = parameter("name", "", "name of the drive", '"hoist A"', "one line", default="unnamed drive")
-    source: str = parameter(
-        "source", "", "where the numbers are from", '"motor plate"', "one line", default="data sheets"
-    )
-    machine: Machine = parameter(
-        "load.machine", "", "kind of the machine", '"travel"', choices=get_args(Machine)
-    )
-    rated_power: MaybeNumber = parameter(
-        "motor.rated_power", "W", "rated power", '"3 kW"', "above 0", default=None, formerly="motor.power"
-    )
+    source: str = parameter("source", "", "where the numbers are from", '"motor plate"', "one line",
+        default="data sheets")
+    machine: Machine = parameter("load.machine", "", "kind of the machine", '"travel"',
+        choices=get_args(Machine))
+    rated_power: MaybeNumber = parameter("motor.rated_power", "W", "rated power", '"3 kW"', "above 0",
+        default=None, formerly="motor.power")
     rated_torque: MaybeNumber = _maybe("motor.rated_torque", "N*m", "rated torque", '"20 N*m"')
-    rated_speed: Number = parameter(
-        "motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0", formerly="motor.speed"
-    )
-    motor_inertia: Number = parameter(
-        "motor.inertia", "kg*m^2", "inertia of the motor's own rotor", '"0.0119 kg*m^2"', "above 0"
-    )
-    added_inertia: Number = _nothing(
-        "motor.added_inertia", "kg*m^2", "inertia of brake, fan and coupling at the motor", '"0.0066 kg*m^2"'
-    )
+    rated_speed: Number = parameter("motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0",
+        formerly="motor.speed")
+    motor_inertia: Number = parameter("motor.inertia", "kg*m^2", "inertia of the motor's own rotor",
+        '"0.0119 kg*m^2"', "above 0")
+    added_inertia: Number = _nothing("motor.added_inertia", "kg*m^2",
+        "inertia of brake, fan and coupling at the motor", '"0.0066 kg*m^2"')
     starting_torque: MaybeNumber = _maybe("motor.starting_torque", "N*m", "starting torque", '"44 N*m"')
-    starting_ratio: Number = parameter(
-        "motor.starting_ratio", "1", "starting torque over rated torque", "2.2", "above 0", default=1.5
-    )
+    starting_ratio: Number = parameter("motor.starting_ratio", "1", "starting torque over rated torque",
+        "2.2", "above 0", default=1.5)
     maximum_torque: MaybeNumber = _maybe("motor.maximum_torque", "N*m", "largest torque", '"52 N*m"')
     maximum_ratio: MaybeNumber = _maybe("motor.maximum_ratio", "1", "largest torque over rated torque", "2.6")
     torque_lag: Number = _nothing("motor.torque_lag", "s", "lag of the torque behind its demand", '"2 ms"')
-    coupling_stiffness: MaybeNumber = _maybe(
-        "coupling.stiffness", "N*m/rad", "stiffness of the coupling on the motor shaft", '"1500 N*m/rad"'
-    )
-    coupling_play: Number = _nothing(
-        "coupling.play", "m", "play of the coupling along its circumference", '"0.1 mm"'
-    )
-    coupling_diameter: MaybeNumber = _maybe(
-        "coupling.diameter", "m", "diameter on which the coupling has its play", '"60 mm"'
-    )
-    ratio: Number = parameter(
-        "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=1.0
-    )
-    efficiency: Number = parameter(
-        "gear.efficiency", "1", "efficiency of all gears", "0.94", "above 0 and at most 1", default=0.95
-    )
-    gear_stiffness: MaybeNumber = _maybe(
-        "gear.stiffness", "N*m/rad", "stiffness of the gears at the output", '"25 N*m/arcmin"'
-    )
+    coupling_stiffness: MaybeNumber = _maybe("coupling.stiffness", "N*m/rad",
+        "stiffness of the coupling on the motor shaft", '"1500 N*m/rad"')
+    coupling_play: Number = _nothing("coupling.play", "m", "play of the coupling along its circumference",
+        '"0.1 mm"')
+    coupling_diameter: MaybeNumber = _maybe("coupling.diameter", "m",
+        "diameter on which the coupling has its play", '"60 mm"')
+    ratio: Number = parameter("gear.ratio", "1", "turns of the motor for one of the output", "31.5",
+        "above 0", default=1.0)
+    efficiency: Number = parameter("gear.efficiency", "1", "efficiency of all gears", "0.94",
+        "above 0 and at most 1", default=0.95)
+    gear_stiffness: MaybeNumber = _maybe("gear.stiffness", "N*m/rad", "stiffness of the gears at the output",
+        '"25 N*m/arcmin"')
     backlash: Number = _nothing("gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"')
-    shaft_diameter: MaybeNumber = _maybe(
-        "output.diameter", "m", "diameter of the steel shaft behind the gears", '"55 mm"'
-    )
-    shaft_length: MaybeNumber = _maybe(
-        "output.length", "m", "length of the steel shaft behind the gears", '"900 mm"'
-    )
-    output_play: Number = _nothing(
-        "output.play", "m", "play of couplings and open gears behind it, along the circumference", '"0.4 mm"'
-    )
-    play_diameter: MaybeNumber = _maybe(
-        "output.play_diameter", "m", "diameter on which they have this play", '"120 mm"'
-    )
+    shaft_diameter: MaybeNumber = _maybe("output.diameter", "m",
+        "diameter of the steel shaft behind the gears", '"55 mm"')
+    shaft_length: MaybeNumber = _maybe("output.length", "m", "length of the steel shaft behind the gears",
+        '"900 mm"')
+    output_play: Number = _nothing("output.play", "m",
+        "play of couplings and open gears behind it, along the circumference", '"0.4 mm"')
+    play_diameter: MaybeNumber = _maybe("output.play_diameter", "m", "diameter on which they have this play",
+        '"120 mm"')
     mass: MaybeNumber = _maybe("load.mass", "kg", "mass that is moved", '"12000 kg"')
     radius: MaybeNumber = _maybe("load.radius", "m", "radius of wheel or drum", '"0.1575 m"')
-    reeving: Number = parameter(
-        "load.reeving", "1", "falls of rope that carry the load for one that is wound", "2", "above 0",
-        default=1.0,
-    )  # fmt: skip
-    rope_stiffness: MaybeNumber = _maybe(
-        "rope.stiffness", "N/m", "stiffness of one fall, times the ropes that the drum winds", '"0.8 MN/m"'
-    )
+    reeving: Number = parameter("load.reeving", "1",
+        "falls of rope that carry the load for one that is wound", "2", "above 0", default=1.0)
+    rope_stiffness: MaybeNumber = _maybe("rope.stiffness", "N/m",
+        "stiffness of one fall, times the ropes that the drum winds", '"0.8 MN/m"')
     rope_length: MaybeNumber = _maybe("rope.length", "m", "length of one fall of the rope", '"12 m"')
     rope_diameter: MaybeNumber = _maybe("rope.diameter", "m", "nominal diameter of the rope", '"14 mm"')
-    rope_modulus: Number = parameter(
-        "rope.modulus", "Pa", "modulus of the rope on its metallic cross-section", '"105 GPa"', "above 0",
-        default=100e9,
-    )  # fmt: skip
-    resistance: MaybeNumber = parameter(
-        "load.resistance", "1", "resistance to motion over weight", "0.008", "from 0 to 1", default=None
-    )
-    output_inertia: Number = _nothing(
-        "load.inertia", "kg*m^2", "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"'
-    )
-    output_torque: Number = _nothing(
-        "load.torque", "N*m", "further torque of the load at the output", '"20 N*m"'
-    )
+    rope_modulus: Number = parameter("rope.modulus", "Pa",
+        "modulus of the rope on its metallic cross-section", '"105 GPa"', "above 0", default=100e9)
+    resistance: MaybeNumber = parameter("load.resistance", "1", "resistance to motion over weight", "0.008",
+        "from 0 to 1", default=None)
+    output_inertia: Number = _nothing("load.inertia", "kg*m^2",
+        "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"')
+    output_torque: Number = _nothing("load.torque", "N*m", "further torque of the load at the output",
+        '"20 N*m"')
     motors: Number = parameter("load.motors", "1", "motors on one load and rope", "2", "above 0", default=1.0)
-    damping_ratio: Number = parameter(
-        "shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03", "from 0 to 1", default=0.02
-    )
+    damping_ratio: Number = parameter("shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03",
+        "from 0 to 1", default=0.02)
+    # fmt: on
 
     # making one -------------------------------------------------------------------------------------------
 
@@ -227,7 +203,9 @@ class DataSheet(ParameterSet):
         wording = Wording(where, style="toml")
         document = parsed(text, wording, cls.WHAT, cls.TABLES)
         if "start" in document and not cls.describes(document):
-            raise InputError(wording.whole("this is the file of a drive already; softstart compare takes it"))
+            raise InputError(
+                wording.sentence("", "this is the file of a drive already; softstart compare takes it")
+            )
         return cls._from_document(document, where, also)
 
     @classmethod
@@ -287,7 +265,8 @@ class DataSheet(ParameterSet):
         given, of = vars(self)["_given"], self.PARAMETERS
         by_ratio = "starting_torque" not in given or "maximum_ratio" in given
         if by_ratio and not {"rated_power", "rated_torque"} & given:
-            yield wording.missing(of["rated_power"], f", or {wording.label(of['rated_torque'])} in its place")
+            other = wording.label(of["rated_torque"])
+            yield wording.missing(of["rated_power"], f", or {other} in its place").sentence
 
     def contradictions(self) -> Iterator[str]:
         """What is missing for this machine, what contradicts something else, and what stands alone."""

@@ -172,51 +172,31 @@ def limits_of(values: Mapping[str, Any]) -> Limits:
 def contradicting_limits(
     values: Mapping[str, Any], parameters: Mapping[str, Parameter], wording: Wording
 ) -> Iterator[str]:
-    """A sentence for limits that contradict one another or the load; `values` holds those that are valid."""
+    """A sentence for a life or an S-N curve that is incomplete; `values` holds those that are valid."""
 
-    def name(key: str) -> str:
-        return wording.label(parameters[key])
-
-    def wrong(key: str, reason: str) -> str:
+    def wrong(key: str, reason: str, other: str = "") -> str:
         value = values[key]
         value = value[0] if isinstance(value, tuple) and len(value) == 1 else value
-        return wording.sentence(f"{name(key)} = {wording.show(value)}", reason)
+        subject = f"{wording.label(parameters[key])} = {wording.show(value)}"
+        return wording.sentence(subject, reason.format(other=other and wording.label(parameters[other])))
 
-    most, load = values.get("permissible_torque"), values.get("load_torque")
-    if most is not None and load is not None and np.any(np.abs(load) >= most):
-        reason = (
-            f"at constant speed the shaft already carries {name('load_torque')} = {wording.show(load)} N*m"
-        )
-        yield wrong("permissible_torque", f"{reason}; give the permissible peak, at the motor shaft")
-    time, starts = values.get("permissible_start_time"), values.get("starts_per_hour")
-    if time is not None and starts is not None and np.any(np.multiply(time, starts) > 3600.0):
-        each = f"{name('permissible_start_time')} = {wording.show(time)} s"
-        yield wrong(
-            "starts_per_hour", f"so many starts of {each} take more than an hour; lower one of the two"
-        )
-    if values.get("required_life") is not None and starts is None:
-        yield wording.missing(parameters["starts_per_hour"])
-    yield from _contradicting_curve(values, name, wrong)
-
-
-def _contradicting_curve(values: Mapping[str, Any], name: Any, wrong: Any) -> Iterator[str]:
-    """The same for the S-N curve."""
+    if values.get("required_life") is not None and values.get("starts_per_hour") is None:
+        yield wording.missing(parameters["starts_per_hour"]).sentence
     slope, torque, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
     if torque is None or cycles is None:
         for key, other in (("fatigue_torque", "fatigue_cycles"), ("fatigue_cycles", "fatigue_torque")):
             if values.get(key) is not None:
-                yield wrong(key, f"an S-N curve has torque and cycles; give {name(other)} as well")
+                yield wrong(key, "an S-N curve has torque and cycles; give {other} as well", other)
         return
+    points = sorted(zip(torque, cycles, strict=False), reverse=True)
     if len(torque) != len(cycles):
-        yield wrong("fatigue_cycles", f"there are {len(cycles)} for {len(torque)} values of "
-                    f"{name('fatigue_torque')}; give one for each")  # fmt: skip
+        count = f"there are {len(cycles)} for {len(torque)} values of {{other}}; give one for each"
+        yield wrong("fatigue_cycles", count, "fatigue_torque")
     elif len(torque) == 1 and slope is None:
-        yield wrong("fatigue_torque", f"one point is no curve; give {name('fatigue_slope')}, or more points")
+        yield wrong("fatigue_torque", "one point is no curve; give {other}, or more points", "fatigue_slope")
     elif len(torque) > 1 and slope is not None:
-        yield wrong("fatigue_slope", "the points of the S-N curve give its slopes; leave out the slope, or "
-                    "all points but one")  # fmt: skip
-    else:
-        points = sorted(zip(torque, cycles, strict=True), reverse=True)
-        if any(a[0] == b[0] or a[1] >= b[1] for a, b in pairwise(points)):
-            yield wrong("fatigue_cycles", "a smaller torque must be withstood for more cycles, in each of "
-                        f"the points; sort them as {name('fatigue_torque')}")  # fmt: skip
+        reason = "the points of the S-N curve give its slopes; leave out the slope, or all points but one"
+        yield wrong("fatigue_slope", reason)
+    elif any(a[0] == b[0] or a[1] >= b[1] for a, b in pairwise(points)):
+        reason = "a smaller torque must be withstood for more cycles, in each point; sort them as {other}"
+        yield wrong("fatigue_cycles", reason, "fatigue_torque")

@@ -6,7 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args, overload
+from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 import numpy as np
 
@@ -27,13 +27,7 @@ from softstart.input.parameter_set import (
     read_settings,
 )  # fmt: skip
 from softstart.input.parameters import Knob, Parameter, Wording
-from softstart.late import late
 from softstart.quantities import show
-
-if TYPE_CHECKING:
-    import control
-
-control_systems = late("softstart.drive.control_systems")
 
 __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
 
@@ -90,169 +84,110 @@ class Drive(ParameterSet):
     WHAT: ClassVar[str] = "a drive"
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
-    SEVERAL: ClassVar[Mapping[str, str]] = {
-        "": "a drive has one value; for several starts use sweep",
-        "python": "a drive has one value; for several starts write records(drive, {name}={value})",
-    }
-    SHEET: ClassVar[Any]  # `DataSheet`, which knows drives
+    # as a chain has it
+    motor_index, load_index = 0, 1
+    mass_names: ClassVar[tuple[str, ...]] = ("motor", "load")
+    shaft_names: ClassVar[tuple[str, ...]] = ("motor - load",)
+    warnings: ClassVar[tuple[str, ...]] = ()  # what it leaves out that decides its shaft torques
+    SEVERAL: ClassVar[str] = (
+        "a drive has one value; for several use sweep, in Python records(drive, {name}=...)"
+    )
 
+    # fmt: off
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
-    assumed: str = parameter(
-        "assumed",
-        "",
-        "what is assumed rather than known",
-        '"efficiency 0.95; damping ratio 0.02"',
-        default="",
-    )
-    units: str = parameter(
-        "units", "", "units in which page and report show angles and speeds", '"deg, rpm"', default=""
-    )
-    motor_inertia: Number = parameter(
-        "motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"', "above 0", symbol="J1"
-    )
-    starting_torque: Number = parameter(
-        "motor.starting_torque", "N*m", "starting torque of the motor", '"62 N*m"', "above 0", symbol="Ms"
-    )
-    maximum_torque: Number = parameter(
-        "motor.maximum_torque", "N*m", "largest torque of the motor", '"64 N*m"', "above 0",
-        default=None, follows="starting_torque",
-    )  # fmt: skip
-    minimum_torque: Number = parameter(
-        "motor.minimum_torque", "N*m", "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less",
-        default=0.0,
-    )  # fmt: skip
-    motor_friction: Number = parameter(
-        "motor.friction", "N*m", "Coulomb friction of the motor", '"1.2 N*m"', "0 or more", default=0.0,
-    )  # fmt: skip
-    motor_viscous_friction: Number = parameter(
-        "motor.viscous_friction", "N*m*s/rad", "viscous friction of the motor", '"0.01 N*m*s/rad"',
-        "0 or more", default=0.0, symbol="b1",
-    )  # fmt: skip
-    rated_power: MaybeNumber = parameter(
-        "motor.rated_power", "W", "rated power of the motor", '"2.2 kW"', "above 0", default=None
-    )
-    rated_speed: MaybeNumber = parameter(
-        "motor.rated_speed", "rad/s", "rated speed of the motor", '"880 rpm"', "above 0", default=None
-    )
-    rated_torque: MaybeNumber = parameter(
-        "motor.rated_torque", "N*m", "rated torque of the motor", '"23.9 N*m"', "above 0", default=None
-    )
-    torque_lag: Number = parameter(
-        "motor.torque_lag", "s", "time constant of the torque behind its demand", '"2 ms"', "0 or more",
-        default=0.0,
-    )  # fmt: skip
-    torque_rate: Number = parameter(
-        "motor.torque_rate", "N*m/s", "largest rate of the torque demand", '"500 N*m/s"', "above 0",
-        default=math.inf, infinite=True,
-    )  # fmt: skip
-    encoder_lines: Number = parameter(
-        "motor.encoder_lines", "1", "number of encoder lines (four counts each; 0 for an ideal encoder)",
-        "4096", "a whole number, 0 or more", default=4096.0,
-    )  # fmt: skip
-    encoder_phase: Number = parameter(
-        "motor.encoder_phase", "1",
-        "where between two edges of the encoder the start lies, as a share of a count",
-        "0.5", "from 0 to 1", default=0.0,
-    )  # fmt: skip
-    torque_noise: Number = parameter(
-        "motor.torque_noise", "N*m",
-        "standard deviation of the noise on the measured motor torque, in each sample",
-        '"0.2 N*m"', "0 or more", default=0.0,
-    )  # fmt: skip
-    noise_seed: Number = parameter(
-        "motor.noise_seed", "1", "number of the noise: the same number gives the same noise",
-        "1", "a whole number, 0 or more", default=0.0,
-    )  # fmt: skip
-    computing_delay: Number = parameter(
-        "motor.computing_delay", "s",
-        "dead time between what a controller measures and the torque demand that follows from it",
-        '"1 ms"', "0 or more", default=0.0,
-    )  # fmt: skip
-    gear_ratio: MaybeNumber = parameter(
-        "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=None
-    )
-    stiffness: Number = parameter(
-        "shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"', "above 0", symbol="c"
-    )
-    damping: Number = parameter(
-        "shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"', "0 or more",
-        default=0.0, symbol="d",
-    )  # fmt: skip
+    assumed: str = parameter("assumed", "", "what is assumed rather than known",
+        '"efficiency 0.95; damping ratio 0.02"', default="")
+    units: str = parameter("units", "", "units in which page and report show angles and speeds", '"deg, rpm"',
+        default="")
+    motor_inertia: Number = parameter("motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"',
+        "above 0", symbol="J1")
+    starting_torque: Number = parameter("motor.starting_torque", "N*m", "starting torque of the motor",
+        '"62 N*m"', "above 0", symbol="Ms")
+    maximum_torque: Number = parameter("motor.maximum_torque", "N*m", "largest torque of the motor",
+        '"64 N*m"', "above 0", default=None, follows="starting_torque")
+    minimum_torque: Number = parameter("motor.minimum_torque", "N*m",
+        "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less", default=0.0)
+    motor_friction: Number = parameter("motor.friction", "N*m", "Coulomb friction of the motor", '"1.2 N*m"',
+        "0 or more", default=0.0)
+    motor_viscous_friction: Number = parameter("motor.viscous_friction", "N*m*s/rad",
+        "viscous friction of the motor", '"0.01 N*m*s/rad"', "0 or more", default=0.0, symbol="b1")
+    rated_power: MaybeNumber = parameter("motor.rated_power", "W", "rated power of the motor", '"2.2 kW"',
+        "above 0", default=None)
+    rated_speed: MaybeNumber = parameter("motor.rated_speed", "rad/s", "rated speed of the motor",
+        '"880 rpm"', "above 0", default=None)
+    rated_torque: MaybeNumber = parameter("motor.rated_torque", "N*m", "rated torque of the motor",
+        '"23.9 N*m"', "above 0", default=None)
+    torque_lag: Number = parameter("motor.torque_lag", "s", "time constant of the torque behind its demand",
+        '"2 ms"', "0 or more", default=0.0)
+    torque_rate: Number = parameter("motor.torque_rate", "N*m/s", "largest rate of the torque demand",
+        '"500 N*m/s"', "above 0", default=math.inf, infinite=True)
+    encoder_lines: Number = parameter("motor.encoder_lines", "1",
+        "number of encoder lines (four counts each; 0 for an ideal encoder)", "4096",
+        "a whole number, 0 or more", default=4096.0)
+    encoder_phase: Number = parameter("motor.encoder_phase", "1",
+        "where between two edges of the encoder the start lies, as a share of a count", "0.5", "from 0 to 1",
+        default=0.0)
+    torque_noise: Number = parameter("motor.torque_noise", "N*m",
+        "standard deviation of the noise on the measured motor torque, in each sample", '"0.2 N*m"',
+        "0 or more", default=0.0)
+    noise_seed: Number = parameter("motor.noise_seed", "1",
+        "number of the noise: the same number gives the same noise", "1", "a whole number, 0 or more",
+        default=0.0)
+    computing_delay: Number = parameter("motor.computing_delay", "s",
+        "dead time between what a controller measures and the torque demand that follows from it", '"1 ms"',
+        "0 or more", default=0.0)
+    gear_ratio: MaybeNumber = parameter("gear.ratio", "1", "turns of the motor for one of the output", "31.5",
+        "above 0", default=None)
+    stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"',
+        "above 0", symbol="c")
+    damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"',
+        "0 or more", default=0.0, symbol="d")
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap")
-    contact_law: ContactLaw = parameter(
-        "shaft.contact_law", "", "law of the shaft torque in contact", '"no-pull"',
-        default="no-pull", choices=get_args(ContactLaw),
-    )  # fmt: skip
-    load_inertia: Number = parameter(
-        "load.inertia", "kg*m^2", "inertia of the load at the motor shaft", '"0.175 kg*m^2"', "above 0",
-        symbol="J2",
-    )  # fmt: skip
-    load_torque: Number = parameter(
-        "load.torque", "N*m", "torque of the load at the motor shaft", '"7.16 N*m"', symbol="Mc"
-    )
-    load_kind: LoadKind = parameter(
-        "load.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
-    )
-    load_viscous_friction: Number = parameter(
-        "load.viscous_friction", "N*m*s/rad", "viscous friction of the load at the motor shaft",
-        '"0.02 N*m*s/rad"', "0 or more", default=0.0, symbol="b2",
-    )  # fmt: skip
-    target_speed: Number = parameter(
-        "start.target_speed", "rad/s", "speed that the load is to reach", '"880 rpm"', "above 0",
-        default=None, follows="rated_speed",
-    )  # fmt: skip
-    start_position: NumberOrWord = parameter(
-        "start.position", "rad", "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"',
-        default="mid-gap", choices=get_args(Position), symbol="theta", formerly="shaft.start_position",
-    )  # fmt: skip
-    brake: Brake = parameter(
-        "start.brake", "", "brake that holds the motor until its release", '"motor"',
-        default="none", choices=get_args(Brake),
-    )  # fmt: skip
-    release: NumberOrWord = parameter(
-        "start.release", "s", "release of the brake, by torque proving or at a time", '"0.1 s"', "0 or more",
-        default="torque", choices=("torque",),
-    )  # fmt: skip
-    initial_speed: NumberOrWord = parameter(
-        "start.initial_speed", "rad/s", "speed of motor and load at the start, or minus the target speed",
-        '"-20 rad/s"', default=0.0, choices=("reversal",),
-    )  # fmt: skip
-    initial_load_speed: Number = parameter(
-        "start.initial_load_speed", "rad/s", "speed of the load at the start", '"0 rad/s"',
-        default=0.0, follows="initial_speed",
-    )  # fmt: skip
-    initial_motor_speed: Number = parameter(
-        "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"',
-        default=0.0, follows="initial_speed",
-    )  # fmt: skip
+    contact_law: ContactLaw = parameter("shaft.contact_law", "", "law of the shaft torque in contact",
+        '"no-pull"', default="no-pull", choices=get_args(ContactLaw))
+    load_inertia: Number = parameter("load.inertia", "kg*m^2", "inertia of the load at the motor shaft",
+        '"0.175 kg*m^2"', "above 0", symbol="J2")
+    load_torque: Number = parameter("load.torque", "N*m", "torque of the load at the motor shaft",
+        '"7.16 N*m"', symbol="Mc")
+    load_kind: LoadKind = parameter("load.kind", "", "kind of the load torque", '"active"', default="active",
+        choices=get_args(LoadKind))
+    load_viscous_friction: Number = parameter("load.viscous_friction", "N*m*s/rad",
+        "viscous friction of the load at the motor shaft", '"0.02 N*m*s/rad"', "0 or more", default=0.0,
+        symbol="b2")
+    target_speed: Number = parameter("start.target_speed", "rad/s", "speed that the load is to reach",
+        '"880 rpm"', "above 0", default=None, follows="rated_speed")
+    start_position: NumberOrWord = parameter("start.position", "rad",
+        "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"', default="mid-gap",
+        choices=get_args(Position), symbol="theta", formerly="shaft.start_position")
+    brake: Brake = parameter("start.brake", "", "brake that holds the motor until its release", '"motor"',
+        default="none", choices=get_args(Brake))
+    release: NumberOrWord = parameter("start.release", "s",
+        "release of the brake, by torque proving or at a time", '"0.1 s"', "0 or more", default="torque",
+        choices=("torque",))
+    initial_speed: NumberOrWord = parameter("start.initial_speed", "rad/s",
+        "speed of motor and load at the start, or minus the target speed", '"-20 rad/s"', default=0.0,
+        choices=("reversal",))
+    initial_load_speed: Number = parameter("start.initial_load_speed", "rad/s",
+        "speed of the load at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
+    initial_motor_speed: Number = parameter("start.initial_motor_speed", "rad/s",
+        "speed of the motor at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
 
-    permissible_torque: MaybeNumber = parameter(
-        "limits.shaft_torque", "N*m", "permissible peak of the shaft torque", '"130 N*m"', "above 0",
-        default=None,
-    )  # fmt: skip
-    permissible_start_time: MaybeNumber = parameter(
-        "limits.start_time", "s", "longest permissible start time", '"1.5 s"', "above 0", default=None
-    )
-    starts_per_hour: MaybeNumber = parameter(
-        "limits.starts_per_hour", "1", "number of starts in an hour of operation", "60", "above 0",
-        default=None,
-    )  # fmt: skip
-    required_life: MaybeNumber = parameter(
-        "limits.life", "s", "time of operation that the shaft line must last", '"20000 h"', "above 0",
-        default=None,
-    )  # fmt: skip
-    fatigue_slope: MaybeNumber = parameter(
-        "limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6", "above 0", default=None
-    )
-    fatigue_torque: MaybeSeries = parameter(
-        "limits.fatigue.torque", "N*m", "torque of the points of the S-N curve", '"90 N*m"', "above 0",
-        default=None, many=True,
-    )  # fmt: skip
-    fatigue_cycles: MaybeSeries = parameter(
-        "limits.fatigue.cycles", "1", "number of cycles at the points of the S-N curve", "2e6", "above 0",
-        default=None, many=True,
-    )  # fmt: skip
+    permissible_torque: MaybeNumber = parameter("limits.shaft_torque", "N*m",
+        "permissible peak of the shaft torque", '"130 N*m"', "above 0", default=None)
+    permissible_start_time: MaybeNumber = parameter("limits.start_time", "s",
+        "longest permissible start time", '"1.5 s"', "above 0", default=None)
+    starts_per_hour: MaybeNumber = parameter("limits.starts_per_hour", "1",
+        "number of starts in an hour of operation", "60", "above 0", default=None)
+    required_life: MaybeNumber = parameter("limits.life", "s",
+        "time of operation that the shaft line must last", '"20000 h"', "above 0", default=None)
+    fatigue_slope: MaybeNumber = parameter("limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6",
+        "above 0", default=None)
+    fatigue_torque: MaybeSeries = parameter("limits.fatigue.torque", "N*m",
+        "torque of the points of the S-N curve", '"90 N*m"', "above 0", default=None, many=True)
+    fatigue_cycles: MaybeSeries = parameter("limits.fatigue.cycles", "1",
+        "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True)
+    # fmt: on
 
     def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
         super()._fill(given, *args, **known)
@@ -321,8 +256,10 @@ class Drive(ParameterSet):
 
         The tables of a data sheet give the drive that follows from it (`softstart.DataSheet`).
         """
-        if cls.SHEET.describes(document):
-            document = tomllib.loads(cls.SHEET._from_document(dict(document), where).drive_toml())
+        from softstart.drive.data_sheet import DataSheet
+
+        if DataSheet.describes(document):
+            document = tomllib.loads(DataSheet._from_document(dict(document), where).drive_toml())
         return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------
@@ -504,18 +441,6 @@ class Drive(ParameterSet):
         """What has the data of the motor: the drive itself."""
         return self
 
-    motor_index, load_index = 0, 1  # of the masses
-
-    @property
-    def mass_names(self) -> tuple[str, ...]:
-        """The two masses."""
-        return ("motor", "load")
-
-    @property
-    def shaft_names(self) -> tuple[str, ...]:
-        """The shaft by the masses that it joins."""
-        return ("motor - load",)
-
     @property
     def gaps(self) -> Vector:
         """The gap of the shaft, rad, as an array."""
@@ -525,11 +450,6 @@ class Drive(ParameterSet):
     def own_gaps(self) -> tuple[float, ...]:
         """The gap of each shaft at that shaft itself, rad, as it was given."""
         return (float(self.gap),)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on what the machine leaves out that decides its shaft torques: none of a drive."""
-        return ()
 
     @property
     def shaft_means(self) -> Vector:
@@ -679,13 +599,7 @@ class Drive(ParameterSet):
         moved = np.where(before == after, theta, moved)
         return one.replace(start_position=moved if moved.ndim else float(moved))
 
-    @overload
-    def to_control(self, *, nonlinear: Literal[False] = False) -> control.StateSpace: ...
-
-    @overload
-    def to_control(self, *, nonlinear: bool) -> control.StateSpace | control.NonlinearIOSystem: ...
-
-    def to_control(self, *, nonlinear: bool = False) -> control.StateSpace | control.NonlinearIOSystem:
+    def to_control(self, *, nonlinear: bool = False) -> Any:
         """The drive for the python-control library: in contact (linear), or the whole of it.
 
         The linear system has the inputs `motor_torque` and `load_torque`, as states and outputs the twist `z`
@@ -696,9 +610,9 @@ class Drive(ParameterSet):
         >>> sorted(round(float(abs(pole)), 3) for pole in Drive.load("crane-4amtkf").to_control().poles())
         [0.0, 112.397, 112.397]
         """
-        if nonlinear:
-            return control_systems.whole_drive(self)
-        return control_systems.in_contact(self)
+        from softstart.drive import control_systems
+
+        return control_systems.whole_drive(self) if nonlinear else control_systems.in_contact(self)
 
 
 PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS

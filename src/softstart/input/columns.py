@@ -14,7 +14,7 @@ from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.quantities import RefusedError, parse, show, with_points
 
-_BARE = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?[.,]?[0-9]|[+-]?(inf|nan)\b", re.IGNORECASE)
 Heading = Literal["any", "names", "units"]
 
 __all__ = ["Columns", "Wanted", "read_columns"]
@@ -55,10 +55,10 @@ def read_columns(
     decimal commas divide the values by semicolons, as 0,5;10,5, or write decimal points.
     """
     rows, separator = _rows(text, where)
-    heading = [cell.strip() for cell in rows[0][1]] if rows else []
     names = " and ".join(one.names[0] for one in wanted)
+    heading = [cell.strip() for cell in rows[0][1]] if rows else []
     first = show(separator.join(heading))
-    if rows and not any(map(_begins_a_number, heading)):
+    if rows and not any(map(_NUMBER.match, heading)):
         rows = rows[1:]
     else:
         heading = [""] * len(wanted)
@@ -68,99 +68,74 @@ def read_columns(
         raise InputError(f"{where}: its first line is {first}: {refusal.reason}.") from None
     if not rows:
         raise InputError(f"{where}: there are no numbers in it; write a line for each {names}.")
-    odd = [(number, row) for number, row in rows if len(row) != len(heading)]
-    if odd:
-        raise InputError(f"{where}: {_miscounted(*odd[0], separator, len(heading), names)}{_more(odd[1:])}.")
+    refused = []
+    for number, row in rows:
+        if len(row) != len(heading):
+            shown, count = show(separator.join(row)), f"{len(row)} value{'s' * (len(row) > 1)}"
+            reason = f"line {number}, {shown}, has {count} instead of {len(heading)}, {names}"
+            if separator == "," and len(row) > len(heading):
+                reason += "; with decimal commas divide the values by semicolons, as 0,5;10,5, or write "
+                reason += "decimal points"
+            refused.append(reason)
+    values = []
     try:
-        cells = with_points([row[place].strip() for place in places for _, row in rows])
+        cells = [] if refused else with_points([row[place].strip() for place in places for _, row in rows])
     except RefusedError as refusal:
-        raise InputError(f"{where}: {refusal.reason}.") from None
-    values, refused = [], []
-    for index, (one, unit) in enumerate(zip(wanted, units, strict=True)):
-        own = cells[index * len(rows) : (index + 1) * len(rows)]
-        column = np.empty(len(rows))
-        for row_index, (cell, (number, _)) in enumerate(zip(own, rows, strict=True)):
-            if missing and cell.lower() in ("", "nan"):
-                column[row_index] = math.nan
-                continue
-            try:
-                column[row_index] = _number(cell, unit, one.unit)
-            except RefusedError as refusal:
-                refused.append(f"{where}: line {number}, {one.names[0]} = {show(cell)}: {refusal.reason}")
+        refused.append(refusal.reason)
+    for one, unit, place in (
+        () if refused else zip(wanted, units, range(0, len(cells), len(rows)), strict=True)
+    ):
+        column = np.full(len(rows), math.nan)
+        for i, cell in enumerate(cells[place : place + len(rows)]):
+            if not (missing and cell.lower() in ("", "nan")):
+                try:
+                    column[i] = parse(f"{cell} {unit}", one.unit)
+                except RefusedError as refusal:
+                    refused.append(f"line {rows[i][0]}, {one.names[0]} = {show(cell)}: {refusal.reason}")
         values.append(column)
     if refused:
-        raise InputError(f"{refused[0]}{_more(refused[1:])}.")
+        more = f"; {len(refused) - 1} more like this" if refused[1:] else ""
+        raise InputError(f"{where}: {refused[0]}{more}.")
     return Columns([number for number, _ in rows], values)
-
-
-def _number(cell: str, unit: str, wanted: str) -> float:
-    if unit in ("", wanted) and _BARE.fullmatch(cell) and math.isfinite(value := float(cell)):
-        return value  # all of its bits, those of -0.0 too
-    return float(parse(f"{cell} {unit}" if unit else cell, wanted))
-
-
-def _more(others: Sequence[object]) -> str:
-    return f"; {len(others)} more like this" if others else ""
 
 
 def _rows(text: str, where: str) -> tuple[list[tuple[int, list[str]]], str]:
     """The cells of each line that counts, with its number, and what divides them."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    separator = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines)), ",")
+    numbered = enumerate(text.splitlines(), start=1)
+    lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    mark = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines)), ",")
     try:
-        rows = [
-            (n, next(csv.reader([line], delimiter=separator, skipinitialspace=True))) for n, line in lines
-        ]
+        rows = [(n, next(csv.reader([line], delimiter=mark, skipinitialspace=True))) for n, line in lines]
     except csv.Error as error:
         raise InputError(f"{where}: it cannot be read as columns of numbers ({error}).") from None
-    if rows and all(
-        len(row) > 1 and not row[-1].strip() for _, row in rows
-    ):  # a mark at the end of each line
-        rows = [(number, row[:-1]) for number, row in rows]
-    return rows, separator
-
-
-def _begins_a_number(cell: str) -> bool:
-    return re.match(r"[+-]?[.,]?[0-9]|[+-]?(inf|nan)\b", cell, re.IGNORECASE) is not None
-
-
-def _miscounted(number: int, row: Sequence[str], separator: str, width: int, names: str) -> str:
-    shown = show(separator.join(row))
-    count = f"{len(row)} value{'s' if len(row) > 1 else ''} instead of {width}"
-    remedy = ""
-    if separator == "," and len(row) > width:
-        remedy = "; with decimal commas divide the values by semicolons, as 0,5;10,5, or write decimal points"
-    return f"line {number}, {shown}, has {count}, {names}{remedy}"
+    if all(len(row) > 1 and not row[-1].strip() for _, row in rows):  # a mark at the end of each line
+        rows = [(n, row[:-1]) for n, row in rows]
+    return rows, mark
 
 
 def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -> tuple[list[int], list[str]]:
     """Which columns are wanted, and the unit that each heading gives."""
     parts = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", cell, re.DOTALL) for cell in heading]
-    names = [part[1].strip() if part else "" for part in parts]
-    found: list[int | None] = []
-    for one in wanted:
+    names, units = ([part[i] or "" if part else "" for part in parts] for i in (1, 2))
+    found: dict[int, int] = {}  # the column of each one wanted
+    for k, one in enumerate(wanted):
         here = [i for i, name in enumerate(names) if name in one.names] or [
             i for i, name in enumerate(names) if name.lower() in map(str.lower, one.names)
         ]
         if len(here) > 1:
             raise RefusedError(f"it names {one.names[0]} twice; keep one of the two columns")
-        found.append(here[0] if here else None)
+        found.update((k, i) for i in here)
     if headed == "any" and len(heading) == len(wanted):  # other names, in the order wanted
-        free = iter(sorted(set(range(len(wanted))) - set(found)))
-        found = [next(free) if place is None else place for place in found]
-    places = [place for place in found if place is not None]
-    units = [part[2] or "" if part else "" for part in (parts[place] for place in places)]
-    if len(places) < len(wanted) or (headed == "units" and not all(units)):
+        free = iter(sorted(set(range(len(wanted))) - set(found.values())))
+        found |= {k: next(free) for k in range(len(wanted)) if k not in found}
+    places = [found[k] for k in sorted(found)]
+    if len(places) < len(wanted) or (headed == "units" and not all(units[i] for i in places)):
         units_too = " with units" if headed == "units" else ""
         form = ",".join(f"{one.names[0]} [{one.unit}]" if units_too else one.names[0] for one in wanted)
         raise RefusedError(f"it must name the columns{units_too}, as {form}")
-    for one, unit in zip(wanted, units, strict=True):
+    for one, place in zip(wanted, places, strict=True):
         try:
-            parse(f"1 {unit}", one.unit)
+            parse(f"1 {units[place]}", one.unit)
         except RefusedError as refusal:
-            raise RefusedError(f"unit of {one.names[0]} = {show(unit)}: {refusal.reason}") from None
-    return places, units
+            raise RefusedError(f"unit of {one.names[0]} = {show(units[place])}: {refusal.reason}") from None
+    return places, [units[place] for place in places]

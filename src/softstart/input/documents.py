@@ -16,7 +16,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softstart.errors import MOST, InputError
-from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of, without_unit
+from softstart.input.parameters import (
+    Mistake,
+    Parameter,
+    Wording,
+    meant_by,
+    read_values,
+    sentences_of,
+    without_unit,
+)
 from softstart.quantities import doubtful_comma, nearest, shortest, show
 
 T = TypeVar("T")
@@ -26,8 +34,7 @@ MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer 
 _DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
 
 __all__ = [
-    "Table", "changed", "document_text", "literal", "made", "parsed", "placed", "read_document",
-    "read_table", "renamed", "table_text",
+    "Table", "changed", "document_text", "literal", "made", "parsed", "placed", "read_document", "table_text",
 ]  # fmt: skip
 
 
@@ -94,8 +101,17 @@ def read_document(
     for table in tables:
         content = given.get(table.name)
         if table.many:
-            found[table.name], more_sentences = _rows(content or [], table, tables, what, wording)
-            in_rows += more_sentences
+            found[table.name] = []
+            for i, row in enumerate(content or [], start=1):
+                numbered = replace(wording, row=f"[{table.name}] {i}, ")
+                strays = [
+                    _unknown(numbered.row, key, value, table, tables, what, wording)
+                    for key, value in row.items()
+                    if key not in table.by_key
+                ]
+                values, more = read_values(row, table.by_key, numbered)
+                found[table.name].append(values)
+                in_rows += sentences_of([*strays, *more])
         elif content is None and not table.required:
             found[table.name] = None
         else:
@@ -108,24 +124,6 @@ def read_document(
     return found
 
 
-def _rows(
-    rows: Sequence[Mapping[str, object]], table: Table, tables: Sequence[Table], what: str, wording: Wording
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """The values of each of several tables, and what is wrong in them."""
-    found, wrong = [], []
-    for i, row in enumerate(rows, start=1):
-        numbered = replace(wording, row=f"[{table.name}] {i}, ")
-        strays = [
-            _misspelt(f"{numbered.row}{key} = {wording.show(value)}", key, table, tables, what, wording)
-            for key, value in row.items()
-            if key not in table.by_key
-        ]
-        values, mistakes = read_values(row, table.by_key, numbered)
-        found.append(values)
-        wrong += sentences_of([*strays, *mistakes])
-    return found, wrong
-
-
 def made(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: list[str]) -> T | None:
     """What `make` returns for the values; where it refuses them, its sentences go to `wrong`."""
     try:
@@ -133,27 +131,6 @@ def made(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: l
     except InputError as error:
         wrong.extend(place + sentence for sentence in error.sentences)
         return None
-
-
-def read_table(given: Mapping[str, object], table: Table, *, style: str = "python") -> dict[str, Any]:
-    """The values of one table given from Python, in SI; raises one InputError for everything that is wrong.
-
-    >>> read_table({"i": "three"}, Table("gear", (Parameter("i", "1", "ratio", "3"),)))
-    Traceback (most recent call last):
-    softstart.errors.InputError: i = "three": this is no number with a unit; write a plain number such as ...
-    """
-    wording = Wording(style=style)
-    known = [p.name for p in table.parameters]
-    values, mistakes = read_values(given, {p.name: p for p in table.parameters}, wording)
-    for name, value in given.items():
-        if name not in known:
-            meant = nearest(name, known)
-            rest = f"did you mean {meant}?" if meant else f"there are {', '.join(known)}"
-            reason = f"there is no parameter {name}; {rest}"
-            mistakes.append(Mistake(wording.sentence(f"{name} = {wording.show(value)}", reason), meant=meant))
-    if mistakes:
-        raise InputError(sentences_of(mistakes))
-    return values
 
 
 def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ()) -> dict[str, Any]:
@@ -165,81 +142,74 @@ def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ())
     Traceback (most recent call last):
     softstart.errors.InputError: line 1, column 11, 'gap = 0.5 rad': this is not valid TOML (expected ...
     """
+    subject, document = "", dict[str, Any]()
     if len(text) > MOST_TEXT:
-        size = f"it has {len(text) / 1e6:.3g} million characters, and a TOML file at most {MOST_TEXT / 1e6:g}"
-        raise InputError(wording.whole(f"{size}; a long profile is read from a CSV file"))
-    if (deep := _DEEP.search(text)) is not None:
-        line = text.count("\n", 0, deep.start()) + 1
-        raise InputError(wording.whole(f"line {line}, {show(deep.group())}: keys are nested too deeply"))
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(_invalid(str(error), text, wording)) from None
-    except ValueError:  # of int(): what else is wrong is a TOMLDecodeError
-        raise InputError(wording.whole("a whole number in it has thousands of digits; shorten it")) from None
-    except RecursionError:
-        raise InputError(wording.whole(f"lists or tables are nested too deeply for {what} file")) from None
-    if tables and not document:
-        named = " and ".join(f"[{table.name}]" for table in tables if table.name)
-        raise InputError(wording.whole(f"it is empty; {what} file has the tables {named}"))
+        reason = (
+            f"it has {len(text) / 1e6:.3g} million characters, and a TOML file at most {MOST_TEXT / 1e6:g}; "
+            "a long profile is read from a CSV file"
+        )
+    elif (deep := _DEEP.search(text)) is not None:
+        subject = f"line {text.count(chr(10), 0, deep.start()) + 1}, {show(deep.group())}"
+        reason = "keys are nested too deeply"
+    else:
+        try:
+            document = tomllib.loads(text)
+            named = " and ".join(f"[{table.name}]" for table in tables if table.name)
+            reason = "" if document or not tables else f"it is empty; {what} file has the tables {named}"
+        except tomllib.TOMLDecodeError as error:
+            subject, reason = _invalid(str(error), text)
+        except ValueError:  # of int(): what else is wrong is a TOMLDecodeError
+            reason = "a whole number in it has thousands of digits; shorten it"
+        except RecursionError:
+            reason = f"lists or tables are nested too deeply for {what} file"
+    if reason:
+        raise InputError(wording.sentence(subject, reason))
     return document
 
 
-def _invalid(message: str, text: str, wording: Wording) -> str:
+def _invalid(message: str, text: str) -> tuple[str, str]:
+    """Where text is no TOML, and why, from the message of tomllib."""
     found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
-    if found is None:
-        return wording.whole(f"it is not valid TOML: {message}")
-    what, line, column = found.groups()
+    what, line, column = found.groups() if found else (message, None, None)
     lines = text.splitlines() or [""]
-    number = int(line) if line else len(lines)
-    where = f"line {number}" + (f", column {column}" if column else "")
-    shown = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    number = min(int(line or len(lines)), len(lines))
+    shown = lines[number - 1].strip()
+    subject = f"line {number}{f', column {column}' * bool(column)}{f', {shown[:60]!r}' * bool(shown)}"
     what = what[0].lower() + what[1:]
     unquoted = what.startswith(("invalid value", "expected newline or end of document"))
     remedy = '; write text and quantities in quotes: gap = "0.5 rad"' if unquoted else ""
     if comma := re.fullmatch(r"[\w.-]+\s*=\s*([+-]?\d+,\d+[^,\[\]#]*?)\s*(?:#.*)?", shown):
         what, remedy = doubtful_comma(comma[1]), ""
-    cut = shown if len(shown) <= 60 else f"{shown[:60]}..."
-    subject = f"{where}, {cut!r}" if shown else where
-    return wording.sentence(subject, f"this is not valid TOML ({what}){remedy}")
+    return subject, f"this is not valid TOML ({what}){remedy}"
 
 
 def changed(
     document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[Table], what: str
 ) -> Iterator[str]:
     """Put changes by path into the document; a sentence for each that cannot be."""
-    former = {p.formerly: p.path for table in tables for p in table.parameters if p.formerly}
+    paths = {
+        path: (one, p) for one in tables for p in one.parameters for path in (p.formerly, p.path) if path
+    }
     for path, value in changes.items():
-        yield from _changed(document, former.get(path, path), value, tables, what)
-
-
-def _changed(
-    document: dict[str, Any], path: str, value: object, tables: Sequence[Table], what: str
-) -> Iterator[str]:
-    name, dot, key = path.rpartition(".")
-    name, _, number = name.partition("[")
-    table = next((one for one in tables if one.name == name), None)
-    if table is None or key not in table.by_key:
-        paths = [p.path for one in tables for p in one.parameters]
-        meant = nearest(path, paths)
-        yield f"{path}: {what} file has no such key; " + (
-            f"did you mean {meant}?" if meant else f"it has {', '.join(paths)}."
-        )
-        return
-    if not dot:
-        document[key] = value
-    elif not table.many:
-        inner = document.setdefault(name, {})
-        if isinstance(inner, dict):
-            inner[key] = value
-    else:
-        rows = document.get(name)
-        index = number.rstrip("]")
-        count = len(rows) if isinstance(rows, list) else 0
-        if not index.isdecimal() or not 1 <= int(index) <= count:
-            yield f"{path}: write {name}[N].{key} with N from 1 to {count}."
-        elif isinstance(rows, list) and isinstance(rows[int(index) - 1], dict):
-            rows[int(index) - 1][key] = value
+        plain = re.sub(r"\[.*\]", "", path)
+        if plain not in paths:
+            meant = nearest(plain, paths)
+            remedy = f"did you mean {meant}?" if meant else f"it has {', '.join(paths)}."
+            yield f"{path}: {what} file has no such key; {remedy}"
+            continue
+        table, p = paths[plain]
+        place: Any = document
+        if table.many:
+            rows, row = document.get(table.name), path[len(table.name) + 1 : -len(p.key) - 2]
+            count = len(rows) if isinstance(rows, list) else 0
+            if not row.isdecimal() or not 1 <= int(row) <= count:
+                yield f"{path}: write {table.name}[N].{p.key} with N from 1 to {count}."
+                continue
+            place = document[table.name][int(row) - 1]
+        elif table.name:
+            place = document.setdefault(table.name, {})
+        if isinstance(place, dict):
+            place[p.key] = value
 
 
 def placed(
@@ -247,152 +217,83 @@ def placed(
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """What stands in each table, by its name, and every key or table that stands where it should not.
 
-    A misplaced value is returned as if it stood in its table, so that its own mistakes are found in the same
-    go. The keys within the rows of [[tables]] are not looked at.
+    The keys within the rows of [[tables]] are not looked at.
     """
-    reader = _Reader(tables, what, wording)
-    for key, value in renamed(document, tables).items():
-        reader.take_top(key, value)
-    for table in tables:
-        reader.count(table)
-    for parameter, value in reader.misplaced:
-        reader.given.setdefault(parameter.table, {}).setdefault(parameter.key, value)
-    return reader.given, reader.mistakes
+    named = {"": Table("", ())} | {table.name: table for table in tables}
+    everywhere = [p for table in tables for p in table.parameters]
+    former = {p.formerly: p for p in everywhere if p.formerly}
+    given: dict[str, Any] = {}
+    renamed: list[tuple[Parameter, object]] = []
+    mistakes: list[Mistake] = []
 
+    def note(subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
+        mistakes.append(Mistake(wording.sentence(subject, reason), (), tuple(p.path for p in meant)))
 
-def renamed(document: Mapping[str, Any], tables: Sequence[Table]) -> Mapping[str, Any]:
-    """The document with keys of former versions under their present names, where these are not given."""
-    for parameter in (p for table in tables for p in table.parameters if p.formerly):
-        name, _, key = parameter.formerly.rpartition(".")
-        old, new = document.get(name), document.get(parameter.table, {})
-        if isinstance(old, dict) and key in old and isinstance(new, dict) and parameter.key not in new:
-            document = {**document, name: {one: value for one, value in old.items() if one != key}}
-            table = document.get(parameter.table, {})
-            document = {**document, parameter.table: {**table, parameter.key: old[key]}}
-    return document
-
-
-class _Reader:
-    """Takes the keys of a document one by one."""
-
-    def __init__(self, tables: Sequence[Table], what: str, wording: Wording) -> None:
-        self.tables, self.what, self.wording = tables, what, wording
-        self.named = {table.name: table for table in tables if table.name}
-        self.top = next((table for table in tables if not table.name), Table("", ()))
-        self.given: dict[str, Any] = {}
-        self.misplaced: list[tuple[Parameter, object]] = []
-        self.mistakes: list[Mistake] = []
-
-    def take_top(self, key: str, value: object) -> None:
-        """A key above the first table, or a table."""
-        if len(self.mistakes) > MOST and key not in self.top.by_key and key not in self.named:
-            self._note(key, f"{self.what} file has no such key")  # in short: it is counted, not shown
-            return
-        if key in self.top.by_key:
-            self.given.setdefault("", {})[key] = value
-        elif key in self.named:
-            self._take_table(self.named[key], value)
-        elif isinstance(value, dict) and not any(key in table.by_key for table in self.tables):
-            self._unknown_table(key, value)
-        else:
-            self._stray(f"{key} = {self.wording.show(value)}", key, value, self.top)
-
-    def count(self, table: Table) -> None:
-        """Whether there are enough of a table of which there may be several."""
-        rows = self.given.setdefault(table.name, []) if table.many else []
-        if table.many and rows is not None and len(rows) < table.least:
-            needed = f"{self.what} file needs at least {table.least}, and there are {len(rows)}"
-            self._note(table.bracket, f"{needed}; add {table.bracket} tables")
-
-    def _take_table(self, table: Table, value: object) -> None:
+    def take(table: Table, content: object, written: str = "") -> None:
+        name = table.name
         if table.many:
-            if isinstance(value, list) and all(isinstance(row, dict) for row in value):
-                self.given[table.name] = value
-                return
-            self.given[table.name] = None
-            self._note(f"[{table.name}]", f"there may be several; write {table.bracket} before each")
-        elif not isinstance(value, dict):
-            form = "one table, not a list of tables" if isinstance(value, list) else "a table"
-            reason = f"{table.name} is {form}; write [{table.name}] on a line of its own and its keys below"
-            subject = f"{table.name} = {self.wording.show(value)}"
-            self._note(subject, reason, *(p.path for p in table.parameters))
-        else:
-            own = self.given.setdefault(table.name, {})
-            for key, content in value.items():
-                inner = self.named.get(f"{table.name}.{key}")
-                if inner is not None:
-                    self._take_table(inner, content)
-                elif key in table.by_key:
-                    own[key] = content
-                elif len(self.mistakes) > MOST:
-                    self._note(key, f"[{table.name}] has no such key")
-                else:
-                    self._stray(f"[{table.name}] {key} = {self.wording.show(content)}", key, content, table)
-
-    def _unknown_table(self, key: str, value: dict[str, object]) -> None:
-        meant = nearest(key, self.named)
-        if meant is None:
-            listed = ", ".join(f"[{name}]" for name in self.named)
-            self._note(f"[{key}]", f"{self.what} has no such table; its tables are {listed}")
+            rows = isinstance(content, list) and all(isinstance(row, dict) for row in content)
+            given[name] = content if rows else None
+            if not rows:
+                note(f"[{name}]", f"there may be several; write {table.bracket} before each")
             return
-        self._note(f"[{key}]", f"{self.what} has no such table; did you mean [{meant}]?")
-        table = self.named[meant]
-        if table.many:
+        if not isinstance(content, dict):
+            form = "one table, not a list of tables" if isinstance(content, list) else "a table"
+            reason = f"{name} is {form}; write [{name}] on a line of its own and its keys below"
+            note(f"{name} = {wording.show(content)}", reason, table.parameters)
             return
-        for inner, content in value.items():
-            if inner in table.by_key:
-                self.misplaced.append((table.by_key[inner], content))
+        own = given.setdefault(name, {})
+        for key, value in content.items():
+            path = f"{name}.{key}" if name else key
+            if path in named:
+                take(named[path], value)
+            elif key in table.by_key:
+                own[key] = value
+            elif path in former:
+                renamed.append((former[path], value))
+            elif len(mistakes) > MOST:
+                note(key, "there is no such key")  # in short: it is counted, not shown
+            elif not name and isinstance(value, dict) and not any(p.key == key for p in everywhere):
+                meant = nearest(key, [one for one in named if one])
+                listed = ", ".join(one.bracket for one in tables if one.name)
+                remedy = f"did you mean {named[meant].bracket}?" if meant else f"its tables are {listed}"
+                note(f"[{key}]", f"{what} has no such table; {remedy}")
+                if meant:
+                    take(named[meant], value, key)
             else:
-                self._stray(f"[{key}] {inner} = {self.wording.show(content)}", inner, content, table)
+                place = f"[{written or name}] " if name else ""
+                mistakes.append(_unknown(place, key, value, table, tables, what, wording))
 
-    def _stray(self, subject: str, key: str, value: object, table: Table) -> None:
-        """A key that this table does not have."""
-        everywhere = [p for one in self.tables for p in one.parameters]
-        flat = next((p for p in everywhere if p.name == key != p.key), None)
-        if flat is not None:
-            homes = [flat]
-            remedy = f"in a file it is written {flat.key}, below [{flat.table}]"
-        else:
-            homes = [p for p in everywhere if p.key == key]
-            places = " or ".join(_home(p, self.named) for p in homes)
-            remedy = f"{key} belongs {places}"
-        if not homes:
-            self.mistakes.append(_misspelt(subject, key, table, self.tables, self.what, self.wording))
-            return
-        alone = len(homes) == 1
-        if alone and not isinstance(value, dict) and not self._several(homes[0].table):
-            self.misplaced.append((homes[0], value))
-        self._note(subject, remedy, *(p.path for p in homes if alone))
-
-    def _several(self, table: str) -> bool:
-        return table in self.named and self.named[table].many
-
-    def _note(self, subject: str, reason: str, *meant: str) -> None:
-        sentence = self.wording.sentence(subject, reason)
-        self.mistakes.extend([Mistake(sentence, meant=path) for path in meant] or [Mistake(sentence)])
+    take(named[""], document)
+    for table in tables:
+        rows = given.setdefault(table.name, []) if table.many else None
+        if rows is not None and len(rows) < table.least:
+            needed = f"{what} file needs at least {table.least}, and there are {len(rows)}"
+            note(table.bracket, f"{needed}; add {table.bracket} tables")
+    for p, value in renamed:
+        own = given.setdefault(p.table, {})
+        if p.key in own:
+            reason = f"it is now {p.place}, which is given as well; leave one out"
+            note(f"{p.formerly} = {wording.show(value)}", reason)
+        own.setdefault(p.key, value)
+    return given, mistakes
 
 
-def _home(parameter: Parameter, named: Mapping[str, Table]) -> str:
-    return f"below {named[parameter.table].bracket}" if parameter.table else "above the first table"
-
-
-def _misspelt(
-    subject: str, key: str, table: Table, tables: Iterable[Table], what: str, wording: Wording
+def _unknown(
+    place: str, key: str, value: object, table: Table, tables: Sequence[Table], what: str, wording: Wording
 ) -> Mistake:
-    """A key that no table has: the one that was probably meant."""
-    own = table.by_key
-    by_symbol = {p.symbol: p for one in tables for p in one.parameters if p.symbol}
-    meant = own.get(nearest(key.removeprefix(f"{table.name}_"), own) or "") or by_symbol.get(key)
-    if meant is None:
-        everywhere = {p.key: p for one in tables for p in one.parameters}
-        meant = everywhere.get(nearest(key, everywhere) or "")
-    where = f"[{table.name}]" if table.name else f"{what} file"
-    if meant is None:
-        names = ", ".join([*own, *(f"[{one.name}]" for one in tables if one.name and not table.name)])
-        return Mistake(wording.sentence(subject, f"{where} has no key {key}; it has {names}"))
-    name = meant.key if meant.table == table.name else meant.place
-    sentence = wording.sentence(subject, f"{where} has no key {key}; did you mean {name}?")
-    return Mistake(sentence, meant=meant.path)
+    """That a table has no such key, and those that were probably meant, in this table or in others."""
+    everywhere = [p for one in tables for p in one.parameters]
+    meant = meant_by(key.removeprefix(f"{table.name}_"), everywhere, table.parameters)
+    names = [
+        p.key if p.table == table.name else p.place if p.table else f"{p.key} above the first table"
+        for p in meant
+    ]
+    listed = [*table.by_key, *(one.bracket for one in tables if one.name and not table.name)]
+    remedy = f"did you mean {' or '.join(names)}?" if meant else f"it has {', '.join(listed)}"
+    reason = f"{f'[{table.name}]' if table.name else f'{what} file'} has no key {key}; {remedy}"
+    sentence = wording.sentence(f"{place}{key} = {wording.show(value)}", reason)
+    return Mistake(sentence, (), tuple(p.path for p in meant) if len(meant) == 1 else ())
 
 
 # ---- writing --------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable
 from functools import cached_property
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import IO, Any
 
@@ -35,13 +36,17 @@ class Library:
         return self._names
 
     @cached_property
+    def _folder(self) -> Traversable:
+        return resources.files(self.package).joinpath("library")
+
+    @cached_property
     def _names(self) -> tuple[str, ...]:
-        entries = (entry.name for entry in resources.files(self.package).joinpath("library").iterdir())
-        return tuple(sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml")))
+        names = (entry.name for entry in self._folder.iterdir())
+        return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
     def text(self, name: str) -> str:
         """The text of a shipped file, whose name must be one of `names()`."""
-        return resources.files(self.package).joinpath("library", f"{name}.toml").read_text(encoding="utf-8")
+        return self._folder.joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
     def find(self, given: str | os.PathLike[str]) -> tuple[str, str]:
         """The TOML text, and what to call it in sentences: a shipped file by its name, else one by its path.
@@ -50,38 +55,27 @@ class Library:
         InputError in one sentence, with the name that was probably meant.
         """
         if not isinstance(given, str | os.PathLike):
-            raise InputError(
-                f"{show(given)}: {self.what} is named by text, a shipped name or the path of a TOML file."
-            )
+            reason = f"{self.what} is named by text, a shipped name or the path of a TOML file"
+            raise InputError(f"{show(given)}: {reason}.")
         if isinstance(given, str) and given in self._names:
             return self.text(given), given
-        path = os.fspath(given)
-        noun = self.what.split()[-1]
+        path, noun, listed = os.fspath(given), self.what.split()[-1], ", ".join(self._names)
         if not path:
-            listed = ", ".join(self._names)
             raise InputError(f'"": the name of the {noun} is empty; give a path, or one of {listed}.')
         try:
             return read_text(path), path
         except RefusedError as refusal:
-            reason = refusal.reason
-            if reason == ABSENT:
-                reason = self._hint(Path(path), noun)
-            elif reason == FOLDER:
-                reason = f"{FOLDER}; give the TOML file of {self.what} in it"
-            stop = "" if reason.endswith("?") else "."
-            raise InputError(f"{show(path)}: {reason}{stop}") from None
-
-    def _hint(self, path: Path, noun: str) -> str:
-        shipped = f"shipped {self.plural} are {', '.join(self._names)}"
-        try:
-            entries = list(path.parent.iterdir())
-        except OSError:
-            return f"there is no directory {show(str(path.parent))}; {shipped}"
-        beside = [str(path.parent / entry.name) for entry in entries if entry.suffix == ".toml"]
-        meant = nearest(path.stem, self._names) or nearest(str(path), beside)
-        return f"{ABSENT}, and no shipped {noun} of this name; " + (
-            f"did you mean {meant}?" if meant else shipped
-        )
+            reason, shipped = f"{refusal.reason}.", f"shipped {self.plural} are {listed}."
+            if refusal.reason == FOLDER:
+                reason = f"{FOLDER}; give the TOML file of {self.what} in it."
+            elif refusal.reason == ABSENT and not Path(path).parent.is_dir():
+                reason = f"there is no directory {show(str(Path(path).parent))}; {shipped}"
+            elif refusal.reason == ABSENT:
+                beside = [str(one) for one in Path(path).parent.glob("*.toml")]
+                meant = nearest(Path(path).stem, self._names) or nearest(path, beside)
+                remedy = f"did you mean {meant}?" if meant else shipped
+                reason = f"{ABSENT}, and no shipped {noun} of this name; {remedy}"
+            raise InputError(f"{show(path)}: {reason}") from None
 
 
 ABSENT, FOLDER = "there is no such file", "this is a directory"
@@ -107,10 +101,8 @@ def refusal_of(path: str | os.PathLike[str]) -> str | None:
     if not stat.S_ISREG(found.st_mode):
         return "this is no ordinary file but a pipe, a socket or a device; give a file"
     if found.st_size > MOST_BYTES:
-        return (
-            f"the file has {found.st_size / 1e6:.3g} MB, and at most {MOST_BYTES / 1e6:g} MB are read; "
-            "give one with fewer lines"
-        )
+        size = f"the file has {found.st_size / 1e6:.3g} MB, and at most {MOST_BYTES / 1e6:g} MB are read"
+        return f"{size}; give one with fewer lines"
     return None
 
 
@@ -154,13 +146,12 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
 
     Raises InputError if the file cannot be written there.
     """
+    refused = f"output = {path}: the file cannot be written there"
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
-        raise InputError(
-            f"output = {path}: the file cannot be written there: {error.strerror or error}; "
-            "give a folder that exists and that you may write to."
-        ) from None
+        remedy = "give a folder that exists and that you may write to"
+        raise InputError(f"{refused}: {error.strerror or error}; {remedy}.") from None
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream:
@@ -170,11 +161,6 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
         temporary.chmod(0o666 & ~umask)
         temporary.replace(path)
     except OSError as error:
+        raise InputError(f"{refused}: {error.strerror or error}; nothing was left behind.") from None
+    finally:
         temporary.unlink(missing_ok=True)
-        raise InputError(
-            f"output = {path}: the file could not be finished: {error.strerror or error}; "
-            "nothing was left behind."
-        ) from None
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -12,13 +13,13 @@ import numpy as np
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
-    "sentences_of", "without_unit",
+    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "bare", "meant_by", "read_value",
+    "read_values", "sentences_of", "without_unit",
 ]  # fmt: skip
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
 LEAST, MOST = 1e-30, 1e30
-LONGEST_LINE = 120  # letters of a name: more leave no room for the figure below it
+LONGEST_LINE = 120  # characters of a name: more leave no room for the figure below it
 
 Limit = Literal[
     "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "above 0 and at most 1",
@@ -74,6 +75,7 @@ class Parameter:
     table: str = ""
     name: str = ""
     formerly: str = ""
+    positional: bool = False
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -125,34 +127,27 @@ class Wording:
         >>> Wording(style="toml").label(gap), Wording().label(gap)
         ('[shaft] gap', 'gap')
         """
-        if parameter.name in self.written:
-            return self.written[parameter.name]
         if self.row:
             return f"{self.row}{parameter.key}"
-        return {"toml": parameter.place, "path": parameter.path}.get(self.style, parameter.name)
+        names = {"toml": parameter.place, "path": parameter.path}
+        return self.written.get(parameter.name) or names.get(self.style, parameter.name)
 
     def show(self, value: object) -> str:
         """The value as the writer wrote it."""
         return show(value, toml=self.style == "toml")
 
     def sentence(self, subject: str, reason: str) -> str:
-        """Subject and reason with the file before and a full stop behind."""
-        stop = "" if reason.endswith(("?", ".")) else "."
-        return f"{self.where + ': ' if self.where else ''}{subject}: {reason}{stop}"
+        """Subject and reason with the file before and a full stop behind; "" stands for the whole input."""
+        before = [one for one in (self.where, subject) if one] or ["the text"]
+        return f"{': '.join(before)}: {reason}{'' if reason.endswith(('?', '.')) else '.'}"
 
-    def whole(self, reason: str) -> str:
-        """A sentence about the input as a whole."""
-        return replace(self, where="").sentence(self.where or "the text", reason)
-
-    def missing(self, parameter: Parameter, instead: str = "") -> str:
+    def missing(self, parameter: Parameter, instead: str = "") -> Mistake:
         """That a required parameter is missing, and what to write; `instead` names what may replace it."""
         p = parameter
         symbol = f" {p.symbol}" if p.symbol and p.symbol != p.key else ""
         text = f"{p.name}={p.example}" if self.style == "python" else f"{p.key} = {p.example}"
-        return self.sentence(
-            f"{self.label(p)} is missing",
-            f"the {p.meaning}{symbol} is needed{instead}; write for example {text}",
-        )
+        reason = f"the {p.meaning}{symbol} is needed{instead}; write for example {text}"
+        return Mistake(self.sentence(f"{self.label(p)} is missing", reason), (p.path,))
 
     def refused(self, parameter: Parameter, value: object, refusal: RefusedError) -> str:
         """The sentence for a value that was refused; of an array, only the bad element is shown."""
@@ -164,23 +159,42 @@ class Wording:
 
 @dataclass(frozen=True)
 class Mistake:
-    """One sentence; `missing`: paths of parameters of which one is needed, `meant`: that of one misspelt."""
+    """One sentence; `missing`: paths of parameters of which one is needed, `meant`: those one may mean."""
 
     sentence: str
     missing: tuple[str, ...] = ()
-    meant: str | None = None
+    meant: tuple[str, ...] = ()
 
 
 def sentences_of(mistakes: Iterable[Mistake]) -> list[str]:
     """The sentences, each once; a parameter that was only misspelt is not also called missing.
 
-    >>> sentences_of([Mistake("gapp: did you mean gap?", meant="gap"), Mistake("no gap", ("gap",))])
+    >>> sentences_of([Mistake("gapp: did you mean gap?", meant=("gap",)), Mistake("no gap", ("gap",))])
     ['gapp: did you mean gap?']
     """
     mistakes = list(mistakes)
-    misspelt = {mistake.meant for mistake in mistakes if mistake.meant}
-    kept = (m.sentence for m in mistakes if not misspelt.intersection(m.missing))
-    return list(dict.fromkeys(kept))
+    misspelt = {path for mistake in mistakes for path in mistake.meant}
+    return list(dict.fromkeys(m.sentence for m in mistakes if not misspelt.intersection(m.missing)))
+
+
+def meant_by(name: str, parameters: Iterable[Parameter], near: Sequence[Parameter] = ()) -> list[Parameter]:
+    """The parameters that an unknown name may mean: by key, symbol, name or path, or else by likeness.
+
+    Those that are `near` go before the others.
+
+    >>> from softstart.drive import PARAMETERS
+    >>> [[p.name for p in meant_by(one, PARAMETERS.values())] for one in ("inertia", "J2", "gapp")]
+    [['motor_inertia', 'load_inertia'], ['load_inertia'], ['gap']]
+    """
+    groups = (near, list(parameters))
+    for group in groups:
+        if same := [p for p in group if name in (p.key, p.symbol, p.name, p.path)]:
+            return same
+    for group in groups:
+        spelt = {spelling: p for p in group for spelling in (p.key, p.path, p.name)}
+        if close := nearest(name, spelt):
+            return [spelt[close]]
+    return []
 
 
 def read_values(
@@ -189,34 +203,32 @@ def read_values(
     wording: Wording,
     *,
     batch: bool = False,
-    known: Mapping[str, Any] | None = None,
-    several: Mapping[str, str] = {},
+    known: Mapping[str, Any] = {},
+    several: str = "",
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """The values of `parameters` (by the names used in `given`), and what is wrong or missing.
 
     `known` holds values that were read before. None stands for "not given" where that is the default.
-    `several` has the reason why a list is refused, by the style of the wording.
+    `several` is the reason why a list is refused.
     """
     values: dict[str, Any] = {}
-    reason = several.get(wording.style, several.get("", ""))
     mistakes: list[Mistake] = []
     for name, parameter in parameters.items():
-        if known is not None and name in known:
+        if name in known:
             values[name] = known[name]
         elif name in given and not (given[name] is None and parameter.default is None):
-            value = given[name]
             try:
-                values[name] = read_value(parameter, value, batch=batch, several=reason)
+                values[name] = read_value(parameter, given[name], batch=batch, several=several)
             except RefusedError as refusal:
-                mistakes.append(Mistake(wording.refused(parameter, value, refusal)))
+                mistakes.append(Mistake(wording.refused(parameter, given[name], refusal)))
         elif parameter.default is REQUIRED:
-            mistakes.append(Mistake(wording.missing(parameter), (parameter.path,)))
+            mistakes.append(wording.missing(parameter))
         elif parameter.follows:
             values[name] = values.get(parameter.follows)
             other = parameters[parameter.follows]
             if values[name] is None and not other.required and given.get(other.name) is None:
-                sentence = wording.missing(parameter, f", or {wording.label(other)} in its place")
-                mistakes.append(Mistake(sentence, (parameter.path, other.path)))
+                missing = wording.missing(parameter, f", or {wording.label(other)} in its place")
+                mistakes.append(replace(missing, missing=(parameter.path, other.path)))
         else:
             values[name] = parameter.default
     return values, mistakes
@@ -257,31 +269,28 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
     Traceback (most recent call last):
     softstart.quantities.RefusedError: the kind is "active" or "reactive"; did you mean "active"?
     """
-    if not parameter.unit:
-        return _read_text(parameter, value)
-    if parameter.choices and isinstance(value, str) and not any(map(str.isdigit, value)):
-        return _read_text(parameter, value)
-    number = parse(value, parameter.unit, infinite=parameter.infinite)
-    if parameter.many:
+    p = parameter
+    if p.choices and (not p.unit or (isinstance(value, str) and not any(map(str.isdigit, value)))):
+        return _read_choice(p, value)
+    if not p.unit:
+        return _read_text(p, value)
+    number = parse(value, p.unit, infinite=p.infinite)
+    if p.many:
         number = np.atleast_1d(number)
         if number.ndim > 1:
-            raise RefusedError(f"the {parameter.meaning} is one list of numbers, such as {parameter.example}")
+            raise RefusedError(f"the {p.meaning} is one list of numbers, such as {p.example}")
     elif not batch and not isinstance(number, float):
         reason = several or "the {meaning} is one number, not a list"
-        shown = show(value) if isinstance(value, list | tuple) else "[...]"
-        raise RefusedError(reason.format(meaning=parameter.meaning, name=parameter.name, value=shown))
-    limit = LIMITS.get(parameter.limit)
-    if limit is not None:
-        _refuse(number, limit(number), f"the {parameter.meaning} must be {parameter.limit}")
-    sizes = np.abs(number)
-    beyond = np.isfinite(sizes) & (sizes > MOST)
-    if parameter.limit == "above 0":
-        beyond |= sizes < LEAST
-    size = f"its size in {parameter.unit}" if parameter.unit != "1" else "it"
-    reason = f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit"
-    _refuse(number, ~beyond, reason)
+        raise RefusedError(reason.format(meaning=p.meaning, name=p.name))
+    if p.limit in LIMITS:
+        _refuse(number, LIMITS[p.limit](number), f"the {p.meaning} must be {p.limit}")
+    size = f"its size in {p.unit}" if p.unit != "1" else "it"
+    least = LEAST if p.limit == "above 0" else 0.0
+    sizes: Any = abs(number)
+    within = (sizes >= least) & ((sizes <= MOST) | (sizes == math.inf))
+    _refuse(number, within, f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit")
     if isinstance(number, np.ndarray):
-        if parameter.many:
+        if p.many:
             return tuple(number.tolist())
         number.setflags(write=False)
     return number
@@ -289,33 +298,34 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
 
 def _refuse(number: Value, allowed: Any, reason: str) -> None:
     """Raise for the first value of a number or array that is not allowed."""
-    if isinstance(number, float):
+    if not np.ndim(number):
         if not allowed:
             raise RefusedError(reason)
     elif not allowed.all():
         index = tuple(int(i) for i in np.argwhere(~allowed)[0])
-        raise RefusedError(reason, float(number[index]), index)
+        raise RefusedError(reason, float(np.asarray(number)[index]), index)
 
 
 def _read_text(parameter: Parameter, value: object) -> str:
-    what = f"the {parameter.meaning}"
-    if not parameter.choices:
-        empty = isinstance(value, str) and not value.strip() and parameter.default != ""
-        if not isinstance(value, str) or (empty and parameter.limit != "one line"):
-            raise RefusedError(f"{what} must be text, such as {parameter.example}")
-        if parameter.limit == "one line" and (empty or len(value.splitlines()) > 1):
-            raise RefusedError(f"{what} must be one line of text that is not empty")
-        if parameter.limit == "one line" and len(value) > LONGEST_LINE:
-            raise RefusedError(f"{what} has {len(value)} letters, and at most {LONGEST_LINE} fit in a title")
-        if parameter.limit == "one line" and (found := _STEERING.search(value)) is not None:
-            raise RefusedError(f"{what} has the control character U+{ord(found.group()):04X}; leave it out")
-        if any(0xD800 <= ord(letter) < 0xE000 for letter in value):
-            raise RefusedError("this text has half a character (a lone surrogate); write it anew")
-        return value
+    what, title = f"the {parameter.meaning}", parameter.limit == "one line"
+    if not isinstance(value, str) or not (title or value.strip() or parameter.default == ""):
+        raise RefusedError(f"{what} must be text, such as {parameter.example}")
+    if any(0xD800 <= ord(letter) < 0xE000 for letter in value):
+        raise RefusedError("this text has half a character (a lone surrogate); write it again")
+    if title and (not value.strip() or len(value.splitlines()) > 1):
+        raise RefusedError(f"{what} must be one line of text that is not empty")
+    if title and len(value) > LONGEST_LINE:
+        raise RefusedError(f"{what} has {len(value)} characters, and at most {LONGEST_LINE} fit in a title")
+    if title and (found := _STEERING.search(value)) is not None:
+        raise RefusedError(f"{what} has the control character U+{ord(found.group()):04X}; leave it out")
+    return value
+
+
+def _read_choice(parameter: Parameter, value: object) -> str:
     if isinstance(value, str) and value in parameter.choices:
         return value
-    listed = [show(choice) for choice in parameter.choices]
-    *first, last = [*listed, f"a quantity such as {parameter.example}"] if parameter.unit else listed
-    reason = f"{what} is {', '.join(first)} or {last}"
+    quantity = [f"a quantity such as {parameter.example}"] if parameter.unit else []
+    *first, last = [*map(show, parameter.choices), *quantity]
+    reason = f"the {parameter.meaning} is {', '.join(first)} or {last}"
     meant = nearest(value, parameter.choices) if isinstance(value, str) else None
     raise RefusedError(f"{reason}; did you mean {show(meant)}?" if meant else reason)

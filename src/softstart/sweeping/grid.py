@@ -17,8 +17,7 @@ from softstart.controller.finding import quantity
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
-from softstart.input.parameter_set import meant_by
-from softstart.input.parameters import Wording, read_value
+from softstart.input.parameters import Wording, meant_by, read_value
 from softstart.quantities import RefusedError, nearest, show
 from softstart.sweeping.maker import Maker, Parameters
 
@@ -279,7 +278,8 @@ def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> l
 
 
 def _unknown(key: str, parameters: Parameters | None, machine: Machine | None = None) -> str:
-    of_drive = [one for one in meant_by(key, PARAMETERS) if machine is None or machine.knob(one)]
+    like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
+    of_drive = [p.name for p in like if machine is None or machine.knob(p.name)]
     meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else of_drive
     if not meant:
         own = [f"{PREFIX}.{name}" for name in parameters or ()]

@@ -32,7 +32,7 @@ PYTHON = [
     ("encoder_lines", "4096 rad", 'encoder_lines = "4096 rad": ', "not a plain number"),
     ("initial_load_speed", 92, "initial_load_speed = 92 rad/s: ", "must start below target_speed = 92 rad/s"),
     ("initial_motor_speed", math.inf, "initial_motor_speed = inf: ", "must be finite"),
-    ("load_torque", -400.0, "load_torque = -400.0: ", "drives so hard"),
+    ("load_torque", -400.0, "load_torque = -400 N*m: ", "drives so hard"),
     ("load_torque", 100, "starting_torque = 62 N*m: ", "cannot move the load against load_torque = 100 N*m"),
     ("load_kind", "reactiv", 'load_kind = "reactiv": ', 'did you mean "reactive"?'),
     ("load_kind", "friction", 'load_kind = "friction": ', 'is "active" or "reactive"'),

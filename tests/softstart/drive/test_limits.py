@@ -63,7 +63,7 @@ def test_limits_change_no_start():
         ("[limits]\nshaft_torque = 5", "at constant speed the shaft already carries [load] torque = 7.16"),
         ("[limits]\nshaft_torqe = 90", "did you mean shaft_torque?"),
         ('[limits]\nshaft_torque = "90 N"', "N is a force, not a torque"),
-        ("[limits]\nslope = 3", "slope belongs below [limits.fatigue]"),
+        ("[limits]\nslope = 3", "did you mean [limits.fatigue] slope?"),
         ("[limits]\nfatigue = 3", "limits.fatigue is a table"),
         ('[limits]\nlife = "1 year"', "[limits] starts_per_hour is missing"),
         ("[limits]\nstarts_per_hour = 4000\nstart_time = 1", "take more than an hour"),

@@ -97,11 +97,11 @@ def test_frozen(crane):
 
 
 def test_a_drive_has_one_value(crane):
-    several = "; for several starts write records(drive, gap="
-    for gap, again in (([0.5, 2.0], "[0.5, 2.0])."), (np.array([0.5, 2.0]), "[...]).")):
+    for gap in ([0.5, 2.0], np.array([0.5, 2.0])):
         with pytest.raises(InputError) as caught:
             crane.replace(gap=gap)
-        assert str(caught.value) == f"gap = [0.5, 2.0]: a drive has one value{several}{again}"
+        several = "for several use sweep, in Python records(drive, gap=...)"
+        assert str(caught.value) == f"gap = [0.5, 2.0]: a drive has one value; {several}."
     with pytest.raises(InputError, match=r"\[shaft\] gap = \[0.5, 2\]: a drive has one value; .* use sweep"):
         Drive.from_toml(crane.to_toml().replace("gap = 0.5", "gap = [0.5, 2]"))
 
@@ -153,7 +153,6 @@ def test_no_way_in_past_the_checks(crane):
         lambda: crane.replace(gap=-1),
         lambda: crane.__replace__(gap=-1),
         lambda: dataclasses.replace(crane, gap=-1),
-        lambda: type(crane).__reduce__(crane)[0](Drive, CRANE | {"gap": -1}),
     ):
         with pytest.raises(InputError) as error:
             attempt()
