@@ -56,9 +56,14 @@ COMMANDS = {
         "Open the interactive page in the browser.",
     ),
     "init": ("init", "Create a drive file from data sheet values."),
+    "plan": ("identify", "Plan an experiment that identifies a drive accurately."),
     "identify": (
         "identify",
         "Identify the parameters of a drive, with confidence intervals, from inverter logs.",
+    ),
+    "wear": (
+        "identify",
+        "Compute the growth of the gap from several identifications, and when it is worn.",
     ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
@@ -70,7 +75,7 @@ COMMANDS = {
 }
 
 PURPOSES = {
-    "Your own drive": ("init", "identify", "drives", "reduce"),
+    "Your own drive": ("init", "plan", "identify", "wear", "drives", "reduce"),
     "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
     "Design": ("optimize", "pareto", "tune", "sweep"),
     "Results": ("serve", "report"),

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.commands import Reading
-from softstart.cli.options import Decorator, as_option, choice, quantity
-from softstart.errors import InputError, Mistakes, SimulationError
+from softstart.cli.options import Decorator, as_option, choice, quantity, read_each, read_range
+from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import TERMINALS, StartTime
-from softstart.quantities import to_si, values_in, whole_number
+from softstart.quantities import to_si, values_in
 from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
@@ -35,25 +35,13 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
     """
     if ":" not in text:
         return _each(text, option, lambda part: StartTime.of(part, option))
-    parts = [part.strip() for part in text.split(":")]
-    if len(parts) != 3:
-        raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
-    mistakes = Mistakes()
-    ends: list[StartTime] = []
-    for part in parts[:2]:
-        with mistakes.noted():
-            ends.append(StartTime.of(part, option))
-    count = 0
-    with mistakes.noted():
-        count = whole_number(parts[2], f'{option} = "{text}": the count', 2, 1000)
-    mistakes.settle()
-    first, last = ends
+    ends, values = read_range(text, option)
+    first, last = read_each(ends, lambda part: StartTime.of(part, option))
     if first.multiple != last.multiple:
         raise InputError(
             f'{option} = "{text}": give both ends as times, or both as multiples of direct (1.2x).'
         )
-    step = (last.value - first.value) / (count - 1)
-    return [StartTime(first.value + index * step, first.multiple) for index in range(count)]
+    return [StartTime(value, first.multiple) for value in values(first.value, last.value)]
 
 
 def quantities(unit: str) -> Reading:
@@ -85,13 +73,7 @@ def _read_corners(text: str, option: str) -> tuple[tuple[float, float], ...]:
 
 def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
     """Every part of a list with commas between, read; all mistakes at once."""
-    mistakes = Mistakes()
-    found = []
-    for part in values_in(text, option):
-        with mistakes.noted():
-            found.append(read(part))
-    mistakes.settle()
-    return found
+    return read_each(values_in(text, option), read)
 
 
 # the options ---------------------------------------------------------------------------------------------

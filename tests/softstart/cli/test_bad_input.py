@@ -15,7 +15,7 @@ ONE_SENTENCE = {
         ["zzzzzz"],
         [
             "there are compare, simulate, fatigue, optimize, pareto, tune, sweep, linear, reduce, clutch, "
-            "balance, report, serve, init, identify, drives, controllers, study and completion"
+            "balance, report, serve, init, plan, identify, wear, drives, controllers, study and completion"
         ],
     ),
     "command by its subject": (["chain"], ['"chain"', "did you mean softstart compare?"]),
