@@ -5,7 +5,6 @@ The drive is the crane drive of [G], target speed 60 rad/s, torque lag 2 ms (ass
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,7 @@ from numpy.typing import NDArray
 
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.tuning.outcome import Tuning
-from softstart.views.drawing import drawing
-from softstart.views.tuning import draw_cells
+from softstart.views.drawing import colour_scale, drawing, heat_map
 from softstart_studies.tuned_alike import (
     ACROSS,
     CRANE,
@@ -301,13 +299,12 @@ def maps_figure(grid: Grid, prefix: str, heading: str) -> Figure:
     """K_dyn of every controller over its optimum; `heading` says which gains."""
     panels = [(name, grid.ratio(name, prefix), grid.late(name, prefix)) for name in grid.tunings]
     finite = np.concatenate([values[np.isfinite(values)] for _, values, _ in panels])
-    low, high = 1.0, min(float(np.max(finite, initial=1.1)), MOST)
+    scale = colour_scale(np.array([1.0, min(float(np.max(finite, initial=1.1)), MOST)]))
     ratios, gaps = ([f"{v:g}" for v in axis] for axis in (grid.extent.inertias, grid.extent.gaps))
     with drawing():
         figure, axes = panel_grid(len(panels), (3.0, 2.2))
         for panel, (name, values, late) in zip(axes.flat, panels, strict=False):
-            texts = [[f"{v:.2f}" if math.isfinite(v) else "-" for v in row] for row in values.tolist()]
-            draw_cells(panel, values, texts, (low, high), ratios, gaps, late & np.isfinite(values))
+            heat_map(panel, ratios, gaps, values, scale, decimals=2, struck=late & np.isfinite(values))
             panel.set_title(name, loc="left")
         for row in axes:
             row[0].set_ylabel("gap, rad")

@@ -607,8 +607,8 @@ def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_on
     [
         ({"wanted": ["gpa"]}, "did you mean gap"),
         ({"free": ["gap", "motor.friction"]}, "it is 0 in the drive; give a guess of it"),
-        ({"most_torque": "0.01 N*m"}, "raise the limit"),
-        ({"most_travel": 0.0}, "a limit is above 0"),
+        ({"max_torque": "0.01 N*m"}, "raise the limit"),
+        ({"max_travel": 0.0}, "a limit is above 0"),
     ],
 )
 def test_plans_that_cannot_be_are_refused(given: dict[str, Any], sentence: str) -> None:

@@ -9,10 +9,12 @@ from typing import Any
 
 import pytest
 
+import softstart
 from softstart import Chain, Drive, compare, fatigue, optimize, pareto, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 DAMPED = CRANE.replace(damping=1.0, name="<script>alert(1)</script> & co")
+QUICK: Any = {"certified": False, "generations": 2, "population": 6, "restarts": 1, "workers": 1}
 
 
 def optimum() -> Any:
@@ -27,6 +29,9 @@ MADE: dict[str, tuple[Callable[[], Any], bool]] = {
     "optimum": (optimum, True),
     "front": (lambda: pareto(DAMPED.replace(damping=0.0), [0.45, 0.5], controllers=["direct"]), True),
     "fatigue": (lambda: fatigue([simulate(DAMPED, "direct"), simulate(DAMPED, "ramp")]), True),
+    "linear": (lambda: softstart.linear_view(DAMPED, "current-limit-feedback", limit_cycles=False), True),
+    "plan": (lambda: softstart.plan_experiments(DAMPED, optimise=False), True),
+    "tuning": (lambda: softstart.tune(DAMPED, "ramp", ["1x"], ["1x"], free=["time"], **QUICK), True),
 }
 
 

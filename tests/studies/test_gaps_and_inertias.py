@@ -73,9 +73,9 @@ def test_tables_and_maps_hold_every_cell(grid):
     shown = [row[column] for row in cells.rows]
     assert shown == pytest.approx(grid.values("ramp", "k_dyn").ravel(), abs=5e-4)
     figure = result.figures["gaps-and-inertias-active-cells"]
-    drawn = [ax.get_title(loc="left") for ax in figure.axes if ax.images]
+    drawn = [ax.get_title(loc="left") for ax in figure.axes if ax.collections]
     assert drawn == ["ramp", "acceleration-delay"]
-    assert np.array_equal(figure.axes[0].images[0].get_array(), grid.ratio("ramp"), equal_nan=True)
+    assert np.array_equal(figure.axes[0].collections[0].get_array(), grid.ratio("ramp"), equal_nan=True)
 
 
 def test_the_study_is_registered_and_covers_all_tunable_controllers():

@@ -34,8 +34,13 @@ COMMANDS = {
     "report": ("report", "Write a report on the start of a drive or a chain as one HTML file."),
     "serve": ("serve", "Open the interactive page in the browser."),
     "init": ("init", "Create a drive file from data sheet values."),
+    "plan": ("identify", "Plan an experiment that identifies a drive accurately."),
     "identify": (
         "identify", "Identify the parameters of a drive, with confidence intervals, from inverter logs."
+    ),
+    "wear": (
+        "identify",
+        "Compute the growth of the gap from several identifications, and when it is worn.",
     ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
@@ -43,7 +48,7 @@ COMMANDS = {
     "completion": ("completion", "Print the script for completion with the Tab key."),
 }  # fmt: skip
 PURPOSES = {
-    "Your own drive": ("init", "identify", "drives", "reduce"),
+    "Your own drive": ("init", "plan", "identify", "wear", "drives", "reduce"),
     "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
     "Design": ("optimize", "pareto", "tune", "sweep"),
     "Results": ("serve", "report"),

@@ -7,14 +7,13 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from softstart.cli.commands import Reading
-from softstart.cli.options import Decorator, as_option, choice, quantity
-from softstart.errors import InputError, Mistakes, SimulationError
+from softstart.cli.options import Decorator, as_option, choice, quantity, read_each, read_range
+from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import TERMINALS, StartTime
-from softstart.quantities import to_si, values_in, whole_number
+from softstart.quantities import to_si, values_in
 from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
@@ -33,16 +32,13 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
     """
     if ":" not in text:
         return _each(text, option, lambda part: StartTime.of(part, option))
-    parts = text.split(":")
-    if len(parts) != 3:
-        raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
-    first, last = (StartTime.of(part.strip(), option) for part in parts[:2])
-    count = whole_number(parts[2].strip(), f'{option} = "{text}": the count', 2, 1000)
+    ends, values = read_range(text, option)
+    first, last = read_each(ends, lambda part: StartTime.of(part, option))
     if first.multiple != last.multiple:
         raise InputError(
             f'{option} = "{text}": give both ends as times, or both as multiples of direct (1.2x).'
         )
-    return [StartTime(one, first.multiple) for one in np.linspace(first.value, last.value, count).tolist()]
+    return [StartTime(value, first.multiple) for value in values(first.value, last.value)]
 
 
 def quantities(unit: str) -> Reading:
@@ -74,13 +70,7 @@ def _read_corners(text: str, option: str) -> tuple[tuple[float, float], ...]:
 
 def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
     """Every part of a list with commas between, read; all mistakes at once."""
-    mistakes = Mistakes()
-    found = []
-    for part in values_in(text, option):
-        with mistakes.noted():
-            found.append(read(part))
-    mistakes.settle()
-    return found
+    return read_each(values_in(text, option), read)
 
 
 def terminal_option(usual: str, default: str | None = None) -> Decorator:

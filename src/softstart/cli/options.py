@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from softstart.chain.model import Chain, is_chain, load_machine
 from softstart.cli.commands import Reading, did_you_mean
@@ -221,6 +222,42 @@ def choice(*words: str) -> Reading:
         return text
 
     return Reading(read, words=words)
+
+
+def read_each(parts: Iterable[str], read: Callable[[str], Any]) -> list[Any]:
+    """Every part of a list, read; all errors at once."""
+    mistakes = Mistakes()
+    found = []
+    for part in parts:
+        with mistakes.noted():
+            found.append(read(part))
+    mistakes.settle()
+    return found
+
+
+def read_range(
+    text: str, option: str, most: int = 1000
+) -> tuple[list[str], Callable[[float, float], list[float]]]:
+    """The ends of from:to:count, or from:to:count:log, and what gives all values once these are read.
+
+    >>> ends, values = read_range("0.5 rad:2 rad:4", "--gaps")
+    >>> ends, values(0.5, 2.0)
+    (['0.5 rad', '2 rad'], [0.5, 1.0, 1.5, 2.0])
+    """
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) < 3 or parts[3:] not in ([], ["log"]):
+        raise InputError(f'{option} = "{text}": a range is from:to:count, or from:to:count:log.')
+    count = whole_number(parts[2], f'{option} = "{text}": the count', 2, most)
+
+    def values(low: float, high: float) -> list[float]:
+        if low == high:
+            raise InputError(f'{option} = "{text}": both ends are the same; write the one value.')
+        if parts[3:] and not (low > 0.0 and high > 0.0):
+            raise InputError(f'{option} = "{text}": the ends of a range in equal ratios (log) are above 0.')
+        found: list[float] = (np.geomspace if parts[3:] else np.linspace)(low, high, count).tolist()
+        return found
+
+    return parts[:2], values
 
 
 def read_list(text: str, option: str) -> list[str]:

@@ -176,6 +176,12 @@ class Plan:
             "best": self.best.name,
         }
 
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        from softstart.views import sheet
+
+        return sheet.as_html(views.plan_sheet(self))
+
 
 def plan_experiments(
     drive: Drive | str,
@@ -185,8 +191,8 @@ def plan_experiments(
     free: Sequence[str] | None = None,
     signal: Kind = "angle",
     wanted: Sequence[str] = (),
-    most_torque: float | str | None = None,
-    most_travel: float | str | None = None,
+    max_torque: float | str | None = None,
+    max_travel: float | str | None = None,
     optimise: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
@@ -220,10 +226,10 @@ def plan_experiments(
         counts.
     wanted : sequence of str, optional
         The parameters that the planned torque is to tell best; all that are to be found by default.
-    most_torque : float or str, optional
+    max_torque : float or str, optional
         Largest shaft torque that a planned experiment may have, N m; by default the permissible one of the
         drive, or else the largest of the standard experiments.
-    most_travel : float or str, optional
+    max_travel : float or str, optional
         How far the load may be moved, rad at the motor shaft; no limit by default.
     optimise : bool
         Whether to look for a better torque.
@@ -278,9 +284,9 @@ def plan_experiments(
     usual = (
         max(one.peak for one in standard) if drive.permissible_torque is None else drive.permissible_torque
     )
-    torque = float(to_si(usual if most_torque is None else most_torque, "N*m", name="most_torque"))
-    travel = math.inf if most_travel is None else float(to_si(most_travel, "rad", name="most_travel"))
-    for key, limit, given in (("most_torque", torque, most_torque), ("most_travel", travel, most_travel)):
+    torque = float(to_si(usual if max_torque is None else max_torque, "N*m", name="max_torque"))
+    travel = math.inf if max_travel is None else float(to_si(max_travel, "rad", name="max_travel"))
+    for key, limit, given in (("max_torque", torque, max_torque), ("max_travel", travel, max_travel)):
         if not limit > 0.0:
             raise InputError(f"{key} = {show(given)}: a limit is above 0.")
     planned = [bench.designed("planned", standard, torque, travel)] if optimise else []
@@ -539,7 +545,7 @@ class _Bench:
         kept = [one for one in (self.keeping(seed, torque, travel) for seed in seeds) if one is not None]
         if not kept:
             raise InputError(
-                f"most_torque = {torque:.4g} N m, most_travel = {travel:.4g} rad: no experiment keeps them, "
+                f"max_torque = {torque:.4g} N m, max_travel = {travel:.4g} rad: no experiment keeps them, "
                 "however small its torque; raise the limit."
             )
         seed = min(kept, key=lambda one: one.score)

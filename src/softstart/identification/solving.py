@@ -416,7 +416,7 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
     if would:
         best = min(would, key=lambda one: max(one.widths[name] for name in names))
         widths = listed([f"{name} within {100.0 * best.widths[name]:.2g} %" for name in names])
-        remedy = f'a log of "{best.name}" would tell {widths} (softstart identify --plan)'
+        remedy = f'a log of "{best.name}" would tell {widths} (softstart plan)'
     return [f"Unknown: {told}. Remedy: {remedy}."]
 
 

@@ -193,6 +193,12 @@ class Wear:
             "notes": list(self.notes),
         }
 
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        from softstart.views import sheet
+
+        return sheet.as_html(views.wear_sheet(self))
+
     def plot(self) -> Any:
         """The gaps over time, the line with its interval, and the limit; a matplotlib figure."""
         return views.wear_figure(self)

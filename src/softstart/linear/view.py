@@ -249,6 +249,12 @@ class LinearView:
             ],
         }
 
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        from softstart.views import sheet
+
+        return sheet.as_html(views.linear_sheet(self))
+
     def plot(self) -> Any:
         """Bode diagram with the margins marked, and Nyquist diagram with the describing function's locus."""
         self._loop()

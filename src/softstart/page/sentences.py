@@ -50,7 +50,7 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
 def plain(sentence: str) -> str:
     """A sentence without the words of the command line, which a page does not have.
 
-    >>> plain("minimise = life: it is below 0; leave out --torque-constant (softstart identify --plan).")
+    >>> plain("minimise = life: it is below 0; leave out --torque-constant (softstart plan).")
     'it is below 0; leave out torque constant.'
     """
     text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)

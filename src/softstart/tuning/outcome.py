@@ -168,6 +168,12 @@ class Tuning:
             "seconds": self.seconds,
         }
 
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        from softstart.views import sheet
+
+        return sheet.as_html(views.tuning_sheet(self))
+
     def plot(self, what: Literal["gains", "metric", "robust", "price"] | None = None) -> Any:
         """A figure: maps of the gains, of the metric tuned and by default, of the robust set, of its price.
 

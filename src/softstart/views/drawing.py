@@ -19,14 +19,16 @@ from softstart.late import late
 if TYPE_CHECKING:
     import matplotlib as mpl
     import matplotlib.figure as mpl_figure
-    from matplotlib import ticker
+    from matplotlib import colors, patheffects, ticker
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from scipy import ndimage
 
     from softstart.start.run import Run
 else:
     mpl, mpl_figure = late("matplotlib"), late("matplotlib.figure")
-    ticker = late("matplotlib.ticker")
+    colors, ticker = late("matplotlib.colors"), late("matplotlib.ticker")
+    patheffects, ndimage = late("matplotlib.patheffects"), late("scipy.ndimage")
 
 # Okabe-Ito: told apart by colour-blind readers and in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
@@ -35,6 +37,9 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0,
 GREY, SMALL = "#666666", 9.5
 GAP_SHADE = "#E8ECEF"
 MARKERS = "osD^vPX*<>hd"
+COLOUR_MAP, MISSING = "cividis", "#D0D0D0"  # even in lightness, for colour-blind and grey readers alike
+LIGHT = 0.55  # share of the colours from which on numbers are dark
+FINEST_CONTOUR = 50  # points along each side
 
 PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
@@ -124,6 +129,106 @@ def shade_open_gap(axes: Axes, run: Run, until: float = math.inf) -> None:
         [span for span in spans if span[1] > 0.0], (0.0, 1.0), color=GAP_SHADE, lw=0, zorder=0,
         transform=axes.get_xaxis_transform(),
     )  # fmt: skip
+
+
+# maps ------------------------------------------------------------------------------------------------------
+
+
+def panels(
+    count: int, size: tuple[float, float], across: int, x_label: str, y_label: str
+) -> tuple[Any, list[Axes]]:
+    """A figure of panels of this size in inches with the same axes, so many across at most, and these."""
+    columns = min(count, across)
+    rows = -(-count // columns)
+    whole = (1.0 + size[0] * columns, 0.7 + size[1] * rows)
+    figure, axes = new_figure(rows, columns, whole, sharex=True, sharey=True, squeeze=False)
+    for index, panel in enumerate(axes.flat):
+        panel.set_visible(index < count)
+        if index % columns == 0:
+            panel.set_ylabel(y_label)
+        if index + columns >= count:
+            panel.set_xlabel(x_label)
+            panel.tick_params(labelbottom=True)
+    return figure, list(axes.flat[:count])
+
+
+def colour_scale(*values: Any) -> Any:
+    """Colours from the least to the largest of all finite values, logarithmic beyond a factor of 10."""
+    finite = np.concatenate([one[np.isfinite(one)] for one in values])
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    if high - low <= 1e-9 * abs(low):
+        return colors.Normalize(low - 0.5, high + 0.5)
+    return colors.LogNorm(low, high) if high > 10.0 * low > 0.0 else colors.Normalize(low, high)
+
+
+def heat_map(
+    axes: Axes, x: Any, y: Any, values: Any, scale: Any, *,
+    decimals: int | None = None, struck: Any = None, margins: bool = False,
+) -> Any:  # fmt: skip
+    """Values in colours over x and y, the first row below; missing ones are grey.
+
+    With `decimals` all cells have the same size and hold their number; those that are `struck` are struck
+    out. Without, x and y are to scale, with contour lines, and the largest value is marked; of `margins` the
+    line of 0 and the least one.
+    """
+    axes.grid(visible=False)
+    axes.set_facecolor(MISSING)
+    colours = {"norm": scale, "cmap": COLOUR_MAP, "shading": "nearest", "rasterized": True}
+    if decimals is None:
+        drawn = axes.pcolormesh(x, y, values, **colours)
+        fit_axis(axes, "x", x)
+        fit_axis(axes, "y", y)
+        _contours(axes, np.asarray(x), np.asarray(y), values, margins)
+        return drawn
+    drawn = axes.pcolormesh(range(len(x)), range(len(y)), values, **colours)
+    for (i, j), value in np.ndenumerate(values):
+        text, light = (f"{value:.{decimals}f}", scale(value)) if math.isfinite(value) else ("-", 1.0)
+        colour = "#000000" if light > LIGHT else "#FFFFFF"
+        axes.text(j, i, text, ha="center", va="center", color=colour, fontsize=8.0)
+        if struck is not None and struck[i, j]:
+            axes.plot([j - 0.5, j + 0.5], [i - 0.5, i + 0.5], color=COLOURS[1], lw=1.2)
+    axes.set_xticks(range(len(x)), list(map(str, x)))
+    axes.set_yticks(range(len(y)), list(map(str, y)))
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    return drawn
+
+
+def _contours(axes: Axes, x: Any, y: Any, values: Any, margins: bool) -> None:
+    """Contour lines, smooth where a fine grid ripples, and a mark at the worst value with its number."""
+    finite = np.isfinite(values)
+    if min(values.shape) > 2 and finite.all() and float(np.ptp(values)) > 0.0:
+        i, j = (-(-size // FINEST_CONTOUR) for size in values.shape)
+        smooth = ndimage.uniform_filter(values, (i, j))[::i, ::j]
+        levels: Any = [0.0] if margins else 6
+        lines = axes.contour(x[::j], y[::i], smooth, levels=levels, colors="white", linewidths=0.9)
+        around: list[Any] = [patheffects.withStroke(linewidth=2.0, foreground="#333333")]
+        for artist in (lines, *axes.clabel(lines, fontsize=8, fmt="%.3g")):
+            artist.set_path_effects(around)
+    if finite.any():
+        worst = int(np.nanargmin(values) if margins else np.nanargmax(values))
+        i, j = np.unravel_index(worst, values.shape)
+        right, high = j > len(x) / 2, i > len(y) / 2
+        axes.plot([x[j]], [y[i]], "X", ms=8, color=COLOURS[1], mec="white", clip_on=False)
+        axes.annotate(
+            f"{values[i, j]:.3g}", (x[j], y[i]), xytext=(-7 if right else 7, -4), color="white", fontsize=8.5,
+            textcoords="offset points", ha="right" if right else "left", va="top" if high else "bottom",
+            bbox={"fc": "#333333", "ec": "none", "pad": 1.5}, zorder=6,
+        )  # fmt: skip
+
+
+def fit_axis(axes: Axes, name: str, values: Any) -> None:
+    """The axis "x" or "y" logarithmic where values rise by a constant factor, over half a decade or more."""
+    if len(values) > 2 and values[0] > 0.0 and values[-1] >= 3.0 * values[0]:
+        steps = np.diff(np.log(values))
+        if np.ptp(steps) < 1e-6 * steps.mean():
+            getattr(axes, f"set_{name}scale")("log")
+            decade_ticks(getattr(axes, f"{name}axis"))
+
+
+def decade_ticks(axis: Any) -> None:
+    """Numbers as they are, at 1, 2 and 5 of each decade."""
+    plain_ticks(axis, ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
 
 
 # names beside the points of a figure, placed so that they cover nothing ------------------------------------

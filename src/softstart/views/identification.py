@@ -1,9 +1,11 @@
-"""An identification and a plan of experiments in words, tables and figures."""
+"""What is shown of an identification, of a plan of experiments, and of wear."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,30 +14,41 @@ from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
+from softstart.late import late
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, Table, number, short
+from softstart.views.numbers import NOTHING, Column, Table, number, short
+from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
+    from softstart.identification import planning
     from softstart.identification.planning import Experiment, Plan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
     from softstart.start.recommendation import Row
+else:
+    planning = late("softstart.identification.planning")
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
+FIGURES = {"peak shaft torque, N m": "peak", "load moves, rad": "travel", "lasts, s": "end"}
+SIMULATED = "simulated, not measured: the torque demand, and the motor as its encoder would count it"
 
 
-def headline(found: Identification) -> list[str]:
+def table_file(table: Table) -> Writer:
+    """A table as a CSV file."""
+    return rows_file([column.heading.replace("\n", " ") for column in table.columns], table.rows)
+
+
+def _lines(found: Identification) -> list[str]:
     """What was identified from what."""
-    samples = sum(one.time.size for one in found.logs)
     if not found.logs:
         return [f"{found.drive.name}: {found.drive.source}"]
     logs = f"{len(found.logs)} logs" if len(found.logs) > 1 else found.logs[0].name
-    known = sum(one.known for one in found.shared)
-    told = f"{known} of {len(found.shared)} parameters are told by the logs"
+    kinds = " and ".join(sorted({one.kind for one in found.logs}))
+    known = f"{sum(one.known for one in found.shared)} of {len(found.shared)} parameters are told by the logs"
     return [
         f"{found.drive.name}: identified from {logs}",
-        f"  {samples} samples of torque and {' and '.join(sorted({one.kind for one in found.logs}))}; "
-        f"{told if found.stated else 'best fit, no intervals'}",
+        f"  {sum(one.time.size for one in found.logs)} samples of torque and {kinds}; "
+        f"{known if found.stated else 'best fit, no intervals'}",
         f"  {found.agreed} of {found.searches} searches ended at the best minimum; torque error "
         f"{found.ripple:.3g} N m in each sample",
     ]
@@ -43,41 +56,25 @@ def headline(found: Identification) -> list[str]:
 
 def estimates_table(found: Identification) -> Table:
     """A row for each parameter: guess, value, interval."""
-    rows = found.estimates
-    cells = {
-        "parameter": [_name(one) for one in rows],
-        "unit": [UNITS[one.name][1] if _shared(one) else "s" if one.name == FILTER else "1" for one in rows],
-        "guess": [_guess(found, one) for one in rows],
-        "found": [_found(one) for one in rows],
-        "+- %": [
-            number(100.0 * one.half_width, 2) if one.known and one.value and _shared(one) else NOTHING
-            for one in rows
-        ],
-        "from": [_digits(one.lower, one) for one in rows],
-        "to": [_digits(one.upper, one) for one in rows],
-    }
+
+    def row(one: Estimate) -> list[str]:
+        shared = one.name in UNITS
+        words = one.name.replace("position", "position in gap, log").replace("_", " ")
+        name, unit = UNITS[one.name] if shared else (words, "s" if one.name == FILTER else "1")
+        unknown = AT_LIMIT if one.reason == AT_LIMIT else "unknown"
+        return [
+            name,
+            unit,
+            short(float(getattr(found.guess, one.name))) if shared else NOTHING,
+            _digits(one.value, one) if one.known or math.isnan(one.upper) else unknown,
+            number(100.0 * one.half_width, 2) if one.known and one.value and shared else NOTHING,
+            _digits(one.lower, one),
+            _digits(one.upper, one),
+        ]
+
     title = "Found, with intervals of 95 %" if found.stated else "Best fit, no intervals"
-    return Table.of(title, cells, ("parameter", "unit"))
-
-
-def _found(one: Estimate) -> str:
-    if one.known or math.isnan(one.upper):
-        return _digits(one.value, one)
-    return AT_LIMIT if one.reason == AT_LIMIT else "unknown"
-
-
-def _shared(one: Estimate) -> bool:
-    return one.name in UNITS
-
-
-def _name(one: Estimate) -> str:
-    if _shared(one):
-        return UNITS[one.name][0]
-    return one.name.replace("position", "position in gap, log").replace("_", " ")
-
-
-def _guess(found: Identification, one: Estimate) -> str:
-    return short(float(getattr(found.guess, one.name))) if _shared(one) else NOTHING
+    numbers = ("guess", "found", "+- %", "from", "to")
+    return Table.of_rows(title, ("parameter", "unit"), numbers, list(map(row, found.estimates)))
 
 
 def _digits(value: float, one: Estimate) -> str:
@@ -91,109 +88,110 @@ def _digits(value: float, one: Estimate) -> str:
     return f"{value:.{digits}g}"
 
 
-def k_dyn_table(each: Mapping[str, tuple[float, float, float]]) -> Table:
-    """K_dyn of strategies with intervals."""
-    rows = sorted(each.items(), key=lambda one: one[1][0])
-    cells = {
-        "strategy": [name for name, _ in rows],
-        "K_dyn": [number(value, 3) for _, (value, _, _) in rows],
-        "from": [number(lower, 3) for _, (_, lower, _) in rows],
-        "to": [number(upper, 3) for _, (_, _, upper) in rows],
-    }
-    stated = all(math.isfinite(upper) for _, _, upper in each.values())
-    title = "K_dyn of the drive found" + (", with intervals of 95 %" if stated else "")
-    return Table.of(title, cells, ("strategy",))
+def identification_sheet(
+    found: Identification, k_dyns: Mapping[str, tuple[float, float, float]] | None = None
+) -> Sheet:
+    """What is shown of an identification; `k_dyns`: K_dyn of strategies on its drive, with its interval."""
+    each = sorted((k_dyns or {}).items(), key=lambda one: one[1][0])
+    rows = [[name, *(number(value, 3) for value in three)] for name, three in each]
+    title = "K_dyn of the drive found" + (", with intervals of 95 %" if found.stated else "")
+    files: dict[str, str | Writer] = {"identification.json": lambda path: found.save(path.parent)}
+    for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True), 1):
+        columns = {"time [s]": log.time[np.isfinite(log.values)].tolist(), "drive - log": left.tolist()}
+        files[f"residuals-{i}.csv"] = columns_file(columns)
+    return Sheet(
+        f"{found.drive.name}: identified from its logs",
+        _lines(found),
+        tables=[
+            estimates_table(found),
+            Table.of_rows(title, ("strategy",), ("K_dyn", "from", "to"), rows),
+        ],
+        notes=found.notes,
+        figures={"logs": found.plot} if found.logs else {},
+        files=files,
+        machine=found.rounded().drive,
+    )
 
 
 def figure(found: Identification) -> Any:
     """Each log beside the start of the drive found, and below what is left."""
+    count = len(found.logs)
+    estimates = {one.name: one.value for one in found.estimates}
+    values = {name: value for name, value in estimates.items() if not name.startswith(POSITION)}
     with drawing():
-        made, axes = new_figure(
-            3, len(found.logs), (4.5 + 3.5 * len(found.logs), 6.0), squeeze=False, sharex="col"
-        )
+        made, axes = new_figure(3, count, (4.5 + 3.5 * count, 6.0), squeeze=False, sharex="col")
         entitle(made, f"{found.drive.name}: what was logged, and the start of the drive found")
-        values = {one.name: one.value for one in found.estimates if not one.name.startswith(POSITION)}
         for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
             own = f"{POSITION} {i + 1}"
-            position = {POSITION: found[own].value} if own in {one.name for one in found.estimates} else {}
+            position = {POSITION: estimates[own]} if own in estimates else {}
             base = found.guess.replace(start_position="mid-gap") if position else found.guess.design_drive
             model = LogModel(log, base).signals([values | position])[0]
-            seen = np.isfinite(log.values)
-            time, unit = log.time - log.time[0], "rad" if log.kind == "angle" else "rad/s"
-            head(axes[0][i], log.name, "torque, N m")
-            axes[0][i].plot(
-                time,
-                log.torque,
-                color=COLOURS[0],
-                drawstyle="steps-post" if log.torque_is == "demand" else None,
-            )
+            seen, unit = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
+            time, steps = log.time - log.time[0], "steps-post" if log.torque_is == "demand" else "default"
             offset = float(np.median(log.values[seen] - model[seen])) if log.kind == "angle" else 0.0
-            head(axes[1][i], "", f"{log.kind}, {unit}")
-            axes[1][i].plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
-            axes[1][i].plot(time, model + offset, color=COLOURS[1], lw=1.0, label="drive found")
-            axes[1][i].legend(loc="best")
-            head(axes[2][i], "", f"drive - log, {unit}", "time, s")
-            axes[2][i].plot(time[seen], left, color=COLOURS[2], lw=0.8)
-            axes[2][i].axhline(0.0, color=GREY, lw=0.6)
-        return made
-
-
-def plan_headline(plan: Plan) -> list[str]:
-    """What the plan is for."""
-    encoder = f"{plan.lines:g} encoder lines" if plan.lines else "an ideal encoder"
-    return [
-        f"{plan.drive.name}: what an experiment would tell",
-        f"  a sample each {1e3 * plan.log_period:g} ms, {encoder}, a torque error of "
-        f"{plan.ripple:.3g} N m in each",
-    ]
+            torque, motion, rest = axes[:, i]
+            head(torque, log.name, "torque, N m")
+            torque.plot(time, log.torque, color=COLOURS[0], drawstyle=steps)
+            head(motion, "", f"{log.kind}, {unit}")
+            motion.plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
+            motion.plot(time, model + offset, color=COLOURS[1], lw=1.0, label="drive found")
+            motion.legend(loc="best")
+            head(rest, "", f"drive - log, {unit}", "time, s")
+            rest.plot(time[seen], left, color=COLOURS[2], lw=0.8)
+            rest.axhline(0.0, color=GREY, lw=0.6)
+    return made
 
 
 def plan_table(plan: Plan) -> Table:
     """Half an interval of 95 % of each parameter, in %, under each experiment."""
     shown = plan.experiments
-    names = list(shown[0].widths)
-    cells = {
-        "parameter": [
-            *(UNITS[name][0] for name in names),
-            "peak shaft torque, N m",
-            "load moves, rad",
-            "lasts, s",
+    rows = [
+        [UNITS[name][0], *(f"{100.0 * one.widths[name]:.2g}".replace("inf", "unknown") for one in shown)]
+        for name in shown[0].widths
+    ]
+    rows += [[heading, *(f"{getattr(one, name):.3g}" for one in shown)] for heading, name in FIGURES.items()]
+    names = [one.name.replace(", ", ",\n") for one in shown]
+    return Table.of_rows("Half intervals of 95 %, in % of the value", ("parameter",), names, rows)
+
+
+def plan_sheet(plan: Plan) -> Sheet:
+    """What is shown of a plan of experiments."""
+    encoder = f"{plan.lines:g} encoder lines" if plan.lines else "an ideal encoder"
+    table = plan_table(plan)
+    files: dict[str, str | Writer] = {"plan.csv": table_file(table)}
+    for one in plan.experiments:
+        stem = one.name.replace(", ", "-").replace(" ", "-")
+        files |= {f"{stem}.csv": one.profile.to_csv, f"{stem}.toml": one.profile.to_toml}
+        files[f"simulated-{stem}.csv"] = partial(_write_log, plan, one)
+    lost = ", ".join(name for name, width in plan.best.widths.items() if math.isinf(width))
+    title = f"{plan.drive.name}: what an experiment would tell"
+    return Sheet(
+        title,
+        [
+            title,
+            f"  a sample each {1e3 * plan.log_period:g} ms, {encoder}, a torque error of "
+            f"{plan.ripple:.3g} N m in each",
         ],
-        **{one.name.replace(", ", ",\n"): _column(one, names) for one in shown},
-    }
-    return Table.of("Half intervals of 95 %, in % of the value", cells, ("parameter",))
-
-
-def _column(one: Experiment, names: Sequence[str]) -> list[str]:
-    widths = [one.widths[name] for name in names]
-    told = ["unknown" if math.isinf(width) else f"{100.0 * width:.2g}" for width in widths]
-    return [*told, f"{one.peak:.3g}", f"{one.travel:.3g}", f"{one.end:.3g}"]
-
-
-def plan_conclusion(plan: Plan) -> str:
-    """Which experiment tells most."""
-    best = plan.best
-    designed = "".join(
-        f" {one.name[0].upper()}{one.name[1:]}: {one.found_by}."
-        for one in plan.experiments
-        if one.found_by != "standard"
+        tables=[table],
+        found=[f'"{plan.best.name}" tells most{f", and leaves {lost} unknown" if lost else ""}.'],
+        notes=[f"{one.name}: {one.found_by}" for one in plan.experiments if one.found_by != "standard"],
+        figures={"experiments": partial(plan_figure, plan)},
+        files=files,
+        machine=plan.drive,
     )
-    lost = [name for name, width in best.widths.items() if math.isinf(width)]
-    if lost:
-        return f'"{best.name}" tells most, and still leaves {", ".join(lost)} unknown.{designed}'
-    worst = max(best.widths, key=lambda name: best.widths[name])
-    return (
-        f'"{best.name}" tells most: every parameter within {100.0 * best.widths[worst]:.2g} %, {worst} the '
-        f"worst; the shaft torque reaches {best.peak:.3g} N m.{designed}"
-    )
+
+
+def _write_log(plan: Plan, one: Experiment, path: Path) -> None:
+    """A simulated log of an experiment."""
+    log = planning.made_up_log(plan.drive, one, log_period=plan.log_period, ripple=plan.ripple)
+    log.to_csv(path, SIMULATED)
 
 
 def plan_figure(plan: Plan) -> Any:
     """The torque of each experiment."""
+    count = len(plan.experiments)
     with drawing():
-        made, axes = new_figure(
-            len(plan.experiments), 1, (7.0, 1.3 * len(plan.experiments) + 1.0), sharex=True, squeeze=False
-        )
+        made, axes = new_figure(count, 1, (7.0, 1.3 * count + 1.0), sharex=True, squeeze=False)
         entitle(made, f"{plan.drive.name}: torque demand of each experiment")
         for axis, one, colour in zip(axes[:, 0], plan.experiments, COLOURS, strict=False):
             time = np.linspace(0.0, one.end, 1000)
@@ -201,100 +199,86 @@ def plan_figure(plan: Plan) -> Any:
             axis.axhline(0.0, color=GREY, lw=0.6)
             head(axis, one.name, "N m")
         axes[-1, 0].set_xlabel("time, s")
-        return made
-
-
-def wear_table(wear: Wear) -> Table:
-    """The gap of each identification."""
-    cells = {
-        "date": [str(one) for one in wear.dates],
-        "identification": list(wear.names),
-        "gap rad": [_digits(one.value, one) for one in wear.gaps],
-        "from": [_digits(one.lower, one) for one in wear.gaps],
-        "to": [_digits(one.upper, one) for one in wear.gaps],
-    }
-    return Table.of("Gap, with intervals of 95 %", cells, ("date", "identification"))
+    return made
 
 
 def wear_conclusion(wear: Wear) -> list[str]:
-    """How fast the gap grows, when it reaches its limit, and which strategies keep what they promise then."""
+    """How fast the gap grows, and when it reaches its limit."""
     growth, lower, upper = wear.line.growth
     said = [f"The gap grows by {growth:.3g} rad a year ({lower:.3g} to {upper:.3g})."]
-    if wear.worn is None:
+    if wear.limit is None or wear.worn is None:
         return said
     reached, earliest, latest = wear.worn
-    when = "not on this line" if reached is None else f"on {reached}"
-    begin = "before any of these dates" if earliest is None else str(earliest)
-    end = "never, as the growth may be none" if latest is None else str(latest)
-    if math.isinf(wear.line.reaches(float(wear.limit or 0.0))[1]):
-        said.append(f"It does not reach {short(float(wear.limit or 0.0))} rad: it does not grow.")
+    if math.isinf(wear.line.reaches(wear.limit)[1]):
+        said.append(f"It does not reach {short(wear.limit)} rad: it does not grow.")
     else:
         said.append(
-            f"It reaches {short(float(wear.limit or 0.0))} rad {when}; the interval of 95 % goes from "
-            f"{begin} to {end}, if wear goes on as it has."
-        )
-    if wear.found[-1].drive.limits:
-        good = [row.name for row in wear.then if row.least_margin is not None and row.least_margin.kept]
-        said.append(
-            "Strategies that keep the limits of the drive then, at the upper end of their intervals too: "
-            f"{', '.join(good) or 'none'}."
-        )
-    else:
-        lost = [
-            f"{two.name} {100.0 * (two.run.k_dyn / one.run.k_dyn - 1.0):+.1f} %"
-            for one, two in zip(wear.now, wear.then, strict=True)
-        ]
-        said.append(
-            f"K_dyn then, beside now: {', '.join(lost)}. Give [limits] to the drive to know which is enough."
+            f"It reaches {short(wear.limit)} rad {f'on {reached}' if reached else 'not on this line'}; the "
+            f"interval of 95 % goes from {earliest or 'before any of these dates'} to "
+            f"{latest or 'never, as the growth may be none'}, if wear goes on as it has."
         )
     return said
 
 
-def wear_strategies(wear: Wear) -> Table:
-    """Each strategy now and with the gap at its limit, set up for the drive found last."""
-    pairs = sorted(zip(wear.now, wear.then, strict=True), key=lambda pair: pair[1].run.k_dyn)
-    now, then = [one for one, _ in pairs], [one for _, one in pairs]
+def _wear_tables(wear: Wear) -> tuple[Table, Table]:
+    """The gap of each identification; each strategy now and with the gap at its limit."""
 
-    def span(row: Row) -> str:
-        return " to ".join(number(end, 3) for end in row.intervals["k_dyn"])
+    def k_dyn(row: Row) -> list[str]:
+        return [number(row.run.k_dyn, 3), " to ".join(number(end, 3) for end in row.intervals["k_dyn"])]
 
-    cells = {
-        "strategy": [row.name for row in now],
-        "K_dyn\nnow": [number(row.run.k_dyn, 3) for row in now],
-        "95 %": [span(row) for row in now],
-        "K_dyn\nworn": [number(row.run.k_dyn, 3) for row in then],
-        "95 % ": [span(row) for row in then],
-        "peak to\nN m": [f"{row.intervals['peak_torque'][1]:.4g}" for row in then],
-    }
-    if wear.found[-1].drive.limits:
-        cells |= {
-            "limits now": [row.against_limits for row in now],
-            "worn": [row.against_limits for row in then],
-        }
-    title = f"Strategies now, and with a gap of {short(float(wear.limit or 0.0))} rad"
-    return Table.of(title, cells, ("strategy", "95 %", "95 % ", "limits now", "worn"))
+    gaps = [
+        [str(day), name, *(_digits(value, one) for value in (one.value, one.lower, one.upper))]
+        for day, name, one in zip(wear.dates, wear.names, wear.gaps, strict=True)
+    ]
+    limited = bool(wear.found[-1].drive.limits)
+    rows = [
+        [now.name, *k_dyn(now), *k_dyn(then), f"{then.intervals['peak_torque'][1]:.4g}",
+         *((now.against_limits, then.against_limits) if limited else ())]
+        for now, then in sorted(zip(wear.now, wear.then, strict=True), key=lambda pair: pair[1].run.k_dyn)
+    ]  # fmt: skip
+    headings = ["strategy", "K_dyn\nnow", "95 %", "K_dyn\nworn", "95 %", "peak to\nN m", "limits now", "worn"]
+    columns = [Column(heading, i in (1, 3, 5)) for i, heading in enumerate(headings[: 8 if limited else 6])]
+    return (
+        Table.of_rows(
+            "Gap, with intervals of 95 %", ("date", "identification"), ("gap rad", "from", "to"), gaps
+        ),
+        Table(f"Strategies now, and with a gap of {short(float(wear.limit or 0.0))} rad", columns, rows),
+    )
+
+
+def wear_sheet(wear: Wear) -> Sheet:
+    """What is shown of wear."""
+    drive, tables = wear.found[-1].drive, _wear_tables(wear)
+    return Sheet(
+        f"{drive.name}: wear of the gap",
+        [f"{drive.name}: wear from {wear.dates[0]} to {wear.dates[-1]}"],
+        tables=tables,
+        found=wear_conclusion(wear),
+        notes=wear.notes,
+        figures={"wear": wear.plot},
+        files={"wear.csv": table_file(tables[0])},
+        machine=drive,
+    )
 
 
 def wear_figure(wear: Wear) -> Any:
     """The gaps over time, the line with its interval, and the limit."""
-    first = wear.dates[0]
-    years = [(one - first).days / YEAR for one in wear.dates]
-    end = max(1.3 * years[-1], min(wear.line.reaches(wear.limit)[0], 4.0 * years[-1]) if wear.limit else 0.0)
+    years = [(one - wear.dates[0]).days / YEAR for one in wear.dates]
+    reached = wear.line.reaches(wear.limit)[0] if wear.limit else 0.0
+    end = np.nanmax([1.3 * years[-1], min(reached, 4.0 * years[-1])])
     with drawing():
-        made, ((axes,),) = new_figure(1, 1, (7.0, 4.0), squeeze=False)
+        made, axes = new_figure(1, 1, (7.0, 4.0))
         entitle(made, f"{wear.found[-1].drive.name}: wear")
-        time = np.linspace(0.0, end if math.isfinite(end) else 1.3 * years[-1], 200)
+        time = np.linspace(0.0, end, 200)
         line, half = wear.line.at(time)
         axes.fill_between(time, line - half, line + half, color=COLOURS[0], alpha=0.2, lw=0.0)
         axes.plot(time, line, color=COLOURS[0], label="line, interval of 95 %")
-        values = np.array([one.value for one in wear.gaps])
-        reach = np.array([[one.value - one.lower, one.upper - one.value] for one in wear.gaps]).T
-        axes.errorbar(
-            years, values, yerr=reach, fmt="o", ms=5, capsize=3, color=COLOURS[1], label="identified"
-        )
+        values = [one.value for one in wear.gaps]
+        reach = np.array([(one.value - one.lower, one.upper - one.value) for one in wear.gaps]).T
+        axes.errorbar(years, values, reach, fmt="o", ms=5, capsize=3, color=COLOURS[1], label="identified")
         if wear.limit is not None:
             axes.axhline(wear.limit, color=GREY, ls="--", lw=1.0, label="limit")
-        head(axes, "", "gap, rad", f"years after {first}")
+        head(axes, "", "gap, rad", f"years after {wear.dates[0]}")
         axes.set_ylim(bottom=0.0)
         axes.legend(loc="best")
-        return made
+    return made

@@ -38,6 +38,13 @@ class Table(NamedTuple):
         return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)], **options)
 
     @classmethod
+    def of_rows(
+        cls, title: str, texts: Sequence[str], numbers: Sequence[str], rows: Sequence[Sequence[str]]
+    ) -> Table:
+        """From rows; the headings of the first columns, which hold text, and of the others, numbers."""
+        return cls(title, [*(Column(one, False) for one in texts), *map(Column, numbers)], rows)
+
+    @classmethod
     def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
         """Rows of text, without a title."""
         return cls("", [Column(heading, False) for heading in headings], rows)
@@ -98,6 +105,16 @@ def short(value: float) -> str:
     ('368.465', '0.175', '92.1534')
     """
     return f"{value:.6g}"
+
+
+def label(name: str, unit: str = "", between: str = ", ") -> str:
+    r"""A figure or a parameter in words, with its unit, as axes and headings name it.
+
+    >>> label("k_dyn_first_contact"), label("load_inertia J2", "kg*m^2"), label("controller_time", "s", "\n")
+    ('K_dyn first contact', 'load inertia J2, kg m2', 'time\ns')
+    """
+    words = name.removeprefix("controller_").replace("_", " ").replace("k dyn", "K_dyn")
+    return words if unit in ("", "1") else f"{words}{between}{unit.replace('*', ' ').replace('^', '')}"
 
 
 def printable(text: str) -> str:

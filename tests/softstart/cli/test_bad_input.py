@@ -15,7 +15,7 @@ ONE_SENTENCE = {
         ["zzzzzz"],
         [
             "there are compare, simulate, fatigue, optimize, pareto, tune, sweep, linear, reduce, clutch, "
-            "balance, report, serve, init, identify, drives, controllers, study and completion"
+            "balance, report, serve, init, plan, identify, wear, drives, controllers, study and completion"
         ],
     ),
     "unknown option": (["compare", "--jsno"], ["compare:", "'--jsno'", "Did you mean '--json'?"]),

@@ -149,7 +149,7 @@ def test_a_command_for_drives_takes_a_chain_that_two_masses_stand_for(place, ref
     near = replace(two, masses=(motor, light, load), shafts=(stiff, two.shafts[0]))
     (place / "near.toml").write_text(near.to_toml())
     assert "reduced to two masses" in read_drive("near.toml", ()).name
-    said = refused("identify", "--plan", "crane-4-mass")
+    said = refused("plan", "crane-4-mass")
     assert "this command takes a drive. Two masses are not enough: " in said
 
 

@@ -76,16 +76,8 @@ def test_the_files_are_whole_and_play(run, place, begun, finished, done):
     tuned = finished[0]
     for file, table in (("schedule.toml", tuned.schedule), ("schedule.csv", tuned.schedule),
                         ("robust.toml", tuned.robust.cells)):  # fmt: skip
-        arguments = (
-            "--controller",
-            f"{begun}/{file}",
-            *SIXTY,
-            "--set",
-            "gap=2",
-            "--set",
-            "load.inertia=0.07",
-        )
-        out = done("simulate", "crane-4amtkf", *arguments, "--json")
+        cell = ("--set", "gap=2", "--set", "load.inertia=0.07", "--json")
+        out = done("simulate", "crane-4amtkf", "--controller", f"{begun}/{file}", *SIXTY, *cell)
         assert json.loads(out)["k_dyn"] == float(table.k_dyn.sel(gap=2.0, load_inertia=0.07))
     out = done("compare", *SIXTY, "--controllers", f"ramp,{begun}/robust.toml,{begun}/schedule.csv", "--json")
     names = [row["controller"] for row in json.loads(out)["strategies"]]
@@ -146,7 +138,7 @@ ONE_SENTENCE = {
     "free twice": (["--free", "time,time"], ["named twice"]),
     "metric": (["--metric", "k_dym"], ["--metric", "did you mean k_dyn?"]),
     "start time": (["--start-time", "soon"], ["--start-time", "1.2x"]),
-    "tolerance": (["--tolerance", "stiffness"], ["KEY=SPREAD"]),
+    "tolerance": (["--tolerance", "stiffness"], ["as stiffness=10%"]),
     "tolerance key": (["--tolerance", "stifness=10%"], ["--tolerance", "did you mean stiffness?"]),
     "quantile": (["--quantile", "2"], ["--quantile"]),
     "only": (["--only", "schedul"], ["--only", "did you mean schedule?"]),

@@ -156,8 +156,8 @@ def test_the_command_reads_folders_and_writes_a_report(
 ) -> None:  # type: ignore[no-untyped-def]
     for year, gap in (("2024", 0.08), ("2026", 0.1)):
         with_value(new, "gap", gap, 0.001).save(tmp_path / year)
-    line = ["identify", "--wear", str(tmp_path / "2024"), str(tmp_path / "2026"), "--controllers", "direct"]
-    result = run(*line, "--limit", "0.2 rad", "--out", str(tmp_path / "worn"))
+    line = ["wear", str(tmp_path / "2024"), str(tmp_path / "2026"), "--controllers", "direct"]
+    result = run(*line, "--worn-gap", "0.2 rad", "--out", str(tmp_path / "worn"))
     assert result.code == 0, result.err
     assert "The gap grows by 0.01 rad a year" in result.out
     assert "It reaches 0.2 rad on 2036-0" in " ".join(result.out.split())
@@ -165,11 +165,10 @@ def test_the_command_reads_folders_and_writes_a_report(
     data = as_json(*line)
     assert [one["gap"] for one in data["gaps"]] == [0.08, 0.1]
     for extra, sentence in (
-        (["--drive", "crane-4amtkf"], "--drive: --wear reads folders"),
-        (["--limit", "soon"], "--limit"),
+        (["--worn-gap", "soon"], "--worn-gap"),
+        (["--worn-gap", "-1"], "--worn-gap = -1"),
         (["--dates", "2024"], "there are 1 for 2"),
     ):
         refused = run(*line, *extra)
         assert refused.code == 2
         assert sentence in refused.err
-    assert "it goes with --wear" in run("identify", "a.csv", "--drive", "crane-4amtkf", "--limit", "1").err
