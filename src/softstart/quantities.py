@@ -626,5 +626,6 @@ def whole_number(text: str, name: str, least: int = 1, most: int = 10**15) -> in
     digits = re.fullmatch(r"\s*0*([0-9]{1,16})\s*", text)
     if digits and least <= int(digits[1]) <= most:
         return int(digits[1])
-    bound = f"from {least} to {most:,}" if most < 10**15 else f"of {least} or more"
+    upper = f"{most}" if most < 10_000 else f"{most:,}"
+    bound = f"from {least} to {upper}" if most < 10**15 else f"of {least} or more"
     raise InputError(f"{name} = {show(text)}: give a whole number {bound}.")

@@ -285,12 +285,14 @@ def _unknown(
     """That a table has no such key, and those that were probably meant, in this table or in others."""
     everywhere = [p for one in tables for p in one.parameters]
     meant = meant_by(key.removeprefix(f"{table.name}_"), everywhere, table.parameters)
-    names = [
-        p.key if p.table == table.name else p.place if p.table else f"{p.key} above the first table"
-        for p in meant
-    ]
+    brackets = {one.name: one.bracket for one in tables}
+
+    def called(p: Parameter) -> str:
+        elsewhere = f"{brackets[p.table]} {p.key}" if p.table else f"{p.key} above the first table"
+        return p.key if p.table == table.name else elsewhere
+
     listed = [*table.by_key, *(one.bracket for one in tables if one.name and not table.name)]
-    remedy = f"did you mean {' or '.join(names)}?" if meant else f"it has {', '.join(listed)}"
+    remedy = f"did you mean {' or '.join(map(called, meant))}?" if meant else f"it has {', '.join(listed)}"
     reason = f"{f'[{table.name}]' if table.name else f'{what} file'} has no key {key}; {remedy}"
     sentence = wording.sentence(f"{place}{key} = {wording.show(value)}", reason)
     return Mistake(sentence, (), tuple(p.path for p in meant) if len(meant) == 1 else ())

@@ -82,7 +82,7 @@ def test_natural_frequencies_come_first_whatever_cannot_be_reduced(run, place):
     ("arguments", "said"),
     [
         (("tractor",), "shipped"),
-        (("good.toml",), "inertia belongs below [[mass]]"),
+        (("good.toml",), "did you mean [[mass]] inertia?"),
         (("--set", "start.load=rotor"), "motor and load are the same mass"),
         (("--factor", "0.5"), "--factor = 0.5"),
         (("--set", "shaft[1].gap=5 m"), "m is a length"),
