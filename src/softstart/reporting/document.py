@@ -1,393 +1,390 @@
-"""The report as one HTML page, and the answer at its head in plain sentences."""
+"""The report as one HTML page: the templates beside this file, and the tables that they show."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import tomllib
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from softstart.errors import listed
-from softstart.reporting.choice import Candidate, Choice, choice_section
-from softstart.reporting.drive_section import drive_section
-from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
-from softstart.reporting.limit import limit_section
-from softstart.reporting.markup import (
-    Figures,
-    Html,
-    css_string,
-    html,
-    joined,
-    table,
-    tag,
-    typeset,
-    with_comma,
-)
-from softstart.reporting.project import Project
-from softstart.reporting.result import Provenance, Report
-from softstart.reporting.robustness import GAPS, INERTIAS, life_chapter, maps_picture, robustness_section
-from softstart.reporting.shafts import chain_section, sentences, shafts_section
-from softstart.reporting.sheet import sheet_section
-from softstart.reporting.strategies import (
-    for_customer,
-    ordered,
-    strategies_section,
-    trace_groups,
-    traces_picture,
-    traces_section,
-)
-from softstart.start.comparison import Comparison
-from softstart.views.drives import POSITIONS
-from softstart.views.printed import digits, fixed, short, units_of
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
 
+from softstart.drive import doubts
+from softstart.errors import listed
+from softstart.optimal.problem import REACTS, best_start
+from softstart.reporting import choice, figures, limit
+from softstart.reporting.resolution import rated_torque
+from softstart.reporting.result import Report
+from softstart.reporting.sheet import Sheet
+from softstart.start import fatigue
+from softstart.start.recommendation import SLOW
+from softstart.vibration import natural_vibration
+from softstart.views import chain_schemes, chains, drives, printed, starts
+from softstart.views import fatigue as lives
+from softstart.views.drawing import drawing
+from softstart.views.numbers import Table
+from softstart.views.printed import at_output, digits, fixed, percent, short, unit
+
+HERE = Path(__file__).parent
+HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
+MOST_SHAFTS = 6  # with a column each in a table
+LONGEST = 70  # characters of a name in the head of a page
+AS_IT_IS = "the drive as it is"
 SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
-LONGEST = 70  # letters of a name in the head of a page
-GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in the file, nothing is loaded
+FUNCTIONS = {
+    "limit": "torque limit",
+    "braking": "torque limit, generating",
+    "reference": "torque reference",
+    "backlash": "torque limit after a change of direction, and its ramp",
+    "ramp": "ramp and S-curve of the speed reference",
+    "preload": "torque before the brake opens, and its ramp",
+}
+_BEFORE_UNIT = re.compile(r"(?<=[\d,]) (?=(?:N\xa0m|kg\xa0m|ms|s|rad|deg|rpm|mm|Hz|kW|W|%)(?!\w))")
+_DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
 
-def pictures(choice: Choice, comparison: Comparison) -> dict[str, Html]:
-    """The figures that do not wait for the limit, by their keys: what is drawn while that is looked for."""
-    with _any_script():
-        made = {
-            key: traces_picture(key, comparison.rows, some) for key, some, _ in trace_groups(comparison.rows)
-        }
-        made["before-after"] = before_after_picture(before_and_after(choice, comparison))
-        if choice.mapped:
-            made["maps"] = maps_picture(comparison.drive, choice.mapped)
-        return made
+def typeset(text: object, comma: bool = False) -> Markup:
+    """A text as HTML in which no line ends before a unit, with K_dyn set as such and decimal commas if asked.
+
+    >>> print(typeset("K_dyn < 0.98 in 1 s", comma=True).replace("\\xa0", "~"))
+    K<sub>dyn</sub> &lt; 0,98 in 1~s
+    """
+    if isinstance(text, Markup):
+        return text
+    shown = re.sub(r"\b(N|kg) m(?=\b|²)", "\\1\xa0m", "" if text is None else str(escape(text)))
+    shown = with_comma(_BEFORE_UNIT.sub("\xa0", shown), comma)
+    return Markup(shown.replace("K_dyn", "K<sub>dyn</sub>"))
 
 
-@contextmanager
-def _any_script() -> Iterator[None]:
-    """A name may have letters that the font of the figures has not."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
-        yield
+def with_comma(text: str, comma: bool) -> str:
+    """A text with decimal commas if asked; version numbers stay as they are."""
+    return _DECIMAL.sub(r"\1,\2", text) if comma else text
+
+
+def for_customer(text: str) -> str:
+    """A text without what it tells the author to give.
+
+    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
+    'It depends. Nothing damps.'
+    """
+    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
+
+
+def css_string(text: str) -> Markup:
+    """Any text as a string of CSS that ends nowhere but at its end, cut where it is too long.
+
+    >>> print(css_string('a"</style>'))
+    "a\\22 \\3c \\2f style\\3e "
+    """
+    text = text if len(text) <= LONGEST else text[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    written = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
+    return Markup('"{}"').format(Markup("".join(written)))
+
+
+def times(seconds: Iterable[float]) -> str:
+    """Start times in words, each once, or how many there are."""
+    words = [f"{digits(t)} s" for t in seconds]
+    return f"{len(words)} start times" if len(set(words)) > 4 else listed(list(dict.fromkeys(words)))
+
+
+FILTERS = {
+    "digits": digits, "fixed": fixed, "short": short, "percent": percent, "listed": listed,
+    "times": times, "factor": lives.factor, "printed": printed.printed, "for_customer": for_customer,
+    "css_string": css_string,
+    "capital": lambda text: text[0].upper() + text[1:], "short4": lambda value: short(float(f"{value:.4g}")),
+}  # fmt: skip
+
+
+def templates() -> Environment:
+    """The templates of the report, which escape all text."""
+    found = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )  # fmt: skip
+    found.filters |= FILTERS
+    found.tests |= {"nan": math.isnan, "finite": math.isfinite}
+    found.globals |= {"SAME": SAME, "HARMED": HARMED}
+    return found
+
+
+def answer(report: Report) -> str:
+    """The answer without HTML."""
+    return Markup(
+        templates().get_template("answer.html.j2").render(report=report, choice=report.choice)
+    ).striptags()
 
 
 def document(report: Report) -> str:
     """The whole file."""
-    with _any_script():
-        text = typeset(_document(report))
-    return with_comma(text) if report.project.decimal == "comma" else text
+    drive, comma, positions = report.drive, report.project.decimal == "comma", list(report.drive.positions)
+    plain = templates()
+    page = plain.overlay(finalize=lambda text: typeset(text, comma))
 
+    def svg(figure: Any, key: str, title: str) -> Markup:
+        return in_page(figures.svg(figure, key, title))
 
-def _document(report: Report) -> str:
-    drive, choice, rows, project = report.drive, report.choice, report.comparison.rows, report.project
-    figures = Figures(report.pictures)
-    chosen = [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
-    best, what = choice.chosen.name if choice.chosen else "", drive.WHAT.removeprefix("a ")
-    first = first_page(report, figures)
-    several = len(drive.shaft_names) > 1
-    shown = list(dict.fromkeys(reversed(before_and_after(choice, report.comparison))))
-    sections: list[tuple[str, str, Html]] = [
-        ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
-        (
-            "strategies",
-            "The strategies compared",
-            strategies_section(drive, rows, chosen, report.failed),
-        ),
-        ("traces", "Torques of each start", traces_section(rows, figures)),
-        *(
-            [("shafts", "What each shaft carries", shafts_section(ordered(rows), shown, figures))]
-            if several
-            else []
-        ),
-        (
-            "drive",
-            f"The {what}",
-            chain_section(drive, figures) if several else drive_section(drive, project, figures),
-        ),
-        ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
-        *(
-            [
-                (
-                    "robustness",
-                    "When the gap wears and the load changes",
-                    robustness_section(drive, choice.mapped, figures),
-                )
-            ]
-            if choice.mapped
-            else []
-        ),
-        (
-            "sheets",
-            "Parameter sheets for the inverter",
-            sheet_section(drive.design_drive, report.sheets, report.resolution, best, choice.role),
-        ),
-        *life_chapter(report.lives),
-        ("validity", "What this report assumes, and where it holds", validity_section(report)),
-        ("provenance", "About this document", provenance_section(report.provenance, project, what)),
-    ]
-    return page(str(drive.name), project, report.provenance.made, first, sections)
+    def in_page(text: str) -> Markup:
+        return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
 
+    def scheme() -> Markup:
+        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=printed.units_of(drive)))
 
-def page(
-    name: str, project: Project, made: str, first: Html, sections: Sequence[tuple[str, str, Html]]
-) -> str:
-    """A whole file: head, first page, contents, and numbered sections, each (key, title, content)."""
-    contents = tag(
-        "nav",
-        tag("h2", "Contents", id="contents"),
-        tag("ol", joined(tag("li", tag("a", title, href=f"#{key}")) for key, title, _ in sections)),
-        aria_labelledby="contents",
-    )
-    heads = [*project.lines, ("Date", made)]
-    names = [tag("div", tag("dt", what), tag("dd", value)) for what, value in heads]
-    body = tag(
-        "main",
-        tag(
-            "header",
-            tag(
-                "img",
-                src=project.logo,
-                alt=f"Logo of {project.company or project.author}",
-            )
-            if project.logo
-            else None,
-            tag("p", "Soft start of a drive with backlash in its transmission", class_="kind"),
-            tag("h1", name),
-            tag("dl", *names, class_="made"),
-        ),
-        first,
-        contents,
-        joined(
-            tag(
-                "section",
-                tag("h2", f"{number}. {title}"),
-                content,
-                id=key,
-            )
-            for number, (key, title, content) in enumerate(sections, start=1)
-        ),
-    )
-    guard = GUARD + "; img-src data:" if project.logo else GUARD
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=guard),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", name="color-scheme", content="light"),
-        tag("title", f"{name}: soft start report"),
-        tag("style", Html(style(name, " · ".join(filter(None, (project.number, made))), project.paper))),
-    )
-    return html(
-        Html("<!DOCTYPE html>\n"),
-        tag("html", head, "\n", tag("body", body), lang="en"),
-        "\n",
-    )
-
-
-def validity_section(report: Report) -> Html:
-    """The assumptions behind all figures, and where their data are from."""
-    drive, project, motor = report.drive, report.project, report.drive.motor
-    motor_is = _motor_sentence(
-        float(motor.minimum_torque), float(motor.maximum_torque), float(motor.torque_lag)
-    )
-    if len(drive.shaft_names) > 1:
-        notes = [
-            *sentences(drive),
-            motor_is,
-            "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
-            "The equations are solved as Taylor series from event to event; peaks are located, not read off "
-            "a grid.",
-        ]
-    else:
-        notes = [*_of_two_masses(drive, motor_is), *_on_maps(report.choice)]
-        notes.append(
-            "The equations are solved in closed form from event to event; peaks are located, not read off a "
-            "grid. The figures are as good as the data, above all gap, stiffness and inertias."
-        )
-    guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
-    if guessed:
-        notes.append(
-            f"Guessed, so to be checked before the values of the sheets are used: {listed(guessed)}."
-        )
-    elif not (project.sources or drive.source):
-        notes.append("Where the values of the drive are from is not stated.")
-    return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
-
-
-def _of_two_masses(drive: Any, motor_is: str) -> list[str]:
-    units, two, where = units_of(drive), drive.lumped, list(drive.positions)
-    damping = (
-        f"damping of the shaft: {short(float(two.d))} N m s/rad, proportional to the speed of its twist"
-        if two.d
-        else "no damping: oscillations do not die out, as those of a real shaft do"
-    )
-    load = (
-        "Load: the load torque acts always, also at rest (a hanging load); its torque and inertia are "
-        "constant during the start."
-        if two.active
-        else "Load: the load torque is friction: it holds the load at rest and opposes its motion; its "
-        "torque and inertia are constant during the start."
-    )
-    begins = (
-        f"The start begins {POSITIONS[where[0] if len(where) == 1 else 'unknown']}."
-        if where[0]
-        else (
-            f"The start begins at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}."
-        )
-    )
-    return [
-        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model.",
-        motor_is,
-        f"Contact law: {drive.contact_laws[0]}; {damping}.",
-        load,
-        begins,
-    ]
-
-
-def _on_maps(choice: Choice) -> list[str]:
-    if not choice.mapped:
-        return []
-    return [
-        f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and "
-        f"from {short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values "
-        "computed. Other stiffness, damping or load torque was not examined."
-    ]
-
-
-def _motor_sentence(least: float, most: float, lag: float) -> str:
-    """What stands for the motor: its torques (N m) and the lag of its torque (s)."""
-    follows = f"with a lag of {short(1e3 * lag)} ms" if lag else "without lag"
-    return (
-        f"The motor is a source of torque from {short(least)} to {short(most)} N m that follows its demand "
-        f"{follows}. Currents, fluxes and a motor started directly at the mains are not in the model."
-    )
-
-
-def provenance_section(about: Provenance, project: Project, what: str) -> Html:
-    """Revisions, approval, versions, date, command, and the drive's file with all changes."""
-    signed = [
-        ["made by", project.author, ""],
-        ["checked by", project.checked, ""],
-        ["approved by", project.approved, ""],
-    ]
-    libraries = ", ".join(f"{name} {version}" for name, version in about.libraries)
-    made = tag("code", f"softstart {about.softstart}, Python {about.python}; {libraries}")
-    revisions = [[one.number, one.date, one.author, one.change] for one in project.revisions]
-    return html(
-        table(
-            ["revision", "date", "author", "change"],
-            revisions,
-            caption="Revisions",
-            text_columns=range(4),
-        )
-        if revisions
-        else None,
-        table(
-            ["", "name, date", "signature"],
-            signed,
-            caption="Approval",
-            text_columns=range(3),
-            class_="signed",
-        )
-        if any(who for _, who, _ in signed)
-        else None,
-        tag("p", f"Made on {about.made} with ", made, ".", class_="small"),
-        tag("p", "Command: ", tag("code", about.command)) if about.command else None,
-        tag(
-            "p",
-            f"The {what} as a file for softstart, with all changes, SI units unless stated:",
-            class_="lead",
-        ),
-        tag("pre", re.sub(r" *#[^\"\n]*$", "", about.drive_toml, flags=re.MULTILINE), class_="file"),
-    )
-
-
-def answer(report: Report) -> str:
-    """The paragraph at the head of the report."""
-    best = report.choice.chosen
-    text = for_customer(report.choice.recommendation.text)
-    if best is None:
-        return text
-    sentences = [
-        text,
-        _sheet_of(report, best),
-        _after_rounding(report, best),
-        *_on_an_ordinary_inverter(report),
-        _compared(report, best),
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _sheet_of(report: Report, best: Candidate) -> str:
-    """Which strategy the figures that follow are those of, where the text names several."""
-    several = report.choice.recommendation.recommended is None and len(report.choice.recommendation.best) > 1
-    return f"The parameters below are those of the gentlest, {best.name}." if several else ""
-
-
-def _on_an_ordinary_inverter(report: Report) -> list[str]:
-    best, plain = report.choice.chosen, report.choice.ordinary
-    if plain is None or plain is best or report.choice.recommendation.limits:
-        return []
-    run = plain.row.run
-    text = (
-        f"On an ordinary inverter, one that offers torque ramps and no more, {plain.name} is the best: "
-        f"K_dyn {fixed(run.k_dyn, 3)} and {digits(run.start_time)} s."
-    )
-    return [text, _after_rounding(report, plain)]
-
-
-def _compared(report: Report, best: Candidate) -> str:
-    """What no start, and what the best start known, has in the same time."""
-    bound, known = report.lower_bound(best.row), report.lowest_known(best.row)
-    if bound is None:
-        return ""
-    motor = report.drive.motor
-    figures = {
-        "least": short(float(motor.minimum_torque)),
-        "most": short(float(min(motor.starting_torque, motor.maximum_torque))),
-        "bound": fixed(math.floor(bound * 1000.0) / 1000.0, 3),
+    several, what = len(drive.shaft_names) > 1, drive.WHAT.removeprefix("a ")
+    sections = {
+        "recommendation": "The recommendation, and why",
+        "strategies": "The strategies compared",
+        "traces": "Torques of each start",
+        "shafts": "What each shaft carries" if several else "",
+        "drive": f"The {what}",
+        "limit": "How gentle could a start be?",
+        "robustness": "When the gap wears and the load changes" if report.choice.mapped else "",
+        "sheets": "Parameter sheets for the inverter",
+        "life": "How long the shaft line lasts" if several or drive.limits.fatigue is not None else "",
+        "validity": "What this report assumes, and where it holds",
+        "provenance": "About this document",
     }
-    if known is None or known >= best.row.run.k_dyn * (1.0 - SAME):
-        return (
-            "For comparison: no motor torque from {least} to {most} N m, however it is controlled, "
-            "brings this load to speed in that time with a K_dyn below {bound}."
-        ).format(**figures)
-    figures["known"] = fixed(math.ceil(known * 1000.0) / 1000.0, 3)
-    return (
-        "For comparison: no motor torque from {least} to {most} N m, however it is controlled, brings "
-        "this load to speed in that time with a K_dyn below {bound}; the gentlest start known has "
-        "{known}."
-    ).format(**figures)
+    values = {
+        "report": report, "drive": drive, "choice": report.choice, "limit": report.limit, "what": what,
+        "project": report.project, "sections": [(key, title) for key, title in sections.items() if title],
+        "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS, "tables": Tables(report),
+        "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
+        "doubts": doubts.doubts(drive), "units": printed.units_of(drive), "most_torque": report.most_torque,
+        "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
+        "position": positions[0] if len(positions) == 1 else "unknown",
+        "natural_vibration": natural_vibration,
+        "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
+        "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
+        "chain_scheme": lambda: in_page(chain_schemes.scheme_svg(drive)), "at_output": at_output,
+        "best_start": best_start, "figures": figures, "starts": starts, "chains": chains, "lives": lives,
+        "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
+        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "REACTS": REACTS,
+        "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
+    }  # fmt: skip
+    with drawing():  # a name may have characters that the font of the figures has not
+        return page.get_template("report.html.j2").render(values)
 
 
-def _after_rounding(report: Report, one: Candidate) -> str:
-    """What the steps of the inverter do to a chosen strategy, where that matters."""
-    sheet = next((sheet for sheet in report.sheets if sheet.name == one.name), None)
-    if sheet is None:
-        return ""
-    if sheet.rounded is None:
-        return "But its values cannot be set in the steps given."
-    exact, rounded = sheet.exact, sheet.rounded
-    if math.isnan(rounded.start_time):
-        return "But rounded to the steps given, its values do not bring the load to its target speed."
-    harm = max(rounded.k_dyn / exact.k_dyn, rounded.start_time / exact.start_time) - 1.0
-    if harm > HARMED:
-        return (
-            "But these are exact values: rounded to the steps given, they make it K_dyn "
-            f"{fixed(rounded.k_dyn, 3)} and {digits(rounded.start_time)} s."
+def inverters() -> dict[str, Any]:
+    """Names of functions in manuals, and what a parameter means at an inverter."""
+    return tomllib.loads((HERE / "inverters.toml").read_text("utf-8"))
+
+
+class Tables:
+    """The tables of a report."""
+
+    def __init__(self, report: Report) -> None:
+        self.report, self.drive, self.choice = report, report.drive, report.choice
+        self.geared = report.drive.gear_ratio is not None
+
+    def _at_output(self, torques: Sequence[float]) -> dict[str, list[str]]:
+        """A column of torques at the output shaft, where a gear ratio is known."""
+        return {"at the output, N m": [at_output(self.drive, one) for one in torques]} if self.geared else {}
+
+    def verdicts(self) -> Table:
+        """Pass or fail of direct and of the chosen strategy, limit by limit, in the worst case."""
+        rows, cells = self.choice.shown, []
+        for row in rows:
+            for one in row.margins(self.choice.recommendation.limits):
+                left = (
+                    percent(one.share) if not one.share < -1.0 else f"{1.0 - one.share:.3g} times the limit"
+                )
+                verdict = Markup('<b class="{0}">{0}</b>').format("pass" if one.kept else "fail")
+                cells.append([row.name, f"{one.name}, {one.unit}", digits(one.value), digits(one.limit), left,
+                              one.case or AS_IT_IS, verdict])  # fmt: skip
+        heads = ("strategy", "limit", "worst value", "permitted", "margin", "worst with", "verdict")
+        worst = listed([AS_IT_IS, *rows[0].worst_case])
+        return _table(
+            f"Pass or fail, in the worst of {worst}",
+            heads,
+            cells,
+            ("strategy", "limit", "worst with", "verdict"),
         )
-    if not max(sheet.worst_k_dyn / exact.k_dyn, sheet.slowest / exact.start_time) - 1.0 <= HARMED:
-        if sheet.variants and math.isnan(sheet.worst_k_dyn + sheet.slowest):
-            return "But with values half a step off, the load may not reach its target speed."
+
+    def choices(self) -> Table:
+        """Direct, what an ordinary inverter can do, and the strategies that no other one beats."""
+        ordinary = [self.choice.ordinary] if self.choice.ordinary else []
+        found = dict.fromkeys([self.choice.direct, *ordinary, *self.choice.recommendation.shown])
+        rows = sorted(found, key=lambda row: (row.effort.order, -row.run.k_dyn))
+        cells = {
+            "strategy": [row.name for row in rows],
+            "takes": [row.effort.meaning for row in rows],
+            "peak torque, N m": [digits(row.run.peak_torque) for row in rows],
+            **self._at_output([row.run.peak_torque for row in rows]),
+            "less than direct": [self.report.share_saved(row) for row in rows],
+            "K_dyn": [fixed(row.run.k_dyn, 3) for row in rows],
+            "start time, s": [digits(row.run.start_time) for row in rows],
+        }
+        return Table.of("What more effort buys", cells, ("strategy", "takes"))
+
+    def rule(self) -> Table:
+        """The verdict on every strategy."""
+        choice, rows = self.choice, self.choice.comparison.rows
+        cells = [
+            [
+                r.name,
+                r.run.controller.summary,
+                r.effort.meaning,
+                fixed(choice.worst(r), 3),
+                choice.recommendation.verdict(r),
+            ]
+            for r in sorted(rows, key=lambda row: (row.effort.order, row.run.k_dyn))
+        ]
+        heads = [
+            "strategy",
+            "what it does",
+            "takes",
+            "worst K_dyn on the map" if choice.maps else "K_dyn",
+            "verdict",
+        ]
+        texts = ("strategy", "what it does", "takes", "verdict")
+        return _table("Every strategy before the rule, in the order of effort", heads, cells, texts)
+
+    def strategies(self) -> Table:
+        """The figures of all strategies, the gentlest first."""
+        rows = self.report.ordered
+        output = starts.Figure(
+            "at the\noutput\nN m", lambda row: row.run.peak_torque * float(self.drive.gear_ratio)
+        )
+        columns = (
+            *starts.GENTLE, *([output] if self.geared else []),
+            *(starts.INTERVALS if rows[0].intervals else []), starts.TIMES[0], *starts.QUICK,
+            starts.TIMES[1], starts.AT_THE_GAP[-1],
+        )  # fmt: skip
+        return starts.comparison_table(rows, columns, "Strategies on this drive, the gentlest first")
+
+    def shafts(self) -> Table:
+        """K_dyn of each shaft of a chain under all strategies."""
+        of_shafts = starts.details(self.drive)[: len(self.drive.shaft_names)]
+        return starts.comparison_table(self.report.ordered, of_shafts, "K_dyn of each shaft")
+
+    def data(self) -> tuple[Table, list[str]]:
+        """What is known of the drive and from where, and what is absent."""
+        project, units, rows, absent = self.report.project, printed.units_of(self.drive), [], []
+        for path, (parameter, value) in self.drive.by_path().items():
+            source, si = project.source_of(path), parameter.unit
+            if value is None or value == "" or parameter.name in HIDDEN:
+                continue
+            if value == parameter.default and not source:
+                absent += [parameter.meaning] if value == 0.0 else []
+                continue
+            of, other, text, there = unit(units.of(si)), "", str(value), ""
+            numbers = [
+                units.shown(v, si)
+                for v in (value if isinstance(value, tuple) else [value])
+                if isinstance(v, float)
+            ]
+            if numbers:
+                text, there = ", ".join(map(short, numbers)), at_output(self.drive, numbers[0], si)
+            if path == "limits.life":
+                hours = value / 3600.0
+                text, of, other = digits(hours / fatigue.HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
+            elif numbers and of != unit(si):
+                other = f"{digits(value)} {unit(si)}"
+            elif si == "rad/s":
+                other = f"{short(float(f'{value * printed.RPM:.6g}'))} rpm"
+            elif si == "rad" and numbers:
+                other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
+            cells = [parameter.meaning, parameter.symbol, text, of if numbers else "", other]
+            cells += [f"{there} {of}" if there else ""] if self.geared else []
+            rows.append([*cells, source or "not stated"] if project.sources else cells)
+        heads = ["parameter", "symbol", "value", "unit", "that is"]
+        heads += [*(["at the output shaft"] if self.geared else []), *(["source"] if project.sources else [])]
+        texts = ("parameter", "symbol", "unit", "source")
+        return _table("Data of the drive, at the motor shaft", heads, rows, texts), absent
+
+    def near(self) -> Table:
+        """Each strategy beside the bound and the lowest K_dyn known in its own start time."""
+        rows, bounded = [], bool(self.report.limit.bounds)
+        for row in self.report.ordered:
+            run, bound, known = row.run, self.report.lower_bound(row), self.report.lowest_known(row)
+            best = self.report.limit.optimum_at(run.start_time)
+            is_best = best is not None and best.k_dyn == known
+            cells = [row.name, digits(run.start_time), fixed(run.k_dyn, 3)]
+            cells.append(fixed(known, 3) + (f" ({best_start(self.drive)})" if is_best else ""))
+            cells.append(fixed(run.k_dyn / known if known else None, 2))
+            cells += [fixed(bound, 3), fixed(run.k_dyn / bound if bound else None, 2)] if bounded else []
+            rows.append(cells)
+        heads = ["strategy", "start time, s", "K_dyn", "lowest known in that time", "times the lowest known"]
+        heads += ["lower bound at that time", "times the bound"] if bounded else []
+        title = "How near each strategy comes to the limit in its own start time"
+        return _table(title, heads, rows, ("strategy",))
+
+    def settings(self, sheet: Sheet) -> Table:
+        """What to set at the inverter."""
+        rows, explained = [], inverters()["setting"]
+        for one in sheet.settings:
+            more = " of the control code" if one.name == "period" else ""
+            more += " (not rounded)" if one.step is None and isinstance(one.exact, float) and not more else ""
+            note = Markup("<small>; {}</small>").format(explained[one.name]) if one.name in explained else ""
+            meaning = Markup("{}{}").format(typeset(one.meaning + more), note)
+            rows.append([one.name.replace("_", " "), meaning, *one.shown(self.drive.design_drive)])
+        heads = ["parameter", "meaning, and what it is at the inverter", "set to", "unit", "that is", "exact"]
+        return _table(f"Parameter sheet: {sheet.name}", heads, rows, (*heads[:2], "unit", "that is"))
+
+    def outcome(self, sheet: Sheet) -> Table:
+        """The starts with the exact, the rounded, and the worst values."""
+        named = {"exact values": sheet.exact, "rounded values, as in the sheet": sheet.rounded}
+        found = {name: (r.k_dyn, r.peak_torque, r.start_time) for name, r in named.items() if r is not None}
         if sheet.variants:
-            return (
-                f"With values half a step off, K_dyn may be {fixed(sheet.worst_k_dyn, 3)} and the "
-                f"start time {digits(sheet.slowest)} s."
+            found["worst with the values half a step off"] = (
+                sheet.worst_k_dyn,
+                sheet.worst_peak,
+                sheet.slowest,
             )
-    return ""
+        cells = {
+            "start with": list(found),
+            "K_dyn": [fixed(k_dyn, 4) for k_dyn, _, _ in found.values()],
+            "peak torque, N m": [digits(peak) for _, peak, _ in found.values()],
+            **self._at_output([peak for _, peak, _ in found.values()]),
+            "start time, s": [digits(time, 5) for _, _, time in found.values()],
+        }
+        return Table.of(f"{sheet.name}: started again after rounding", cells, ("start with",))
+
+    def families(self) -> Table:
+        """Where inverters have what the sheets name: names as public manuals print them, and no others."""
+        low = min(float(np.min((sheet.rounded or sheet.exact).u)) for sheet in self.report.sheets)
+        left_out = {"braking"} if low >= 0.0 else set()
+        left_out |= {"preload"} if self.drive.design_drive.brake != "motor" else set()
+        line, rows = Markup("{}: <code>{}</code>"), []
+        for number, family in enumerate(inverters()["family"], start=1):
+            if asked := [key for key in FUNCTIONS if key in family and key not in left_out]:
+                lines = Markup("<br>").join(line.format(FUNCTIONS[key], family[key]) for key in asked)
+                rows.append([f"{family['name']} [{number}]", lines])
+        heads = ["inverter", "functions, with the names in its manual"]
+        return _table("Where to set it: names of these functions in manuals", heads, rows, heads)
+
+    def lives(self) -> Table:
+        """The life of the shaft line under each strategy, of several shafts that of each."""
+        found = self.report.lives
+        assert not isinstance(found, str)
+        if len(self.drive.shaft_names) > 1:
+            return lives.fatigue_tables(found, found.rows)[0]
+        rows = sorted(found.rows, key=lambda row: -row.relative)
+        return lives.fatigue_table(found, rows, "Life of the shaft line under each strategy")
+
+    def revisions(self) -> Table:
+        """What has changed from one revision to the next."""
+        heads = ["revision", "date", "author", "change"]
+        return _table("Revisions", heads, [[*one.values()] for one in self.report.project.revisions], heads)
+
+    def approval(self) -> Table:
+        """Who made, checked and approved the report."""
+        project = self.report.project
+        signed = [
+            ["made by", project.author],
+            ["checked by", project.checked],
+            ["approved by", project.approved],
+        ]
+        heads = ["", "name, date", "signature"]
+        return _table("Approval", heads, [[*one, ""] for one in signed], heads)
 
 
-def style(header: str, footer: str, paper: str) -> str:
-    """The style sheet with what stands at the head and the foot of each printed page."""
-    header = header if len(header) <= LONGEST else header[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    values = {"HEADER": css_string(header), "FOOTER": css_string(footer), "PAPER": paper}
-    sheet = Path(__file__).with_name("style.css").read_text("utf-8")
-    return re.sub("|".join(values), lambda found: values[found[0]], sheet)
+def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], texts: Sequence[str]) -> Table:
+    """A table of rows; columns with these `texts` as heads hold text."""
+    return Table.of(title, {head: [row[k] for row in rows] for k, head in enumerate(heads)}, texts)
