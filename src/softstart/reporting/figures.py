@@ -33,6 +33,7 @@ from softstart.views.drawing import (
     shade_open_gap,
 )
 from softstart.views.printed import units_of
+from softstart.views.starts import run_figure
 
 ACROSS = 4  # panels side by side
 LATE = 1.6  # times the median start time, up to which traces are shown
@@ -119,6 +120,13 @@ def _torques(panel: Axes, run: Run) -> None:
         panel.axhline(permissible, color=RED, lw=0.9, ls=":", label="permissible torque")
 
 
+def start_figure(run: Run) -> Any:
+    """Torques, speeds and twists of a chain's start, of which two stand on a page."""
+    figure = run_figure(run)
+    figure.set_size_inches(8.0, 5.2)
+    return figure
+
+
 def _peak(run: Run) -> float:
     return float(run.recorded.shafts["peak"][run.worst_shaft])
 
@@ -165,10 +173,10 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
     with drawing(), mpl.rc_context(STYLE):
         figure, axes = new_figure(1, 1, (WIDE, 3.6))
         if limit.times:
-            t, k = _within(limit, left, right, 2.0 * max(values))
+            t, k = limit.times, np.minimum(limit.bounds, 2.0 * max(values))
             axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
             axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound: no torque goes below")
-            values.append(float(k.min()))
+            values.append(float(np.interp(right, t, k)))
         if optima:
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], ".-", color=COLOURS[0],
@@ -199,15 +207,6 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
     return figure
 
 
-def _within(limit: Limit, left: float, right: float, most: float) -> tuple[Any, Any]:
-    """The curve of the bound in the frame: near the shortest start time it rises beyond all others."""
-    times, bounds = np.array(limit.times), np.minimum(limit.bounds, most)
-    inside = times[(times > left) & (times < right)]
-    ends = [t for t in (left, right) if times[0] <= t <= times[-1]]
-    t = np.union1d(inside, ends) if inside.size or ends else times
-    return t, np.interp(t, times, bounds)
-
-
 def maps_figure(choice: Choice, drive: Any, units: Units) -> Any:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
     shown = [(row.name, choice.maps[row.name]) for row in choice.mapped]
@@ -218,7 +217,6 @@ def maps_figure(choice: Choice, drive: Any, units: Units) -> Any:
     high = max(high, low * 1.02)
     scale = colors.LogNorm(low, high) if high > 3.0 * low else colors.Normalize(low, high)
     gaps = [units.shown(one, "rad") for one in first.gaps]
-    inertia, gap = _thousand(first.inertias), _thousand(gaps)
     row, column = (
         min(range(len(values)), key=lambda i: abs(values[i] - own))
         for values, own in zip((first.gaps, first.inertias), nominal, strict=True)
@@ -245,15 +243,15 @@ def maps_figure(choice: Choice, drive: Any, units: Units) -> Any:
                 panel.add_patch(box).set_zorder(5)
             worst = f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
             panel.set_title(f"{name_in_figure(name)}: {worst}")
-            panel.set_xticks(range(columns), [f"{v / inertia:.3g}" for v in first.inertias])
-            panel.set_yticks(range(rows), [f"{v / gap:.4g}" for v in gaps])
+            panel.set_xticks(range(columns), [f"{v:.3g}" for v in first.inertias])
+            panel.set_yticks(range(rows), [f"{v:.4g}" for v in gaps])
             panel.tick_params(length=0)
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
         for panel in axes[:, 0]:
-            panel.set_ylabel(f"gap, {_powers(gap)}{units.angle}")
+            panel.set_ylabel(f"gap, {units.angle}")
         for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
-            panel.set_xlabel(f"load inertia J2, {_powers(inertia)}kg m²")
+            panel.set_xlabel("load inertia J2, kg m²")
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
         bar.set_label(K_DYN)
         bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
@@ -261,15 +259,3 @@ def maps_figure(choice: Choice, drive: Any, units: Units) -> Any:
         ticks = [float(f"{v:.2g}") for v in np.geomspace(low, high, 6)]
         plain_ticks(bar.ax.yaxis, ticker.FixedLocator([v for v in ticks if low <= v <= high]))
     return figure
-
-
-def _thousand(values: Sequence[float]) -> float:
-    """The power of a thousand in whose multiples small or large numbers are short, 1 for usual ones."""
-    if max(values) == 0.0 or (values[0] >= 1e-2 and max(values) < 1e4):
-        return 1.0
-    return 1e3 ** math.floor(math.log10(max(values)) / 3.0)
-
-
-def _powers(unit: float) -> str:
-    """Such a power, to stand before a unit."""
-    return "" if unit == 1.0 else f"$10^{{{round(math.log10(unit))}}}$ "

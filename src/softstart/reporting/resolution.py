@@ -10,7 +10,7 @@ from typing import Self
 from softstart.drive import Drive
 from softstart.errors import InputError, Mistakes
 from softstart.quantities import nearest, to_si
-from softstart.views.printed import RPM, decimals_of, digits, short
+from softstart.views.printed import RPM, decimals_of
 
 EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"
 RATED = "rated torque"
@@ -95,20 +95,6 @@ class Resolution:
         if unit == "rad/s":
             return 2.0 * math.pi * self.frequency if "frequency" in name else self.speed
         return {"s": self.time, "1": self.share}.get(unit)
-
-    def described(self, drive: Drive) -> str:
-        """What is rounded to what, in words."""
-        rated, basis = rated_torque(drive)
-        torques = f"{short(self.torque or 0.0)} N m"
-        if self.torque is None:
-            step = short(float(f"{self.torque_share * rated:.4g}"))
-            percent = short(100.0 * self.torque_share)
-            torques = f"{percent} % of the {basis} of {digits(rated)} N m, that is {step} N m"
-        return (
-            f"torques to {torques}; times to {short(1000.0 * self.time)} ms; "
-            f"speeds to {short(self.speed * RPM)} rpm; frequencies to {short(self.frequency)} Hz; "
-            f"shares and gains to {short(self.share)}"
-        )
 
 
 def _read(key: str, value: object) -> dict[str, float | None]:

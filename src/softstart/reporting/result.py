@@ -346,6 +346,8 @@ def report(
     sheets: list[Sheet] = []
 
     def round_off() -> None:
+        import softstart.reporting.document  # noqa: F401  takes half a second, for which nobody waits here
+
         for row in choice.of_sheets:
             show(0.5, f"rounding the values of {row.name}")
             controller = next(one for one, other in started if other is row)

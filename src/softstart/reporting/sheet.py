@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -28,18 +28,11 @@ KEPT = ("period",)  # the cycle of the control code is what the inverter has, no
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 NEIGHBOURS = 3  # rounded values up to which every combination of steps beside them is tried
 _DATA = {
-    "motor_inertia": "J1",
-    "load_inertia": "J2",
-    "stiffness": "c",
-    "damping": "d",
-    "gap": "the gap",
-    "starting_torque": "Ms",
-    "load_torque": "Mc",
-    "torque_lag": "the torque lag",
-    "torque_rate": "the torque rate",
-    "torque_noise": "the noise of the torque",
+    "motor_inertia": "J1", "load_inertia": "J2", "stiffness": "c", "damping": "d", "gap": "the gap",
+    "starting_torque": "Ms", "load_torque": "Mc", "torque_lag": "the torque lag",
+    "torque_rate": "the torque rate", "torque_noise": "the noise of the torque",
     "computing_delay": "the dead time",
-}
+}  # fmt: skip
 _LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
 _PROBE = 1e-3  # relative
 EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
@@ -81,6 +74,10 @@ class Setting:
         assert isinstance(self.rounded, float)
         most = max(self.most, self.rounded)
         return min(max(self.rounded + steps * self.step, self.least), most) if steps else self.rounded
+
+    def summary(self) -> dict[str, Any]:
+        """As plain data."""
+        return {key: getattr(self, key) for key in ("name", "unit", "exact", "rounded", "step")}
 
     def shown(self, drive: Drive) -> tuple[str, str, str, str]:
         """What to set, its unit, the same in another one, and the exact value."""
@@ -147,7 +144,7 @@ class Sheet:
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
     largest K_dyn, `slowest` the longest start time (s) of `variants` starts in which the rounded values are
     half a step off, all combinations if `corners`, else each alone and all together; NaN if one of them
-    fails. `worst_values` belong to it. `moved` names settings that are not at their nearest step, because the
+    fails. `moved` names settings that are not at their nearest step, because the
     rule by which the strategy was chosen would not hold there; where it holds nowhere near, there is no start
     with rounded values, and `failure` says why. `own` is the drive whose numbers the strategy works with,
     `computes_with` says with which of them. `torque_step` (N m) is that of the inverter. `full_rise` is a
@@ -167,7 +164,6 @@ class Sheet:
     corners: bool = False
     worst_k_dyn: float = math.nan
     slowest: float = math.nan
-    worst_values: Mapping[str, float] | None = None
     full_rise: Rise | None = None
     gear_ramp: Rise | None = None
     moved: tuple[str, ...] = ()
@@ -203,14 +199,7 @@ class Sheet:
         return {
             "controller": self.name,
             "settings": [
-                {
-                    "name": s.name,
-                    "unit": s.unit,
-                    "exact": s.exact,
-                    "rounded": s.rounded if self.rounded else None,
-                    "step": s.step,
-                }
-                for s in self.settings
+                one.summary() | ({} if self.rounded else {"rounded": None}) for one in self.settings
             ],
             "k_dyn": self.exact.k_dyn,
             "k_dyn_rounded": self.rounded.k_dyn if self.rounded else None,
@@ -358,12 +347,10 @@ def _half_steps_off(sheet: Sheet, machine: Any, ready: Controller, corners: bool
     found = prepared([machine]).figures(set_ups, machine.mean_torque, np.zeros(len(sides), dtype=np.int64))
     time = np.asarray(found["start_time"][0], dtype=np.float64)
     k_dyn = np.where(np.isnan(time), np.nan, found["k_dyn"][0])
-    worst, at = float(np.max(k_dyn)), values[int(np.argmax(np.nan_to_num(k_dyn, nan=math.inf)))]
-    if rounded.k_dyn > worst:  # the values as they are set are among what may be
-        worst, at = rounded.k_dyn, {one.name: one.beside(0) for one in varied}
-    slowest = max(float(np.max(time)), rounded.start_time)
+    # the values as they are set are among what may be
+    worst, slowest = np.maximum((np.max(k_dyn), np.max(time)), (rounded.k_dyn, rounded.start_time))
     return replace(
-        sheet, variants=len(sides), corners=corners, worst_k_dyn=worst, slowest=slowest, worst_values=at
+        sheet, variants=len(sides), corners=corners, worst_k_dyn=float(worst), slowest=float(slowest)
     )
 
 

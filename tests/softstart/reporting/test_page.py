@@ -8,8 +8,7 @@ import pytest
 
 from softstart import Drive, compare, fatigue, optimize, report
 from softstart.reporting.document import css_string
-from softstart.reporting.figures import _within, svg
-from softstart.reporting.limit import Limit
+from softstart.reporting.figures import svg
 from softstart.views.fatigue import factor
 from softstart.views.numbers import plain
 
@@ -114,15 +113,6 @@ def test_provenance_holds_the_drive(page, hostile):
     assert Drive.from_toml(hostile.provenance["drive"]) == hostile.drive
     (file,) = verbatim(page)
     assert Drive.from_toml(unescape(file)) == hostile.drive
-
-
-def test_a_bound_that_grows_beyond_the_frame_is_cut():
-    import numpy as np
-
-    limit = Limit(times=(1.0, 1.1, 1.2, 1.3, 2.0), bounds=(1e9, 5.0, 1.2, 1.0, 0.8))
-    t, k = _within(limit, 0.9, 1.25, 6.0)
-    assert t.tolist() == [1.0, 1.1, 1.2, 1.25]
-    np.testing.assert_allclose(k, [6.0, 5.0, 1.2, 1.1])
 
 
 def test_life_of_the_shaft_line_where_it_is_asked_for(hostile):
