@@ -195,8 +195,9 @@ def strategies(report: Report) -> Table:
         *starts.GENTLE, *([output] if ratio else []), *(starts.INTERVALS if rows[0].intervals else []),
         starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],
     )  # fmt: skip
-    columns = [one._replace(digits=one.digits + 1) for one in shown]  # one more than a terminal holds
-    return starts.comparison_table(rows, columns, "Strategies on this drive, the gentlest first")
+    # a digit more than a terminal holds
+    exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
+    return starts.comparison_table(rows, exact, "Strategies on this drive, the gentlest first")
 
 
 def functions(report: Report) -> list[tuple[str, str]]:
