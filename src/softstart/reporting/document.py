@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
 
 from softstart.drive import doubts
@@ -130,7 +130,12 @@ def document(report: Report) -> str:
     """The whole file."""
     drive, comma, positions = report.drive, report.project.decimal == "comma", list(report.drive.positions)
     plain = templates()
-    page = plain.overlay(finalize=lambda text: typeset(text, comma))
+
+    @pass_context  # else constants are escaped before they come here
+    def finalize(_: Any, text: object) -> Markup:
+        return typeset(text, comma)
+
+    page = plain.overlay(finalize=finalize)
 
     def svg(figure: Any, key: str, title: str) -> Markup:
         return in_page(figures.svg(figure, key, title))

@@ -78,7 +78,7 @@ def shown_until(rows: Sequence[Row]) -> float:
 
 
 def traces_figure(rows: Sequence[Row]) -> Any:
-    """Torques of all starts, with their flags, in small panels of one scale; grey where the gap is open."""
+    """Torques of all starts in small panels of one scale; grey where the gap is open."""
     runs, down, longest = [row.run for row in rows], -(-len(rows) // ACROSS), shown_until(rows)
     lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
     highest = max(float(max(run.peak_torque, run.u.max())) for run in runs)
@@ -90,7 +90,7 @@ def traces_figure(rows: Sequence[Row]) -> Any:
             if len(run.drive.shaft_names) == 1:
                 shade_open_gap(panel, run, longest)
             _torques(panel, run)
-            panel.set_title(f"{name_in_figure(row.marked)}: {run.k_dyn:.3f}", pad=3)
+            panel.set_title(f"{name_in_figure(row.name)}: {run.k_dyn:.3f}", pad=3)
             if not math.isnan(run.start_time):
                 panel.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
         axes[0, 0].set_xlim(0.0, longest)
