@@ -13,7 +13,7 @@ from softstart.controller.finding import ready_controller_names
 from softstart.drive import library
 from softstart.page.frames import Screen
 from softstart.page.session import Session
-from softstart.reporting.first_page import for_customer
+from softstart.reporting.document import for_customer
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import flags

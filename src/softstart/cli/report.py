@@ -36,10 +36,9 @@ if TYPE_CHECKING:
 
     from softstart import reporting
     from softstart.identification.result import Identification
-    from softstart.reporting import document
     from softstart.views import starts
 else:
-    reporting, document = late("softstart.reporting"), late("softstart.reporting.document")
+    reporting = late("softstart.reporting")
     starts = late("softstart.views.starts")
 
 BROWSERS = (
@@ -158,7 +157,7 @@ def _made(
 
         asked |= {"controllers": controllers, "progress": progress, "command": command_line()}
         with Attributed():
-            made = reporting.report(drive, draw=drawn, **asked)
+            made = reporting.report(drive, **asked)
         show("drawing the figures")
         return made, made.to_html() if drawn else ""
 
@@ -226,7 +225,7 @@ def _printed(page: str, browser: str) -> bytes:
 def _show(to: Console, made: reporting.Report) -> None:
     print_lines(to, starts.machine_lines(made.drive))
     to.print()
-    sentence(to, document.answer(made), "bold")
+    sentence(to, made.answer, "bold")
     for sheet in made.sheets:
         if sheet.rounded is None:
             sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")

@@ -1,175 +1,153 @@
-"""What is recommended, by the rule of `start.recommendation`, with the map of each strategy beside it."""
+"""What is recommended, by the rule of `start.recommendation`, and how strategies fare on changed drives."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from softstart.controller.base import Effort
-from softstart.errors import listed
-from softstart.reporting.markup import Html, html, table, tag
-from softstart.reporting.robustness import RobustnessMap
-from softstart.reporting.strategies import realisable
-from softstart.start.comparison import REFERENCE
-from softstart.start.recommendation import SLOW, Recommendation, Row
-from softstart.views.printed import fixed, short
+import numpy as np
 
+from softstart.arrays import Matrix
+from softstart.chain.machines import varied
+from softstart.controller import Controller
+from softstart.controller.base import Effort
+from softstart.drive import Drive
+from softstart.start.batch import prepared
+from softstart.start.comparison import REFERENCE, Comparison
+from softstart.start.recommendation import Recommendation, Row
+
+GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
+INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
 MOST_MAPS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One strategy: its start, its map, whether drives can do it, and the verdict of the rule on it."""
+class RobustnessMap:
+    """K_dyn and start time (s) of one strategy: a row a gap (rad), a column a load inertia (kg m2).
 
-    row: Row
-    map: RobustnessMap | None  # none of a machine with several gaps
-    realisable: bool
-    verdict: str
+    K_dyn refers to the mean torque of the nominal drive, so that it compares shaft torques. NaN where the
+    start was not finished or the load did not reach its target speed.
+    """
 
-    @property
-    def name(self) -> str:
-        """Its name in tables."""
-        return self.row.name
-
-    @property
-    def ordinary(self) -> bool:
-        """Whether an inverter does it that offers torque ramps and no more."""
-        return self.row.effort is Effort.RAMPS
+    gaps: tuple[float, ...]
+    inertias: tuple[float, ...]
+    k_dyn: Matrix
+    start_time: Matrix
 
     @property
     def worst(self) -> float:
-        """Largest K_dyn over the map; without one that of the start."""
-        return self.row.run.k_dyn if self.map is None else self.map.worst
+        """The largest K_dyn; NaN if a cell has none."""
+        return float(np.max(self.k_dyn))
+
+    def summary(self) -> dict[str, Any]:
+        """As plain data."""
+        axes = {"gaps": list(self.gaps), "load_inertias": list(self.inertias)}
+        figures = {"k_dyn": self.k_dyn.tolist(), "start_time": self.start_time.tolist()}
+        return {**axes, **figures, "worst_k_dyn": self.worst}
+
+
+def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
+    """The map of a controller that was set up for `drive`; of a drive without a gap it has one row.
+
+    >>> from softstart.controller import make_controller
+    >>> robustness(Drive.load("crane-4amtkf"), make_controller("direct")).gaps
+    (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
+    """
+    gaps = tuple(float(f"{share * float(drive.gap):.12g}") for share in (GAPS if drive.gap > 0.0 else (0.0,)))
+    inertias = tuple(float(f"{share * float(drive.J2):.12g}") for share in INERTIAS)
+    many = varied(drive, {"gap": np.array(gaps)[:, None], "load_inertia": np.array(inertias)[None, :]})
+    found = prepared(many).figures(controller.set_ups(drive), drive.mean_torque)
+    k_dyn, time = (
+        np.asarray(found[name][0], dtype=np.float64).reshape(len(gaps), len(inertias))
+        for name in ("k_dyn", "start_time")
+    )
+    return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k_dyn), time)
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The strategies with the verdict on each.
+    """The strategies compared, their maps by name (of a machine with one gap), and which are best."""
 
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-        All strategies.
-    recommendation : Recommendation
-        The text that is the same everywhere, and what it rests on.
-    chosen : Candidate or None
-        The recommended strategy; without limits the gentlest of those that no other one beats.
-    ordinary : Candidate or None
-        The strategy of an ordinary inverter with the least K_dyn over its map, of those that are not flagged
-        and keep the limits.
-    """
-
-    candidates: tuple[Candidate, ...]
-    recommendation: Recommendation
-    chosen: Candidate | None
-    ordinary: Candidate | None
+    comparison: Comparison
+    maps: Mapping[str, RobustnessMap]
 
     @property
-    def rows(self) -> list[Row]:
-        """The rows of all candidates."""
-        return [one.row for one in self.candidates]
+    def recommendation(self) -> Recommendation:
+        """The text that is the same everywhere, and what it rests on."""
+        return self.comparison.recommendation
+
+    @cached_property
+    def chosen(self) -> Row | None:
+        """The recommended strategy; without limits the gentlest of those that no other one beats."""
+        return self.recommendation.shown[-1] if self.recommendation.shown else None
+
+    @cached_property
+    def ordinary(self) -> Row | None:
+        """That of an ordinary inverter with the least worst K_dyn, not flagged and within the limits."""
+        ramps = [
+            row
+            for row in self.comparison.rows
+            if row.effort is Effort.RAMPS and not row.flags and not math.isnan(self.worst(row))
+            if all(margin.kept for margin in row.margins(self.recommendation.limits))
+        ]
+        return min(ramps, key=self.worst, default=None)
+
+    @property
+    def of_sheets(self) -> list[Row]:
+        """The chosen strategy and that of an ordinary inverter, each once."""
+        return list(dict.fromkeys(row for row in (self.chosen, self.ordinary) if row is not None))
 
     @property
     def role(self) -> str:
         """What the chosen one is, in a word or two."""
         return "gentlest unbeaten" if self.recommendation.recommended is None else "recommended"
 
-    def of(self, name: str) -> Candidate | None:
-        """The candidate of this name."""
-        return next((one for one in self.candidates if one.name == name), None)
+    def worst(self, row: Row) -> float:
+        """Largest K_dyn over the map; without one that of the start."""
+        return self.maps[row.name].worst if row.name in self.maps else float(row.run.k_dyn)
 
     @property
-    def mapped(self) -> list[Any]:
+    def _able(self) -> list[Row]:
+        """Those for which a drive measures what they need: motor encoder and motor torque."""
+        return [row for row in self.comparison.rows if row.effort is not Effort.SENSOR]
+
+    @property
+    def direct(self) -> Row:
+        """The reference."""
+        return next(row for row in self.comparison.rows if row.name == REFERENCE)
+
+    @property
+    def mapped(self) -> list[Row]:
         """Those whose maps are shown: the two chosen, direct, and others with the least worst case."""
-        others = sorted(
-            (one for one in self.candidates if one.realisable),
-            key=lambda one: math.inf if math.isnan(one.worst) else one.worst,
-        )
-        first = [self.chosen, self.ordinary, self.of(REFERENCE)]
-        shown = dict.fromkeys([one for one in first if one is not None] + others)
-        return [one for one in shown if one.map is not None][:MOST_MAPS]
+        others = sorted(self._able, key=lambda row: np.nan_to_num(self.worst(row), nan=math.inf))
+        shown = dict.fromkeys([*self.of_sheets, self.direct, *others])
+        return [row for row in shown if row.name in self.maps][:MOST_MAPS]
+
+    @property
+    def shown(self) -> list[Row]:
+        """Direct, and the chosen strategy; where none keeps the limits, the one that comes nearest."""
+        able = [row for row in self._able if not row.flags]
+        shares = {row: row.least_margin.share for row in able if row.least_margin is not None}
+        known = {row: share for row, share in shares.items() if not math.isnan(share)}
+        best = self.chosen or max(known, key=lambda row: known[row], default=self.direct)
+        return list(dict.fromkeys([self.direct, best]))
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""
-        return {
-            **self.recommendation.summary(),
-            "chosen": self.chosen.name if self.chosen else None,
-            "ordinary": self.ordinary.name if self.ordinary else None,
-            "candidates": [
-                {
-                    "controller": one.name,
-                    "effort": one.row.effort.value,
-                    "worst_k_dyn": one.worst,
-                    "realisable": one.realisable,
-                    "ordinary": one.ordinary,
-                    "verdict": one.verdict,
-                }
-                for one in self.candidates
-            ],
-        }
-
-
-def choose(
-    maps: Sequence[RobustnessMap | None], rows: Sequence[Row], recommendation: Recommendation
-) -> Choice:
-    """The verdict on each strategy; nothing is decided here."""
-    found = [
-        Candidate(row, one, realisable(row.run.controller), recommendation.verdict(row))
-        for row, one in zip(rows, maps, strict=True)
-    ]
-    shown = recommendation.shown
-    chosen = next((one for one in found if shown and one.row is shown[-1]), None)
-    able = [one for one in found if one.ordinary and not one.row.flags and not math.isnan(one.worst)]
-    ramps = [one for one in able if all(margin.kept for margin in one.row.margins(recommendation.limits))]
-    ordinary = min(ramps, key=lambda one: one.worst, default=None)
-    return Choice(tuple(found), recommendation, chosen, ordinary)
-
-
-def choice_section(choice: Choice, answer: str) -> Html:
-    """The answer, the rule behind it, and every strategy before it."""
-    limits = bool(choice.recommendation.limits)
-    cases = choice.candidates[0].row.worst_case
-    worst = f"on the drive as it is, with {listed(list(cases))}" if cases else "on the drive as it is"
-    rule = (
-        (
-            f"The rule: the simplest strategy that keeps the limits of the drive {worst}, of several of the "
-            "same effort the one with the larger margin. Effort rises from what a contactor does to ramps, "
-            "torque steps, code of your own, and the same with an encoder."
-        )
-        if limits
-        else (
-            "The rule: the drive has no limits, so nothing says which peak is low enough. Those "
-            "strategies are named that no other one beats in K_dyn and settled time at once, with the "
-            "cost of each step."
-        )
-    )
-    timed = choice.candidates[0].row.run.drive.limits.start_time is not None
-    never = (
-        (
-            "Never recommended: what is flagged (harder than direct start, not settled), and what needs a "
-            "sensor that drives do not have."
-        )
-        if timed
-        else (
-            "Never recommended: what is flagged (harder than direct start, not settled, more than "
-            f"{short(SLOW)} times as slow), and what needs a sensor that drives do not have."
-        )
-    )
-    order = sorted(choice.candidates, key=lambda one: (one.row.effort.order, one.row.run.k_dyn))
-    rows = [
-        [one.name, one.row.run.controller.summary, one.row.effort.meaning, fixed(one.worst, 3), one.verdict]
-        for one in order
-    ]
-    strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
-    worst_of = "K_dyn" if choice.candidates[0].map is None else "worst K_dyn on the map"
-    heads = ["strategy", "what it does", "takes", worst_of, "verdict"]
-    return html(
-        tag("p", answer),
-        tag("p", rule, " ", never),
-        table(
-            heads, rows, caption="Every strategy before the rule, in the order of effort",
-            text_columns=(0, 1, 2, 4), strong=strong, class_="words",
-        ),
-    )  # fmt: skip
+        candidates = [
+            {
+                "controller": row.name,
+                "effort": row.effort.value,
+                "worst_k_dyn": self.worst(row),
+                "realisable": row in self._able,
+                "ordinary": row.effort is Effort.RAMPS,
+                "verdict": self.recommendation.verdict(row),
+            }
+            for row in self.comparison.rows
+        ]
+        named = {"chosen": self.chosen, "ordinary": self.ordinary}
+        names = {key: row.name if row else None for key, row in named.items()}
+        return {**self.recommendation.summary(), **names, "candidates": candidates}

@@ -1,393 +1,249 @@
-"""The report as one HTML page, and the answer at its head in plain sentences."""
+"""The report as one HTML page: the templates beside this file, and the tables that they show."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from softstart.errors import listed
-from softstart.reporting.choice import Candidate, Choice, choice_section
-from softstart.reporting.drive_section import drive_section
-from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
-from softstart.reporting.limit import limit_section
-from softstart.reporting.markup import (
-    Figures,
-    Html,
-    css_string,
-    html,
-    joined,
-    table,
-    tag,
-    typeset,
-    with_comma,
-)
-from softstart.reporting.project import Project
-from softstart.reporting.result import Provenance, Report
-from softstart.reporting.robustness import GAPS, INERTIAS, life_chapter, maps_picture, robustness_section
-from softstart.reporting.shafts import chain_section, sentences, shafts_section
-from softstart.reporting.sheet import sheet_section
-from softstart.reporting.strategies import (
-    for_customer,
-    ordered,
-    strategies_section,
-    trace_groups,
-    traces_picture,
-    traces_section,
-)
-from softstart.start.comparison import Comparison
-from softstart.views.drives import POSITIONS
-from softstart.views.printed import digits, fixed, short, units_of
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
+from markupsafe import Markup, escape
 
+from softstart.drive import doubts
+from softstart.errors import listed
+from softstart.optimal.problem import REACTS, best_start
+from softstart.reporting import choice, figures, limit
+from softstart.reporting.resolution import rated_torque
+from softstart.reporting.result import Report
+from softstart.start import fatigue
+from softstart.start.recommendation import SLOW
+from softstart.vibration import natural_vibration
+from softstart.views import chain_schemes, chains, drives, printed, starts
+from softstart.views import fatigue as lives
+from softstart.views.drawing import drawing
+from softstart.views.numbers import Column, Table
+from softstart.views.printed import at_output, digits, fixed, percent, short, unit
+
+HERE = Path(__file__).parent
+HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
+MOST_SHAFTS = 6  # with a column each in a table
+LONGEST = 70  # characters of a name in the head of a page
 SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
-LONGEST = 70  # letters of a name in the head of a page
-GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in the file, nothing is loaded
+FUNCTIONS = {
+    "limit": "torque limit",
+    "braking": "torque limit, generating",
+    "reference": "torque reference",
+    "backlash": "torque limit after a change of direction, and its ramp",
+    "ramp": "ramp and S-curve of the speed reference",
+    "preload": "torque before the brake opens, and its ramp",
+}
+_BEFORE_UNIT = re.compile(r"(?<=[\d,]) (?=(?:N\xa0m|kg\xa0m|ms|s|rad|deg|rpm|mm|Hz|kW|W|%)(?!\w))")
+_DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
 
-def pictures(choice: Choice, comparison: Comparison) -> dict[str, Html]:
-    """The figures that do not wait for the limit, by their keys: what is drawn while that is looked for."""
-    with _any_script():
-        made = {
-            key: traces_picture(key, comparison.rows, some) for key, some, _ in trace_groups(comparison.rows)
-        }
-        made["before-after"] = before_after_picture(before_and_after(choice, comparison))
-        if choice.mapped:
-            made["maps"] = maps_picture(comparison.drive, choice.mapped)
-        return made
+def typeset(text: object, comma: bool = False) -> Markup:
+    """A text as HTML in which no line ends before a unit, with K_dyn set as such and decimal commas if asked.
+
+    >>> print(typeset("K_dyn < 0.98 in 1 s", comma=True).replace("\\xa0", "~"))
+    K<sub>dyn</sub> &lt; 0,98 in 1~s
+    """
+    if isinstance(text, Markup):
+        return text
+    shown = re.sub(r"\b(N|kg) m(?=\b|²)", "\\1\xa0m", "" if text is None else str(escape(text)))
+    shown = with_comma(_BEFORE_UNIT.sub("\xa0", shown), comma)
+    return Markup(shown.replace("K_dyn", "K<sub>dyn</sub>"))
 
 
-@contextmanager
-def _any_script() -> Iterator[None]:
-    """A name may have letters that the font of the figures has not."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
-        yield
+def with_comma(text: str, comma: bool) -> str:
+    """A text with decimal commas if asked; version numbers stay as they are."""
+    return _DECIMAL.sub(r"\1,\2", text) if comma else text
+
+
+def for_customer(text: str) -> str:
+    """A text without what it tells the author to give.
+
+    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
+    'It depends. Nothing damps.'
+    """
+    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
+
+
+def css_string(text: str) -> Markup:
+    """Any text as a string of CSS that ends nowhere but at its end, cut where it is too long.
+
+    >>> print(css_string('a"</style>'))
+    "a\\22 \\3c \\2f style\\3e "
+    """
+    text = text if len(text) <= LONGEST else text[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    written = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
+    return Markup('"{}"').format(Markup("".join(written)))
+
+
+def times(seconds: Iterable[float]) -> str:
+    """Start times in words, each once, or how many there are."""
+    words = [f"{digits(t)} s" for t in seconds]
+    return f"{len(words)} start times" if len(set(words)) > 4 else listed(list(dict.fromkeys(words)))
+
+
+def columns(heads: str | list[Column]) -> list[Column]:
+    """The columns of a table from heads in one text, those of numbers with # before them."""
+    if not isinstance(heads, str):
+        return heads
+    return [Column(head.removeprefix("#"), head.startswith("#")) for head in heads.split("|")]
+
+
+FILTERS = {
+    "digits": digits, "fixed": fixed, "short": short, "percent": percent, "listed": listed,
+    "times": times, "factor": lives.factor, "printed": printed.printed, "for_customer": for_customer,
+    "css_string": css_string,
+    "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
+    "short4": lambda value: short(float(f"{value:.4g}")), "columns": columns,
+}  # fmt: skip
+
+
+def templates() -> Environment:
+    """The templates of the report, which escape all text."""
+    found = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        undefined=StrictUndefined, extensions=["jinja2.ext.do"],
+    )  # fmt: skip
+    found.filters |= FILTERS
+    found.tests |= {"nan": math.isnan, "finite": math.isfinite}
+    found.globals |= {"SAME": SAME, "HARMED": HARMED}
+    return found
+
+
+def answer(report: Report) -> str:
+    """The answer without HTML."""
+    return Markup(
+        templates().get_template("answer.html.j2").render(report=report, choice=report.choice)
+    ).striptags()
 
 
 def document(report: Report) -> str:
     """The whole file."""
-    with _any_script():
-        text = typeset(_document(report))
-    return with_comma(text) if report.project.decimal == "comma" else text
+    drive, comma, positions = report.drive, report.project.decimal == "comma", list(report.drive.positions)
+    plain = templates()
 
+    @pass_context  # else constants are escaped before they come here
+    def finalize(_: Any, text: object) -> Markup:
+        return typeset(text, comma)
 
-def _document(report: Report) -> str:
-    drive, choice, rows, project = report.drive, report.choice, report.comparison.rows, report.project
-    figures = Figures(report.pictures)
-    chosen = [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
-    best, what = choice.chosen.name if choice.chosen else "", drive.WHAT.removeprefix("a ")
-    first = first_page(report, figures)
-    several = len(drive.shaft_names) > 1
-    shown = list(dict.fromkeys(reversed(before_and_after(choice, report.comparison))))
-    sections: list[tuple[str, str, Html]] = [
-        ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
-        (
-            "strategies",
-            "The strategies compared",
-            strategies_section(drive, rows, chosen, report.failed),
-        ),
-        ("traces", "Torques of each start", traces_section(rows, figures)),
-        *(
-            [("shafts", "What each shaft carries", shafts_section(ordered(rows), shown, figures))]
-            if several
-            else []
-        ),
-        (
-            "drive",
-            f"The {what}",
-            chain_section(drive, figures) if several else drive_section(drive, project, figures),
-        ),
-        ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
-        *(
-            [
-                (
-                    "robustness",
-                    "When the gap wears and the load changes",
-                    robustness_section(drive, choice.mapped, figures),
-                )
-            ]
-            if choice.mapped
-            else []
-        ),
-        (
-            "sheets",
-            "Parameter sheets for the inverter",
-            sheet_section(drive.design_drive, report.sheets, report.resolution, best, choice.role),
-        ),
-        *life_chapter(report.lives),
-        ("validity", "What this report assumes, and where it holds", validity_section(report)),
-        ("provenance", "About this document", provenance_section(report.provenance, project, what)),
-    ]
-    return page(str(drive.name), project, report.provenance.made, first, sections)
+    page = plain.overlay(finalize=finalize)
 
+    def svg(figure: Any, key: str, title: str) -> Markup:
+        return in_page(figures.svg(figure, key, title))
 
-def page(
-    name: str, project: Project, made: str, first: Html, sections: Sequence[tuple[str, str, Html]]
-) -> str:
-    """A whole file: head, first page, contents, and numbered sections, each (key, title, content)."""
-    contents = tag(
-        "nav",
-        tag("h2", "Contents", id="contents"),
-        tag("ol", joined(tag("li", tag("a", title, href=f"#{key}")) for key, title, _ in sections)),
-        aria_labelledby="contents",
-    )
-    heads = [*project.lines, ("Date", made)]
-    names = [tag("div", tag("dt", what), tag("dd", value)) for what, value in heads]
-    body = tag(
-        "main",
-        tag(
-            "header",
-            tag(
-                "img",
-                src=project.logo,
-                alt=f"Logo of {project.company or project.author}",
-            )
-            if project.logo
-            else None,
-            tag("p", "Soft start of a drive with backlash in its transmission", class_="kind"),
-            tag("h1", name),
-            tag("dl", *names, class_="made"),
-        ),
-        first,
-        contents,
-        joined(
-            tag(
-                "section",
-                tag("h2", f"{number}. {title}"),
-                content,
-                id=key,
-            )
-            for number, (key, title, content) in enumerate(sections, start=1)
-        ),
-    )
-    guard = GUARD + "; img-src data:" if project.logo else GUARD
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=guard),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", name="color-scheme", content="light"),
-        tag("title", f"{name}: soft start report"),
-        tag("style", Html(style(name, " · ".join(filter(None, (project.number, made))), project.paper))),
-    )
-    return html(
-        Html("<!DOCTYPE html>\n"),
-        tag("html", head, "\n", tag("body", body), lang="en"),
-        "\n",
-    )
+    def in_page(text: str) -> Markup:
+        return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
 
+    def scheme() -> Markup:
+        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=printed.units_of(drive)))
 
-def validity_section(report: Report) -> Html:
-    """The assumptions behind all figures, and where their data are from."""
-    drive, project, motor = report.drive, report.project, report.drive.motor
-    motor_is = _motor_sentence(
-        float(motor.minimum_torque), float(motor.maximum_torque), float(motor.torque_lag)
-    )
-    if len(drive.shaft_names) > 1:
-        notes = [
-            *sentences(drive),
-            motor_is,
-            "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
-            "The equations are solved as Taylor series from event to event; peaks are located, not read off "
-            "a grid.",
-        ]
-    else:
-        notes = [*_of_two_masses(drive, motor_is), *_on_maps(report.choice)]
-        notes.append(
-            "The equations are solved in closed form from event to event; peaks are located, not read off a "
-            "grid. The figures are as good as the data, above all gap, stiffness and inertias."
-        )
-    guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
-    if guessed:
-        notes.append(
-            f"Guessed, so to be checked before the values of the sheets are used: {listed(guessed)}."
-        )
-    elif not (project.sources or drive.source):
-        notes.append("Where the values of the drive are from is not stated.")
-    return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
-
-
-def _of_two_masses(drive: Any, motor_is: str) -> list[str]:
-    units, two, where = units_of(drive), drive.lumped, list(drive.positions)
-    damping = (
-        f"damping of the shaft: {short(float(two.d))} N m s/rad, proportional to the speed of its twist"
-        if two.d
-        else "no damping: oscillations do not die out, as those of a real shaft do"
-    )
-    load = (
-        "Load: the load torque acts always, also at rest (a hanging load); its torque and inertia are "
-        "constant during the start."
-        if two.active
-        else "Load: the load torque is friction: it holds the load at rest and opposes its motion; its "
-        "torque and inertia are constant during the start."
-    )
-    begins = (
-        f"The start begins {POSITIONS[where[0] if len(where) == 1 else 'unknown']}."
-        if where[0]
-        else (
-            f"The start begins at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}."
-        )
-    )
-    return [
-        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model.",
-        motor_is,
-        f"Contact law: {drive.contact_laws[0]}; {damping}.",
-        load,
-        begins,
-    ]
-
-
-def _on_maps(choice: Choice) -> list[str]:
-    if not choice.mapped:
-        return []
-    return [
-        f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and "
-        f"from {short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values "
-        "computed. Other stiffness, damping or load torque was not examined."
-    ]
-
-
-def _motor_sentence(least: float, most: float, lag: float) -> str:
-    """What stands for the motor: its torques (N m) and the lag of its torque (s)."""
-    follows = f"with a lag of {short(1e3 * lag)} ms" if lag else "without lag"
-    return (
-        f"The motor is a source of torque from {short(least)} to {short(most)} N m that follows its demand "
-        f"{follows}. Currents, fluxes and a motor started directly at the mains are not in the model."
-    )
-
-
-def provenance_section(about: Provenance, project: Project, what: str) -> Html:
-    """Revisions, approval, versions, date, command, and the drive's file with all changes."""
-    signed = [
-        ["made by", project.author, ""],
-        ["checked by", project.checked, ""],
-        ["approved by", project.approved, ""],
-    ]
-    libraries = ", ".join(f"{name} {version}" for name, version in about.libraries)
-    made = tag("code", f"softstart {about.softstart}, Python {about.python}; {libraries}")
-    revisions = [[one.number, one.date, one.author, one.change] for one in project.revisions]
-    return html(
-        table(
-            ["revision", "date", "author", "change"],
-            revisions,
-            caption="Revisions",
-            text_columns=range(4),
-        )
-        if revisions
-        else None,
-        table(
-            ["", "name, date", "signature"],
-            signed,
-            caption="Approval",
-            text_columns=range(3),
-            class_="signed",
-        )
-        if any(who for _, who, _ in signed)
-        else None,
-        tag("p", f"Made on {about.made} with ", made, ".", class_="small"),
-        tag("p", "Command: ", tag("code", about.command)) if about.command else None,
-        tag(
-            "p",
-            f"The {what} as a file for softstart, with all changes, SI units unless stated:",
-            class_="lead",
-        ),
-        tag("pre", re.sub(r" *#[^\"\n]*$", "", about.drive_toml, flags=re.MULTILINE), class_="file"),
-    )
-
-
-def answer(report: Report) -> str:
-    """The paragraph at the head of the report."""
-    best = report.choice.chosen
-    text = for_customer(report.choice.recommendation.text)
-    if best is None:
-        return text
-    sentences = [
-        text,
-        _sheet_of(report, best),
-        _after_rounding(report, best),
-        *_on_an_ordinary_inverter(report),
-        _compared(report, best),
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _sheet_of(report: Report, best: Candidate) -> str:
-    """Which strategy the figures that follow are those of, where the text names several."""
-    several = report.choice.recommendation.recommended is None and len(report.choice.recommendation.best) > 1
-    return f"The parameters below are those of the gentlest, {best.name}." if several else ""
-
-
-def _on_an_ordinary_inverter(report: Report) -> list[str]:
-    best, plain = report.choice.chosen, report.choice.ordinary
-    if plain is None or plain is best or report.choice.recommendation.limits:
-        return []
-    run = plain.row.run
-    text = (
-        f"On an ordinary inverter, one that offers torque ramps and no more, {plain.name} is the best: "
-        f"K_dyn {fixed(run.k_dyn, 3)} and {digits(run.start_time)} s."
-    )
-    return [text, _after_rounding(report, plain)]
-
-
-def _compared(report: Report, best: Candidate) -> str:
-    """What no start, and what the best start known, has in the same time."""
-    bound, known = report.lower_bound(best.row), report.lowest_known(best.row)
-    if bound is None:
-        return ""
-    motor = report.drive.motor
-    figures = {
-        "least": short(float(motor.minimum_torque)),
-        "most": short(float(min(motor.starting_torque, motor.maximum_torque))),
-        "bound": fixed(math.floor(bound * 1000.0) / 1000.0, 3),
+    several, what = len(drive.shaft_names) > 1, drive.WHAT.removeprefix("a ")
+    sections = {
+        "recommendation": "The recommendation, and why",
+        "strategies": "The strategies compared",
+        "traces": "Torques of each start",
+        "shafts": "What each shaft carries" if several else "",
+        "drive": f"The {what}",
+        "limit": "How gentle could a start be?",
+        "robustness": "When the gap wears and the load changes" if report.choice.mapped else "",
+        "sheets": "Parameter sheets for the inverter",
+        "life": "How long the shaft line lasts" if several or drive.limits.fatigue is not None else "",
+        "validity": "What this report assumes, and where it holds",
+        "provenance": "About this document",
     }
-    if known is None or known >= best.row.run.k_dyn * (1.0 - SAME):
-        return (
-            "For comparison: no motor torque from {least} to {most} N m, however it is controlled, "
-            "brings this load to speed in that time with a K_dyn below {bound}."
-        ).format(**figures)
-    figures["known"] = fixed(math.ceil(known * 1000.0) / 1000.0, 3)
-    return (
-        "For comparison: no motor torque from {least} to {most} N m, however it is controlled, brings "
-        "this load to speed in that time with a K_dyn below {bound}; the gentlest start known has "
-        "{known}."
-    ).format(**figures)
+    ordinary = [report.choice.ordinary] if report.choice.ordinary else []
+    choices = dict.fromkeys([report.choice.direct, *ordinary, *report.choice.recommendation.shown])
+    by_effort = sorted(choices, key=lambda row: (row.effort.order, -row.run.k_dyn))
+    values = {
+        "report": report, "drive": drive, "choice": report.choice, "limit": report.limit, "what": what,
+        "project": report.project, "sections": [(key, title) for key, title in sections.items() if title],
+        "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS,
+        "geared": drive.gear_ratio is not None,
+        "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
+        "doubts": doubts.doubts(drive), "units": printed.units_of(drive), "most_torque": report.most_torque,
+        "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
+        "position": positions[0] if len(positions) == 1 else "unknown",
+        "natural_vibration": natural_vibration,
+        "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
+        "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
+        "chain_scheme": lambda: in_page(chain_schemes.scheme_svg(drive)), "at_output": at_output,
+        "best_start": best_start, "figures": figures, "starts": starts, "chains": chains, "lives": lives,
+        "output": "|#at the output, N m" if drive.gear_ratio else "", "strategies": strategies,
+        "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
+        "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
+        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": printed.RPM, "REACTS": REACTS,
+        "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
+    }  # fmt: skip
+    with drawing():  # a name may have characters that the font of the figures has not
+        return page.get_template("report.html.j2").render(values)
 
 
-def _after_rounding(report: Report, one: Candidate) -> str:
-    """What the steps of the inverter do to a chosen strategy, where that matters."""
-    sheet = next((sheet for sheet in report.sheets if sheet.name == one.name), None)
-    if sheet is None:
-        return ""
-    if sheet.rounded is None:
-        return "But its values cannot be set in the steps given."
-    exact, rounded = sheet.exact, sheet.rounded
-    if math.isnan(rounded.start_time):
-        return "But rounded to the steps given, its values do not bring the load to its target speed."
-    harm = max(rounded.k_dyn / exact.k_dyn, rounded.start_time / exact.start_time) - 1.0
-    if harm > HARMED:
-        return (
-            "But these are exact values: rounded to the steps given, they make it K_dyn "
-            f"{fixed(rounded.k_dyn, 3)} and {digits(rounded.start_time)} s."
-        )
-    if not max(sheet.worst_k_dyn / exact.k_dyn, sheet.slowest / exact.start_time) - 1.0 <= HARMED:
-        if sheet.variants and math.isnan(sheet.worst_k_dyn + sheet.slowest):
-            return "But with values half a step off, the load may not reach its target speed."
-        if sheet.variants:
-            return (
-                f"With values half a step off, K_dyn may be {fixed(sheet.worst_k_dyn, 3)} and the "
-                f"start time {digits(sheet.slowest)} s."
-            )
-    return ""
+def inverters() -> dict[str, Any]:
+    """Names of functions in manuals, and what a parameter means at an inverter."""
+    return tomllib.loads((HERE / "inverters.toml").read_text("utf-8"))
 
 
-def style(header: str, footer: str, paper: str) -> str:
-    """The style sheet with what stands at the head and the foot of each printed page."""
-    header = header if len(header) <= LONGEST else header[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    values = {"HEADER": css_string(header), "FOOTER": css_string(footer), "PAPER": paper}
-    sheet = Path(__file__).with_name("style.css").read_text("utf-8")
-    return re.sub("|".join(values), lambda found: values[found[0]], sheet)
+def strategies(report: Report) -> Table:
+    """The figures of all strategies, the gentlest first."""
+    rows, ratio = report.ordered, report.drive.gear_ratio
+    output = starts.Figure("at the\noutput\nN m", lambda row: float(ratio) * row.run.peak_torque)
+    shown = (
+        *starts.GENTLE, *([output] if ratio else []), *(starts.INTERVALS if rows[0].intervals else []),
+        starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],
+    )  # fmt: skip
+    # a digit more than a terminal holds
+    exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
+    return starts.comparison_table(rows, exact, "Strategies on this drive, the gentlest first")
+
+
+def functions(report: Report) -> list[tuple[str, str]]:
+    """The functions of inverters that these sheets need: keys and names."""
+    low = min((float(np.min((sheet.rounded or sheet.exact).u)) for sheet in report.sheets), default=0.0)
+    left_out = {"braking"} if low >= 0.0 else set()
+    left_out |= {"preload"} if report.drive.design_drive.brake != "motor" else set()
+    return [(key, name) for key, name in FUNCTIONS.items() if key not in left_out]
+
+
+def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
+    """What is known of the drive and from where: heads and rows of the table, and what is absent."""
+    project, units, geared = (
+        report.project,
+        printed.units_of(report.drive),
+        report.drive.gear_ratio is not None,
+    )
+    rows, absent = list[list[str]](), list[str]()
+    for path, (parameter, value) in report.drive.by_path().items():
+        source, si = project.source_of(path), parameter.unit
+        if value is None or value == "" or parameter.name in HIDDEN:
+            continue
+        if value == parameter.default and not source:
+            absent += [parameter.meaning] if value == 0.0 else []
+            continue
+        of, other, text, there = unit(units.of(si)), "", str(value), ""
+        values = value if isinstance(value, tuple) else (value,)
+        numbers = [float(units.shown(v, si)) for v in values if isinstance(v, float)]
+        if numbers:
+            text, there = ", ".join(map(short, numbers)), at_output(report.drive, numbers[0], si)
+        if path == "limits.life":
+            hours = value / 3600.0
+            text, of, other = digits(hours / fatigue.HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
+        elif numbers and of != unit(si):
+            other = f"{digits(value)} {unit(si)}"
+        elif numbers and si == "rad/s":
+            other = f"{short(float(f'{value * printed.RPM:.6g}'))} rpm"
+        elif numbers and si == "rad":
+            other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
+        cells = [parameter.meaning, parameter.symbol, text, of if numbers else "", other]
+        cells += [f"{there} {of}" if there else ""] if geared else []
+        rows.append([*cells, source or "not stated"] if project.sources else cells)
+    heads = "parameter|symbol|#value|unit|#that is" + ("|#at the output shaft" if geared else "")
+    return heads + ("|source" if project.sources else ""), rows, absent

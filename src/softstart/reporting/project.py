@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Self
 
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, Mistakes
@@ -14,82 +15,46 @@ from softstart.input.files import text_of
 from softstart.input.parameters import REQUIRED, Parameter
 from softstart.quantities import nearest
 
-Paper = Literal["A4", "letter"]
-Decimal = Literal["point", "comma"]
-Origin = Literal["data sheet", "drawing", "measured", "identified", "guessed"]
-
 LOGOS = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml"}
 MOST_LOGO = 500_000  # bytes: a report is sent by mail
 
 
-def _line(key: str, meaning: str, example: str, **more: Any) -> Parameter:
-    return Parameter(key, "", meaning, f'"{example}"', "one line", **{"default": "", **more})
+def _line(key: str, meaning: str, example: str, default: object = "", choices: str = "") -> Parameter:
+    found = tuple(choices.split(", ")) if choices else ()
+    return Parameter(key, "", meaning, f'"{example}"', "one line", default, found)
 
 
 TABLES = (
-    Table(
-        "project",
-        (
-            _line("customer", "who the report is for", "Harbour Cranes Ltd"),
-            _line("project", "name of the project", "Gantry crane 3"),
-            _line("number", "number of the document", "SC-0147"),
-            _line("author", "who made it", "A. Engineer"),
-            _line("company", "the author's company", "Drives & Co"),
-            _line("checked", "who checked it, and when", "B. Checker, 2026-11-20"),
-            _line("approved", "who approved it, and when", "C. Chief, 2026-11-21"),
-            _line("logo", "picture for the head of page 1", "logo.png"),
-            _line("paper", "paper size", "A4", default="A4", choices=get_args(Paper)),
-            _line("decimal", "decimal sign", "point", default="point", choices=get_args(Decimal)),
-        ),
-        required=False,
-    ),
-    Table(
-        "revision",
-        (
-            _line("number", "number of the revision", "A"),
-            _line("date", "its date, in quotes", "2026-11-20"),
-            _line("author", "who made it", "A. Engineer"),
-            _line("change", "what has changed", "first issue"),
-        ),
-        many=True,
-    ),
-    Table(
-        "source",
-        (
-            _line("parameter", "the parameter of the drive file", "shaft.gap", default=REQUIRED),
-            _line("origin", "what its value is from", "identified", choices=get_args(Origin)),
-            _line("note", "interval, sheet or drawing", "0.48 to 0.52 rad (95 %)"),
-        ),
-        many=True,
-    ),
-)
-
-
-@dataclass(frozen=True)
-class Revision:
-    """One line of the revision table."""
-
-    number: str
-    date: str
-    author: str
-    change: str
-
-
-@dataclass(frozen=True)
-class Source:
-    """What the value of a parameter (as `shaft.gap`) is from."""
-
-    parameter: str
-    origin: str
-    note: str
-
-    def __str__(self) -> str:
-        return ", ".join(filter(None, (self.origin, self.note)))
+    Table("project", required=False, parameters=(
+        _line("customer", "who the report is for", "Harbour Cranes Ltd"),
+        _line("project", "name of the project", "Gantry crane 3"),
+        _line("number", "number of the document", "SC-0147"),
+        _line("author", "who made it", "A. Engineer"),
+        _line("company", "the author's company", "Drives & Co"),
+        _line("checked", "who checked it, and when", "B. Checker, 2026-11-20"),
+        _line("approved", "who approved it, and when", "C. Chief, 2026-11-21"),
+        _line("logo", "picture for the head of page 1", "logo.png"),
+        _line("paper", "paper size", "A4", "A4", "A4, letter"),
+        _line("decimal", "decimal sign", "point", "point", "point, comma"),
+    )),
+    Table("revision", many=True, parameters=(
+        _line("number", "number of the revision", "A"),
+        _line("date", "its date, in quotes", "2026-11-20"),
+        _line("author", "who made it", "A. Engineer"),
+        _line("change", "what has changed", "first issue"),
+    )),
+    Table("source", many=True, parameters=(
+        _line("parameter", "the parameter of the drive file", "shaft.gap", REQUIRED),
+        _line("origin", "what its value is from", "identified",
+              choices="data sheet, drawing, measured, identified, guessed"),
+        _line("note", "interval, sheet or drawing", "0.48 to 0.52 rad (95 %)"),
+    )),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Project:
-    """Names, revisions and sources of a report; `logo` is a data URI. All may be empty.
+    """Names, revisions and sources of a report, rows as in the file; `logo` is a data URI. All may be empty.
 
     >>> Project.read('[project]\\ncustomer = "Harbour Cranes Ltd"').customer
     'Harbour Cranes Ltd'
@@ -106,10 +71,10 @@ class Project:
     checked: str = ""
     approved: str = ""
     logo: str = ""
-    paper: Paper = "A4"
-    decimal: Decimal = "point"
-    revisions: tuple[Revision, ...] = ()
-    sources: tuple[Source, ...] = ()
+    paper: str = "A4"
+    decimal: str = "point"
+    revisions: Sequence[Mapping[str, str]] = ()
+    sources: Sequence[Mapping[str, str]] = ()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -120,21 +85,14 @@ class Project:
     def read(cls, text: str, where: str = "", folder: Path = Path()) -> Self:
         """From a TOML text; all mistakes at once."""
         found = read_document(text, TABLES, "a project", where=where)
-        about = found["project"] or {}
-        made = cls(
-            **about,
-            revisions=tuple(Revision(**row) for row in found["revision"]),
-            sources=tuple(Source(**row) for row in found["source"]),
-        )
-        paths = [one.path for one in PARAMETERS.values()]
-        wrong = Mistakes()
+        made = cls(**(found["project"] or {}), revisions=found["revision"], sources=found["source"])
+        paths, wrong = [one.path for one in PARAMETERS.values()], Mistakes()
         for number, source in enumerate(made.sources, start=1):
-            if source.parameter not in paths:
-                hint = nearest(source.parameter, paths)
-                wrong.sentences.append(
-                    f'[source] {number}, parameter = "{source.parameter}": a drive has no such parameter; '
-                    + (f"did you mean {hint}?" if hint else "write it as --set does, as shaft.gap.")
-                )
+            if (path := source["parameter"]) not in paths:
+                near = nearest(path, paths)
+                hint = f"did you mean {near}?" if near else "write it as --set does, as shaft.gap."
+                place = f'[source] {number}, parameter = "{path}"'
+                wrong.sentences.append(f"{place}: a drive has no such parameter; {hint}")
         with wrong.noted():
             made = replace(made, logo=_picture(made.logo, folder))
         wrong.settle(f"{where}: " if where else "")
@@ -142,22 +100,21 @@ class Project:
 
     def source_of(self, path: str) -> str:
         """What the value of a parameter is from, "" if nothing is said."""
-        return next((str(one) for one in self.sources if one.parameter == path), "")
+        found = next((one for one in self.sources if one["parameter"] == path), {})
+        return ", ".join(filter(None, (found.get("origin"), found.get("note"))))
 
     @property
     def lines(self) -> list[tuple[str, str]]:
         """Names for the head of page 1: what, and who or which."""
-        named = [
-            ("Customer", self.customer),
-            ("Project", self.project),
-            ("Document", self.number),
-            ("Author", ", ".join(filter(None, (self.author, self.company)))),
-        ]
-        if self.revisions:
-            last = self.revisions[-1]
-            dated = f"{last.number} of {last.date}"
-            named.append(("Revision", dated if last.number and last.date else last.number or last.date))
-        return [(what, value) for what, value in named if value]
+        last = self.revisions[-1] if self.revisions else {}
+        named = {
+            "Customer": self.customer,
+            "Project": self.project,
+            "Document": self.number,
+            "Author": ", ".join(filter(None, (self.author, self.company))),
+            "Revision": " of ".join(filter(None, (last.get("number"), last.get("date")))),
+        }
+        return [(what, value) for what, value in named.items() if value]
 
 
 def _picture(name: str, folder: Path) -> str:
@@ -170,12 +127,8 @@ def _picture(name: str, folder: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        reason = error.strerror or error
-        raise InputError(
-            f"{subject}: the file cannot be read ({reason}); it is looked for beside the project's file."
-        ) from None
+        reason = f"the file cannot be read ({error.strerror or error})"
+        raise InputError(f"{subject}: {reason}; it is looked for beside the project's file.") from None
     if len(data) > MOST_LOGO:
-        raise InputError(
-            f"{subject}: {len(data):,} bytes are too many; give one of {MOST_LOGO:,} bytes or less."
-        )
+        raise InputError(f"{subject}: {len(data):,} bytes are too many; give {MOST_LOGO:,} bytes or less.")
     return f"data:{LOGOS[path.suffix.lower()]};base64,{base64.b64encode(data).decode('ascii')}"

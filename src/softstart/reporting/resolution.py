@@ -8,11 +8,12 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.quantities import nearest, to_si
-from softstart.views.printed import RPM, decimals_of, digits, short
+from softstart.views.printed import RPM, decimals_of
 
 EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"
+RATED = "rated torque"
 _KEYS = {
     "torque": ("N*m", '"0.5%" of the rated torque, or "0.2 N*m"'),
     "time": ("s", '"10 ms"'),
@@ -44,43 +45,43 @@ class Resolution:
     share: float = 0.01
 
     def __post_init__(self) -> None:
-        wrong = [
-            f"{f.name} = {getattr(self, f.name)!r}: a step is a number above 0."
-            for f in fields(self)
-            if not _step(getattr(self, f.name)) and not (f.name == "torque" and self.torque is None)
-        ]
-        if wrong:
-            raise InputError(wrong)
+        wrong = Mistakes()
+        for one in fields(self):
+            value = getattr(self, one.name)
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (is_number and 0.0 < value < math.inf) and not (one.name == "torque" and value is None):
+                wrong.sentences.append(f"{one.name} = {value!r}: a step is a number above 0.")
+        wrong.settle()
 
     @classmethod
-    def read(cls, text: str | Mapping[str, object], option: str = "resolution") -> Self:
+    def read(cls, given: str | Mapping[str, object], option: str = "resolution") -> Self:
         """From `key=value,...` or a mapping; all mistakes at once, sentences begin with `option`.
 
         >>> Resolution.read("tme=10ms")
         Traceback (most recent call last):
         softstart.errors.InputError: resolution "tme=10ms": there is no such key; did you mean time?
         """
-        pairs = (
-            _pairs(text, option) if isinstance(text, str) else [(k, v, f"{k}={v}") for k, v in text.items()]
-        )
-        made, wrong, seen = cls(), list[str](), set[str]()
-        for key, value, given in pairs:
-            start = f'{option} "{given}"'
-            if key not in _KEYS:
-                near = nearest(str(key), _KEYS)
-                hint = f"did you mean {near}?" if near else f"there are {', '.join(_KEYS)}."
-                wrong.append(f"{start}: there is no such key; {hint}")
-            elif key in seen:
-                wrong.append(f"{start}: {key} is given twice; keep one of the two.")
-            else:
+        if isinstance(given, str):
+            parts = [tuple(one.strip() for one in part.partition("=")) for part in given.split(",")]
+            if wrong := ["".join(part) for part in parts if not all(part)]:
+                raise InputError(
+                    [f'{option} "{part}": write keys and values, as {EXAMPLE}.' for part in wrong]
+                )
+            pairs: list[tuple[str, object]] = [(key, value) for key, _, value in parts]
+        else:
+            pairs = list(given.items())
+        made, mistakes, seen = cls(), Mistakes(), set[str]()
+        for key, value in pairs:
+            with mistakes.noted(f'{option} "{key}={value}": '):
+                if key not in _KEYS:
+                    near = nearest(str(key), _KEYS)
+                    hint = f"did you mean {near}?" if near else f"there are {', '.join(_KEYS)}."
+                    raise InputError(f"there is no such key; {hint}")
+                if key in seen:
+                    raise InputError(f"{key} is given twice; keep one of the two.")
                 seen.add(key)
-                try:
-                    made = replace(made, **_read(key, value))  # type: ignore[arg-type]
-                except InputError as error:
-                    reason = error.sentences[0].partition(": ")[2] or error.sentences[0]
-                    wrong.append(f"{start}: {reason}")
-        if wrong:
-            raise InputError(wrong)
+                made = replace(made, **_read(key, value))  # type: ignore[arg-type]
+        mistakes.settle()
         return made
 
     def step(self, name: str, unit: str, rated_torque: float) -> float | None:
@@ -95,27 +96,18 @@ class Resolution:
             return 2.0 * math.pi * self.frequency if "frequency" in name else self.speed
         return {"s": self.time, "1": self.share}.get(unit)
 
-    def described(self, drive: Drive) -> list[str]:
-        """What is rounded to what, in words."""
-        rated, basis = rated_torque(drive)
-        if self.torque is not None:
-            torques = f"torques to {short(self.torque)} N m"
-        else:
-            step = short(float(f"{self.torque_share * rated:.4g}"))
-            torques = (
-                f"torques to {short(100.0 * self.torque_share)} % of the {basis} of {digits(rated)} N m, "
-                f"that is {step} N m"
-            )
-        return [
-            torques,
-            f"times to {short(1000.0 * self.time)} ms",
-            f"speeds to {short(self.speed * RPM)} rpm",
-            f"frequencies to {short(self.frequency)} Hz",
-            f"shares and gains to {short(self.share)}",
-        ]
 
-
-RATED = "rated torque"
+def _read(key: str, value: object) -> dict[str, float | None]:
+    unit, example = _KEYS[key]
+    shown = str(value).strip()
+    share = key in ("torque", "share") and isinstance(value, str) and shown.endswith("%")
+    try:
+        number = float(to_si(shown[:-1], "1")) / 100.0 if share else float(to_si(value, unit))
+    except InputError as error:
+        raise InputError(error.sentences[0].partition(": ")[2] or error.sentences[0]) from None
+    if not number > 0.0:
+        raise InputError(f"a step is above 0; write {example}.")
+    return {"torque_share": number, "torque": None} if share and key == "torque" else {key: number}
 
 
 def rated_torque(drive: Drive) -> tuple[float, str]:
@@ -139,43 +131,9 @@ def nearest_step(value: float, step: float, most: float = math.inf) -> float:
     count = max(1, round(abs(value) / step))
     if count * step > most * (1.0 + 1e-12):
         count = max(1, math.floor(most / step * (1.0 + 1e-12)))
-    return math.copysign(_multiple(count, step), value)
-
-
-def _multiple(count: int, step: float) -> float:
-    """The product, without the noise of binary fractions where the step is a short decimal."""
-    exact = count * step
-    decimal = round(exact, decimals_of(step)) if decimals_of(step) < 9 else exact
-    return decimal if abs(decimal - exact) <= 1e-12 * exact else exact
-
-
-def _pairs(text: str, option: str) -> list[tuple[str, object, str]]:
-    found: list[tuple[str, object, str]] = []
-    wrong = []
-    for part in text.split(","):
-        key, equals, value = (one.strip() for one in part.partition("="))
-        if not (key and equals and value):
-            wrong.append(f'{option} "{part.strip()}": write keys and values, as {EXAMPLE}.')
-        else:
-            found.append((key, value, part.strip()))
-    if wrong:
-        raise InputError(wrong)
-    return found
-
-
-def _read(key: str, value: object) -> dict[str, float | None]:
-    unit, example = _KEYS[key]
-    shown = str(value).strip()
-    if key in ("torque", "share") and isinstance(value, str) and shown.endswith("%"):
-        share = float(to_si(shown[:-1], "1", name=key)) / 100.0
-        if not share > 0.0:
-            raise InputError(f"{key}: a step is above 0; write {example}.")
-        return {"torque_share": share, "torque": None} if key == "torque" else {"share": share}
-    number = float(to_si(value, unit, name=key))
-    if not number > 0.0:
-        raise InputError(f"{key}: a step is above 0; write {example}.")
-    return {key: number}
-
-
-def _step(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
+    exact, decimals = count * step, decimals_of(step)
+    decimal = round(
+        exact, decimals
+    )  # without the noise of binary fractions, of a step that is a short decimal
+    noise = decimals < 9 and abs(decimal - exact) <= 1e-12 * exact
+    return math.copysign(decimal if noise else exact, value)

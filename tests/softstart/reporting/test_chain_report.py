@@ -7,10 +7,10 @@ import re
 import pytest
 
 from softstart import Chain, InputError, fatigue, simulate
-from softstart.reporting import Project, Report, first_page, report
+from softstart.reporting import Project, Report, report
 from softstart.reporting.limit import bound_at
 
-from .conftest import untypeset
+from .conftest import Page
 
 CHAIN = Chain.load("crane-4-mass")
 
@@ -21,12 +21,12 @@ def made() -> Report:
 
 
 def test_the_figures_are_those_of_the_starts_on_the_chain(made):
-    page, headline = untypeset(made.to_html()), first_page.headline(made)
+    page = made.to_html()
+    text = Page(page).text
     ramp, gentle, direct = (simulate(CHAIN, name) for name in ("ramp", "take-up", "direct"))
     assert made.choice.chosen.name == "take-up"
-    assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in headline
-    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in headline
-    assert untypeset(headline) in page
+    assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in text
+    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in text
     for run in (ramp, gentle, direct):
         row = re.findall(rf'<tr[^>]*><th scope="row" class="text">{run.controller_name}</th>(.*?)</tr>', page)
         assert len(row) == 5  # page 1, the rule, the strategies, shafts, beside the bound
@@ -55,20 +55,19 @@ def test_the_optimum_lies_between_bound_and_strategy(monkeypatch):
     monkeypatch.setattr("softstart.reporting.limit.SHARES", ())  # the start time of take-up alone
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.05" for k in (1, 2, 3)})
     best = report(damped, controllers=["take-up"], budget=200.0)
-    run = best.choice.chosen.row.run
+    run = best.choice.chosen.run
     optimum = best.limit.optimum_at(run.start_time)
     assert bound_at(damped, run.start_time) < optimum.k_dyn < run.k_dyn
-    assert "optima are the best starts found" in untypeset(best.to_html())
+    assert "optima are the best starts found" in Page(best.to_html()).text
 
 
-def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(made):
-    page = untypeset(made.to_html())
-    assert "Not counted: damping is missing in rotor - pinion" in page
-    assert "take up speed 25.83 rpm, " in page  # the chain has its speed in rpm
+def test_lives_of_shafts_are_those_of_fatigue(made):
+    page = Page(made.to_html()).text
+    assert "Lives cannot be given. damping is missing in rotor - pinion" in page
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report(damped, controllers=["take-up"], budget=0.0).to_html()
     found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
-    last = re.findall(r">take-up</th>(.*?)</tr>", page)[-2]  # the last one is beside the bound
+    last = re.findall(r">take-up</th>(.*?)</tr>", page)[-1]
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
     assert relative == pytest.approx([life.relative for life in found.by_run[0]], rel=5e-3)
     assert "Longest life: take-up" in page
@@ -76,7 +75,7 @@ def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(ma
 
 def test_limits_pass_or_fail_by_the_worst_case(made):
     assert "Neither passed nor failed" in made.to_html()
-    permitted = 1.5 * made.choice.chosen.row.run.peak_torque
+    permitted = 1.5 * made.choice.chosen.run.peak_torque
     limited = Chain.load("crane-4-mass", also={"shaft[1].permissible_torque": permitted})
     page = report(limited, controllers=["take-up"], budget=0.0).to_html()
     assert "Pass or fail" in page

@@ -4,15 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from softstart import Drive, optimize
+from softstart import Drive
 from softstart.optimal.front import FrontPoint
-from softstart.processes import Progress
 from softstart.reporting import report
-from softstart.reporting.document import answer
-from softstart.reporting.limit import bound_at, limit_section, optima
-from softstart.reporting.markup import Figures
+from softstart.reporting.limit import bound_at
 
-from .test_page import Page, rows_of
+from .conftest import Page
 
 LAGGING = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.002)
 
@@ -21,26 +18,22 @@ def test_an_optimum_that_is_found_stands_between_bound_and_strategy(monkeypatch)
     monkeypatch.setattr("softstart.reporting.limit.SHARES", ())
     made = report(LAGGING, controllers=["direct", "shaped"], budget=60.0)
     best = made.choice.chosen
-    bound, known, own = made.lower_bound(best.row), made.lowest_known(best.row), best.row.run.k_dyn
-    assert bound <= known == made.limit.optimum_at(best.row.run.start_time).k_dyn < own
-    row = rows_of(Page(section(made)), "times the bound")[best.name]
+    bound, known, own = made.lower_bound(best), made.lowest_known(best), best.run.k_dyn
+    assert bound <= known == made.limit.optimum_at(best.run.start_time).k_dyn < own
+    row = Page(made.to_html()).rows("times the bound")[best.name]
     assert row["lowest known in that time"] == f"{known:.3f} (optimum)"
     assert float(row["times the bound"]) == pytest.approx(own / bound, abs=5e-3)
-    assert "; the gentlest start known has" in answer(made)
+    assert "; the gentlest start known has" in made.answer
     assert made.summary()["k_dyn_gentlest_known"] == known
-
-
-def section(made):
-    return limit_section(made.drive, made.choice, made.limit, Figures())
 
 
 def test_without_a_search_nothing_else_is_claimed():
     made = report(LAGGING, controllers=["direct", "shaped"], budget=0.0)
-    said, best = "".join(Page(section(made)).text), made.choice.chosen
+    said, best = Page(made.to_html()).text, made.choice.chosen
     assert "none was looked for" in said
     assert "the motor torque lags behind its demand" in said
     assert made.limit.points == ()
-    bound, own = made.lower_bound(best.row), best.row.run.k_dyn
+    bound, own = made.lower_bound(best), best.run.k_dyn
     assert f"between {bound:.3f} (proved) and {own:.3f} (that of {best.name} itself)" in said
 
 
@@ -52,38 +45,23 @@ def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostil
         bound_kind="certificate",
     )  # fmt: skip
     points = (*hostile.limit.found, single)
-    page = Page(section(replace(hostile, limit=replace(hostile.limit, points=points))))
-    said = "".join(page.text)
+    page = Page(replace(hostile, limit=replace(hostile.limit, points=points)).to_html())
+    said = page.text
     assert f"{len(points) - 1} of {len(points)} optima are proved against every other start" in said
     assert "among starts whose gap closes only once: the optimum at 0.3735 s" in said
     assert "is not ruled out" in said
-    row = rows_of(page, "times the bound")["direct"]
+    row = page.rows("times the bound")["direct"]
     assert row["lowest known in that time"] == "1.336 (optimum)"
     assert float(row["times the bound"]) == pytest.approx(
         direct.k_dyn / bound_at(hostile.drive, direct.start_time), abs=5e-3
     )
 
 
-def test_optima_of_a_report_begin_with_the_nearest_that_is_known(monkeypatch):
-    asked = []
-
-    def noted(stretch, start_time, near):
-        asked.append((start_time, near and near.time[-1]))
-        if start_time == 0.32:
-            return FrontPoint(start_time, "reached", "NOT_FOUND", "")
-        return replace(OPTIMUM, time=(0.0, start_time), torque=(1.0, 1.0))
-
-    OPTIMUM = FrontPoint.of_optimum(optimize(LAGGING.replace(torque_lag=0.0), 0.32, terminal="reached"), 0.32)
-    monkeypatch.setattr("softstart.reporting.limit.Stretch.point", noted)
-    optima(LAGGING, [0.3, 0.4, 0.31, 0.32, 0.35], progress=Progress(lambda message: None))
-    assert asked == [(0.3, None), (0.31, 0.3), (0.32, 0.31), (0.35, 0.31), (0.4, 0.35)]
-
-
 def test_an_unknown_position_is_reported_with_where_it_is_worst():
     drive = LAGGING.replace(load_kind="reactive", start_position="unknown")
     made = report(drive, controllers=["direct", "s-curve"], budget=0.0)
-    runs = {row.name: row.run for row in made.choice.rows}
-    text = " ".join("".join(Page(made.to_html()).text).split())
+    runs = {row.name: row.run for row in made.comparison.rows}
+    text = Page(made.to_html()).text
     assert "there is no formula (one torque serves several starts)" in text
     for name, run in runs.items():
         assert f"{name} {run.position}" in text

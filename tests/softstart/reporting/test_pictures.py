@@ -1,7 +1,6 @@
 """The figures of a report: nothing is cut off, no name is taken for a formula, no label for its neighbour."""
 
 import itertools
-import math
 import re
 
 import numpy as np
@@ -11,12 +10,12 @@ from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import report
-from softstart.reporting.drive_section import scheme
-from softstart.reporting.limit import Limit, limit_figure
-from softstart.reporting.markup import Figures
-from softstart.reporting.robustness import maps_figure
-from softstart.reporting.strategies import _frame, traces_figure, traces_section
+from softstart.reporting.document import templates
+from softstart.reporting.figures import limit_figure, traces_figure
+from softstart.reporting.limit import Limit
 from softstart.views.printed import units_of
+
+from .conftest import Page
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -28,7 +27,7 @@ def test_traces_of_a_braking_motor_are_in_the_frame_and_all_in_one_scale():
     runs = [simulate(drive, brakes), simulate(drive, "direct")]
     assert runs[0].u.min() == -50.0
     rows = report(drive, controllers=[brakes, "direct"], budget=0.0).comparison.rows
-    figure = traces_figure(rows, *_frame(rows))
+    figure = traces_figure(rows)
     panels = [axes for axes in figure.axes if axes.get_lines()]
     assert len(panels) == 2
     assert len({panel.get_ylim() for panel in panels}) == 1  # the caption says so
@@ -43,7 +42,7 @@ def test_names_in_figures_are_taken_literally():
     gains = [RobustGains(label, make_controller("ramp"), CRANE) for label in labels]
     made = report(CRANE, controllers=["direct", *gains], budget=0.0)
     page = made.to_html()  # warnings are errors here
-    figure = traces_figure(made.comparison.rows[1:], 0.3, 0.0, 100.0)
+    figure = traces_figure(made.comparison.rows[1:])
     for label, axes in zip(labels, figure.axes, strict=False):
         assert label in page
         shown = axes.get_title(loc="left").replace("\\$", "$").partition(":")[0]
@@ -53,22 +52,8 @@ def test_names_in_figures_are_taken_literally():
 
 def test_a_single_strategy_has_a_limit_figure():
     choice = report(CRANE, controllers=["direct"], budget=0.0).choice
-    left, right = limit_figure(choice.rows, [], Limit()).axes[0].get_xlim()
-    assert left <= choice.chosen.row.run.start_time <= right
-
-
-def test_small_inertias_stand_in_powers_that_keep_their_labels_apart():
-    servo = Drive.load("servo-axis-small")
-    made = report(servo, controllers=["direct"], budget=0.0)
-    one, units = made.choice.of("direct"), units_of(servo)
-    axes = maps_figure([(one.name, one.map)], (one.map.gaps[2], one.map.inertias[3]), units).axes[0]
-    labels = [tick.get_text() for tick in axes.get_xticklabels()]
-    assert labels == ["52", "78", "104", "130", "162"]
-    assert "10^{-6}" in axes.get_xlabel()
-    assert all(len(text) <= 5 for text in labels)
-    assert math.isclose(
-        float(axes.get_yticklabels()[2].get_text()), units.shown(servo.gap, "rad"), rel_tol=5e-3
-    )
+    left, right = limit_figure(choice.comparison.rows, [], Limit()).axes[0].get_xlim()
+    assert left <= choice.chosen.run.start_time <= right
 
 
 @pytest.mark.parametrize("drive", ["tiny", "huge", "crane-4amtkf", "servo-axis-small", "nordin-servo-60kw"])
@@ -86,7 +71,7 @@ def test_labels_of_the_scheme_are_inside_and_clear_of_each_other(drive):
         )  # fmt: skip
     else:
         made = Drive.load(drive)
-    picture = scheme(made, "figure-1")
+    picture = templates().get_template("scheme.svg.j2").render(drive=made, units=units_of(made))
     width = float(re.search(r'viewBox="0 0 (\d+) 300"', picture)[1])
     boxes = []
     pattern = r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)" font-size="(\d+)"[^>]*>([^<]*)<'
@@ -107,6 +92,6 @@ def test_labels_of_the_scheme_are_inside_and_clear_of_each_other(drive):
 def test_traces_that_are_cut_off_are_named():
     slow = make_controller("ramp", {"time": 5.0})
     made = report(CRANE, controllers=["direct", slow], budget=0.0)
-    assert "The start of ramp goes on beyond the" in traces_section(made.comparison.rows, Figures())
+    assert "The start of ramp goes on beyond the" in Page(made.to_html()).text
     made = report(CRANE, controllers=["direct", "ramp"], budget=0.0)
-    assert "goes on beyond" not in traces_section(made.comparison.rows, Figures())
+    assert "goes on beyond" not in Page(made.to_html()).text
