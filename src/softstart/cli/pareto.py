@@ -49,7 +49,7 @@ else:  # no numba for a help, a wrong option or the Tab key
     starts, views = late("softstart.views.starts"), late("softstart.views.optima")
     optima = late("softstart.optimal.optimize")
 
-STATE = "pareto.jsonl"
+STATE = "pareto.sqlite"
 
 
 @click.command(cls=Command)

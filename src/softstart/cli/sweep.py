@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +38,7 @@ from softstart.drive import PARAMETERS
 from softstart.errors import InputError, Mistakes
 from softstart.late import late
 from softstart.quantities import values_in, whole_number
-from softstart.views.markdown import output_folder
+from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import present
 
 if TYPE_CHECKING:
@@ -137,7 +135,7 @@ def sweep(
     """
     asked |= {"fitted_to": fitted_to, **({} if figures is None else {"figures": figures})}
     begin = time.monotonic()
-    with output_folder(out) as folder, _kept(out) as to, named_as_options():
+    with output_folder(out) as folder, kept_state(out, RESULTS, "finished chunks") as to, named_as_options():
         results, last = _computed(drive, controller, params, axes, asked, to)
 
         with working("summing up ..."):
@@ -197,18 +195,6 @@ def _computed(
             allow_code=code_allowed(),
             **asked,
         ), last
-
-
-@contextmanager
-def _kept(out: str | None) -> Iterator[Path | None]:
-    """The folder of the results in DIR itself: it is there after an interruption too, and that is said."""
-    to = None if out is None else Path(out) / RESULTS
-    try:
-        yield to
-    except KeyboardInterrupt:
-        if to is not None and to.exists():
-            print(f"softstart: finished chunks are kept in {to}; the same command goes on.", file=sys.stderr)
-        raise
 
 
 MOST_VALUES = 1_000_000  # of a range

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 else:  # no numba for a help, a wrong option or the Tab key
     views = late("softstart.views.tuning")
 
-STATE = "tuning.jsonl"
+STATE = "tuning.sqlite"
 QUESTIONS = ("schedule", "robust")
 LARGEST_GRID = 100  # values of one axis
 ENDINGS = ("x", "J1")  # of multiples: of the drive's own value, of the motor's inertia

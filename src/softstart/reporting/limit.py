@@ -19,8 +19,8 @@ from softstart.optimal.front import FrontPoint, Stretch, computed
 from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
 from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve
-from softstart.processes import DiedError, Worker
-from softstart.processes import Progress as WorkerProgress
+from softstart.parallel import DiedError, Worker
+from softstart.parallel import Progress as WorkerProgress
 from softstart.profile import TorqueProfile
 from softstart.reporting.choice import Choice
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
@@ -188,7 +188,7 @@ def _in_own_process(
     except DiedError:
         pass  # what it found counts
     finally:
-        worker.end()
+        worker.kill()
     return points
 
 

@@ -613,6 +613,6 @@ def write_front(front: Front, folder: Path, command: str) -> None:
     parts += [
         *map(markdown, footnotes(front)),
         "All numbers with their digits: [pareto.csv](pareto.csv). Points with their torque profiles, from "
-        "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
+        "which the same command goes on: [pareto.sqlite](pareto.sqlite).",
     ]
     write_drive_report(folder, parts, front.drive, command)

@@ -456,7 +456,7 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
     parts += [
         "## Notes",
         *map(markdown, notes(tuning)),
-        "Finished parts, from which the same command goes on: [tuning.jsonl](tuning.jsonl).",
+        "Finished parts, from which the same command goes on: [tuning.sqlite](tuning.sqlite).",
     ]
     write_drive_report(folder, parts, tuning.drive, command)
 

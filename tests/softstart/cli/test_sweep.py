@@ -127,7 +127,7 @@ LONG = (
 def test_an_interrupted_command_says_how_to_go_on(interrupted, place, as_json):
     status = place / "grid" / "sweep.zarr" / "status" / "c"
     err = interrupted(*LONG, begun=status.exists)
-    assert "finished chunks are kept in grid/sweep.zarr; the same command goes on." in err
+    assert "finished chunks are kept in grid/sweep.zarr; run the same command to continue." in err
     assert [path.name for path in (place / "grid").iterdir()] == ["sweep.zarr"]
     done = {path: path.stat().st_mtime_ns for path in status.rglob("*") if path.name.isdigit()}
     told = as_json(*LONG)

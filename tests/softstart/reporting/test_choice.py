@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, PlainController, simulate
-from softstart.processes import Progress
+from softstart.parallel import Progress
 from softstart.reporting import report
 from softstart.reporting.choice import choice_section
 from softstart.reporting.document import answer

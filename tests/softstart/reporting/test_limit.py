@@ -6,7 +6,7 @@ import pytest
 
 from softstart import Drive, optimize
 from softstart.optimal.front import FrontPoint
-from softstart.processes import Progress
+from softstart.parallel import Progress
 from softstart.reporting import report
 from softstart.reporting.document import answer
 from softstart.reporting.limit import bound_at, limit_section, optima
