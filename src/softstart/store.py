@@ -1,81 +1,41 @@
-"""What long computations keep on disk, so that an interrupted one goes on where it was.
+"""What long computations keep on disk, so that an interrupted one continues where it was.
 
-A `Target` is the file or folder that a caller named. It holds a manifest, the inputs that the results follow
-from, and each finished part. The same call on it goes on; a target of other inputs, or of anything else, is
-refused and never touched. One process writes at a time. `Records` keeps parts as JSON lines (tuning, limit
-curves); sweeps keep theirs as chunks of a Zarr folder (sweeping/store.py) with the same lock, seals and
-sentences. What is kept is `sealed`: a part that is not as it was written is computed again, and a
-DamagedWarning says so.
+A `Target` is the file or folder that a caller named, and words the sentences about it. `Records` keeps in an
+SQLite file the inputs that the results follow from and each finished part, with checksums. The same call on
+it continues; a target of other inputs, or of anything else, is refused and never touched; a part that is not
+as it was written is computed again, and a DamagedWarning says so. The file is locked as long as a process
+writes it. Sweeps keep their figures as chunks of a Zarr folder (sweeping/store.py), and such a list in it.
 """
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
 import shutil
 import socket
+import sqlite3
 import stat
 import sys
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from softstart.errors import DamagedWarning, InputError, listed
-from softstart.input.files import write_whole
-from softstart.processes import undone
+from softstart.stopping import at_stop
 
 Record = dict[str, Any]
-
-
-def fingerprint(inputs: Mapping[str, Any]) -> str:
-    """A fingerprint of all inputs.
-
-    >>> fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1})
-    True
-    >>> fingerprint({"a": 1}) == fingerprint({"a": 2})
-    False
-    """
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-
-
-def sealed(record: Mapping[str, Any], key: str = "") -> str:
-    """A line of JSON that begins with a checksum of what follows and of `key`: what it belongs to.
-
-    >>> line = sealed({"cost": 1.5}, "cell 3")
-    >>> unsealed(line, "cell 3"), unsealed(line, "cell 4"), unsealed(line.replace("5", "4"), "cell 3")
-    ({'cost': 1.5}, None, None)
-    """
-    rest = json.dumps(record, allow_nan=False)[1:]
-    return f"{_seal(rest, key)}{'' if rest == '}' else ', '}{rest}\n"
-
-
-def unsealed(line: str, key: str = "") -> Record | None:
-    """The record of such a line; None if anything in it was changed, or if it belongs to something else."""
-    line, size = line.rstrip("\r\n"), len(_seal("", ""))
-    for comma in (", ", ""):
-        rest = line[size + len(comma) :]
-        if line == f"{_seal(rest, key)}{comma}{rest}":
-            found: Record = json.loads("{" + rest)
-            return found
-    return None
-
-
-def _seal(rest: str, key: str) -> str:
-    return f'{{"sha256": "{hashlib.sha256(f"{key} {rest}".encode()).hexdigest()}"'
-
-
+SMALLEST = 512  # bytes of an SQLite file
+# the first two remove what a killed process left; a power failure may cost the file, but no number is wrong
+MODES = "journal_mode = PERSIST", "journal_mode = DELETE", "locking_mode = EXCLUSIVE", "synchronous = OFF"
 NAMED = 3  # damaged parts that are named
 
 
 def warn_of_damage(path: Path, parts: Sequence[str]) -> None:
-    """Say which parts of a target are not as they were written; the caller makes them again."""
+    """Say which parts of a target are not as they were written; the caller computes them again."""
     if parts:
         shown = [*parts[:NAMED], f"{len(parts) - NAMED} more"] if len(parts) > NAMED + 1 else list(parts)
         verb = "are" if len(parts) > 1 else "is"
@@ -87,92 +47,77 @@ def warn_of_damage(path: Path, parts: Sequence[str]) -> None:
 
 
 class Target(NamedTuple):
-    """Where results are kept: the option that named it, its path, and what it holds ("sweep")."""
+    """Where results are kept: the option that named it, its path, and what it holds ("sweep").
+
+    Of a folder `inside` is the path of the SQLite file in it.
+    """
 
     option: str
     path: Path
     content: str
-    kind: str = "file"  # or "folder"
+    inside: str = ""
 
     @property
     def other(self) -> str:
         """What the user may do instead."""
-        return "give another folder" if self.kind == "folder" else "name another file"
+        return "give another folder" if self.inside else "name another file"
+
+    def error(self, sentence: str) -> InputError:
+        """The error for this target."""
+        return InputError(f"{self.option} = {self.path}: {sentence}")
 
     def foreign(self) -> InputError:
         """The error for a target that holds something else."""
-        return self._error(f"this {self.kind} holds something else than a {self.content}; {self.other}.")
+        kind = "folder" if self.inside else "file"
+        return self.error(f"this {kind} holds something else than a {self.content}; {self.other}.")
 
-    def older(self) -> InputError:
-        """The error for a target whose manifest is not there, or is damaged beyond use."""
-        return self._error(
-            f"its list of inputs has no checksum or a wrong one: this {self.kind} was damaged, or written by "
-            f"an older softstart; {self.other}, or delete this one to begin anew."
-        )
+    def damaged(self) -> InputError:
+        """The error for a target that is damaged beyond use."""
+        what = "its list of finished parts" if self.inside else "this file"
+        return self.error(f"{what} is damaged; {self.other}, or delete this one to begin again.")
 
-    def unwritable(self, error: OSError) -> InputError:
+    def unwritable(self, error: Exception) -> InputError:
         """The error for a target that cannot be written."""
-        place = "a folder" if self.kind == "folder" else "a file in a folder"
-        return self._error(
-            f"nothing can be written there ({error.strerror or error}); give {place} that you may write to."
-        )
+        place = "a folder" if self.inside else "a file in a folder"
+        reason = getattr(error, "strerror", None) or error
+        return self.error(f"nothing can be written there ({reason}); give {place} that you may write to.")
 
     def check_same(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
         """Raise InputError that names the inputs which differ from those that the target was begun with."""
         other = [name for name in {**before, **now} if before.get(name) != now.get(name)]
         if other:
-            raise self._error(
+            raise self.error(
                 f"it holds a {self.content} with another {listed(other)}; {self.other}, or delete this one "
-                "to begin anew."
+                "to begin again."
             )
 
     @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Hold the lock of the target, the file `.NAME.lock` beside it; InputError if another process has it.
-
-        The lock is on the open file, not its name: the system drops it when its owner dies, and a file that a
-        dead process left behind locks nobody out.
-        """
-        home = self.path.parent
-        path = home / f".{self.path.name}.lock"
+    def errors(self) -> Iterator[None]:
+        """What SQLite and the system say in the block, as an InputError."""
         try:
-            made = [folder for folder in (home, *home.parents) if not folder.exists()]
-            home.mkdir(parents=True, exist_ok=True)
-            handle = _open_locked(path)
-        except OSError as error:
-            raise self.unwritable(error) from None
-        if handle is None:
-            owner = path.read_text("ascii", errors="replace").strip() if sys.platform != "win32" else ""
-            raise self._error(
-                f"{f'process {owner}' if owner else 'another process'} is writing this {self.content} now; "
-                f"wait for it or end it, or {self.other}."
-            )
-        with undone(partial(_unlock, handle, path, made)):
-            os.truncate(handle, 0)
-            os.pwrite(handle, f"{os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-            for left in home.glob(f".{self.path.name}.*.part"):  # by an owner that was killed
-                with suppress(OSError):
-                    left.unlink()
             yield
-
-    @contextmanager
-    def fresh_folder(self) -> Iterator[Path]:
-        """A hidden folder beside the target to fill and to rename, see the function of this name."""
-        try:
-            with fresh_folder(self.path.parent) as fresh:
-                yield fresh
         except OSError as error:
             raise self.unwritable(error) from None
-
-    def _error(self, sentence: str) -> InputError:
-        return InputError(f"{self.option} = {self.path}: {sentence}")
+        except UnicodeDecodeError:  # a message with damaged names
+            raise self.damaged() from None
+        except sqlite3.Error as error:
+            match error.sqlite_errorname.split("_")[1]:
+                case "NOTADB":
+                    raise self.foreign() from None
+                case "BUSY":
+                    raise self.error(
+                        f"another process is writing this {self.content} now; wait for it or end it, or "
+                        f"{self.other}."
+                    ) from None
+                case "FULL" | "IOERR" | "READONLY" | "CANTOPEN" | "PERM":
+                    raise self.unwritable(error) from None
+            raise self.damaged() from None
 
 
 class Records:
-    """Finished parts in a file of JSON lines: first the manifest, then one part a line. Use it in a `with`.
+    """Finished parts in an SQLite file. Use it in a `with`; without a target nothing is kept on disk.
 
-    The fields `keys` identify a part. Parts are appended; a line that was cut off or damaged costs that part
-    only. Without a target nothing is kept on disk.
+    The fields `keys` identify a part. A file in which nothing was kept is removed at the end.
 
     >>> with Records(None, {"drive": "crane"}, ["cell", "restart"]) as kept:
     ...     kept.add({"cell": 3, "restart": 0, "cost": 1.1})
@@ -182,193 +127,130 @@ class Records:
 
     def __init__(self, target: Target | None, inputs: Mapping[str, Any], keys: list[str]) -> None:
         self.target, self.keys = target, keys
-        self._manifest: Record = {"inputs": dict(inputs), "key": fingerprint(inputs)}
-        self._records: dict[str, Record] = {}
-        self._lock = ExitStack()
-        self._written = False
+        self._inputs = json.dumps(inputs, sort_keys=True)
+        self._parts: dict[str, Record] = {}
+        self._base: sqlite3.Connection | None = None
+        self._open = ExitStack()
 
     def __enter__(self) -> Self:
         if self.target is not None:
-            path = self.target.path
-            if _exists(path):
-                self._read()  # before the lock, which would be left beside a file of something else
-            with self._lock as stack:
-                stack.enter_context(self.target.locked())
-                if _exists(path):
-                    warn_of_damage(path, self._read())
-                    self._write()  # without a line that was cut off
-                self._lock = stack.pop_all()
+            with ExitStack() as stack, self.target.errors():
+                file = self.target.path / self.target.inside
+                if file.is_symlink() or file.exists():
+                    found = file.stat()
+                    if not stat.S_ISREG(found.st_mode) or 0 < found.st_size < SMALLEST:
+                        raise self.target.foreign()
+                    made = []
+                else:
+                    made = [file, *(folder for folder in file.parents if not folder.exists())]
+                    file.parent.mkdir(parents=True, exist_ok=True)
+                stack.callback(self._close, made)
+                stack.enter_context(at_stop(lambda: self._close(made)))
+                self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
+                warn_of_damage(self.target.path, self._read(self._base))
+                self._open = stack.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._lock.close()
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
 
     def find(self, *part: Any) -> Record | None:
         """The record of a part, or None if it is not finished."""
-        return self._records.get(json.dumps(part))
+        return self._parts.get(json.dumps(part))
+
+    def parts(self) -> list[Record]:
+        """All records."""
+        return list(self._parts.values())
+
+    def forget(self, *part: Any) -> None:
+        """Take a part for one that is not finished."""
+        self._parts.pop(json.dumps(part), None)
 
     def add(self, record: Record) -> None:
         """Keep a part, on disk too."""
-        self._records[self._part_of(record)] = dict(record)
-        if self.target is None:
-            return
-        if not self._written:
-            self._write()
-            return
-        try:
-            with self.target.path.open("a", encoding="utf-8") as stream:
-                stream.write(sealed(record, self._manifest["key"]))
-        except OSError as error:
-            raise self.target.unwritable(error) from None
+        key = json.dumps([record[name] for name in self.keys])
+        self._parts[key] = dict(record)
+        if self.target is not None:
+            with self.target.errors():
+                self._insert(key, json.dumps(record, allow_nan=False))
 
-    def _part_of(self, record: Record) -> str:
-        return json.dumps([record[name] for name in self.keys])
+    def _insert(self, key: str, text: str) -> None:
+        assert self._base is not None
+        self._base.execute(
+            "INSERT OR REPLACE INTO parts VALUES (?, ?, ?)", (key, text, self._seal(key, text))
+        )
 
-    def _write(self) -> None:
+    def _seal(self, key: str, text: str) -> str:
+        """A checksum of a row, which fits these inputs alone; that of the inputs themselves fits any."""
+        return hashlib.sha256(f"{self._inputs if key else ''} {key} {text}".encode()).hexdigest()
+
+    def _read(self, base: sqlite3.Connection) -> list[str]:
+        """Take in the parts of a file that was begun with the same inputs; which of them are damaged."""
         assert self.target is not None
-        key = self._manifest["key"]
-        lines = (sealed(record, key) for record in self._records.values())
-        text = "".join([sealed(self._manifest, "manifest"), *lines])
-        write_whole(self.target.path, lambda stream: stream.write(text))
-        self._written = True
+        base.text_factory = lambda text: text.decode(errors="replace")
+        for mode in MODES:
+            base.execute(f"PRAGMA {mode}")
+        base.execute("BEGIN EXCLUSIVE")
+        tables = base.execute("SELECT name FROM sqlite_master").fetchall()
+        if not tables:
+            base.execute("CREATE TABLE parts (key TEXT PRIMARY KEY, record TEXT, seal TEXT) WITHOUT ROWID")
+            self._insert("", self._inputs)
+        elif tables != [("parts",)]:
+            raise self.target.foreign()
+        elif base.execute("PRAGMA integrity_check").fetchone() != ("ok",):
+            raise self.target.damaged()
+        rows = base.execute("SELECT key, record, seal FROM parts").fetchall()
+        good = {key: json.loads(text) for key, text, seal in rows if seal == self._seal(key, text)}
+        if (before := good.pop("", None)) is None:
+            raise self.target.damaged()
+        self.target.check_same(before, json.loads(self._inputs))
+        bad = [key for key, *_ in rows if key and key not in good]
+        base.executemany("DELETE FROM parts WHERE key IS ?", [(key,) for key in bad])
+        base.execute("COMMIT")
+        self._parts = good
+        return [f"part {key}" for key in bad]
 
-    def _read(self) -> list[str]:
-        """Take in the parts of a file that was begun with the same inputs; what in it is damaged."""
-        assert self.target is not None
-        try:
-            if not stat.S_ISREG(self.target.path.stat().st_mode):
-                raise self.target.foreign()
-            content = self.target.path.read_bytes()
-        except OSError as error:
-            raise self.target.unwritable(error) from None
-        *lines, torn = content.decode("ascii", errors="replace").split("\n")
-        if not content:
-            return []
-        key = self._manifest["key"]
-        manifest = unsealed(lines[0], "manifest") if lines else None
-        found = [unsealed(line, key) for line in lines[1:]]
-        if manifest is not None:
-            if manifest["key"] != key:
-                self.target.check_same(manifest["inputs"], self._manifest["inputs"])
-                raise self.target.foreign()
-        elif not any(found):  # nothing says that it belongs to these inputs
-            raise self.target.older() if '"inputs": ' in (lines or [torn])[0] else self.target.foreign()
-        self._records = {self._part_of(record): record for record in found if record is not None}
-        damaged = [] if manifest is not None else ["line 1, the list of inputs,"]
-        return damaged + [f"line {n}" for n, record in enumerate(found, start=2) if record is None]
+    def _close(self, made: Sequence[Path]) -> None:
+        if self._base is not None:
+            self._base.close()
+        if made and not self._parts:
+            made[0].unlink(missing_ok=True)
+            with suppress(OSError):
+                for folder in made[1:]:
+                    folder.rmdir()
 
 
 @contextmanager
 def fresh_folder(home: Path, *also: Path) -> Iterator[Path]:
     """A hidden folder in `home`, gone at the end of the block; what is to stay is renamed.
 
-    Its owner holds a lock on it. Folders in `home`, and in the folders `also`, that nobody holds were left by
-    processes that were killed, and are removed. Raises OSError.
+    Its name has the number of its process: folders in `home` and in `also` whose process was killed are
+    removed. Raises OSError.
     """
-    for place in (home, *also):
-        _sweep(place)
-    path, handle = _locked_folder(home)
-    with undone(partial(_remove, path, handle)):
-        yield path
+    prefix = f".softstart-{socket.gethostname()}-"
+    for left in (path for place in (home, *also) for path in place.glob(f"{prefix}*.part")):
+        if sys.platform != "win32" and not _runs(left.name.removeprefix(prefix).partition("-")[0]):
+            shutil.rmtree(left, ignore_errors=True)
+    path = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", suffix=".part", dir=home))
+    try:
+        with at_stop(lambda: _remove(path)):
+            yield path
+    finally:
+        _remove(path)
 
 
-PREFIX, SUFFIX = ".softstart-", ".part"
+def _runs(number: str) -> bool:
+    try:
+        os.kill(int(number), 0)
+    except (ProcessLookupError, ValueError):
+        return False
+    except OSError:  # of another user
+        pass
+    return True
 
 
-def _locked_folder(home: Path) -> tuple[Path, int | None]:
-    while True:
-        path = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=home))
-        if sys.platform == "win32":
-            return path, None
-        try:
-            handle = os.open(path, os.O_RDONLY)
-        except FileNotFoundError:  # swept away by another process before it was locked
-            continue
-        with suppress(OSError):  # a file system without locks on folders: nobody can remove it either
-            if not _lock(handle) or not path.exists():
-                os.close(handle)
-                shutil.rmtree(path, ignore_errors=True)
-                continue
-        return path, handle
-
-
-def _remove(path: Path, handle: int | None) -> None:
+def _remove(path: Path) -> None:
+    """Remove a folder into which another thread may still be writing."""
+    with suppress(OSError):  # it has been put in place
+        path = path.rename(path.with_suffix(".gone.part"))
     shutil.rmtree(path, ignore_errors=True)
-    if handle is not None:
-        os.close(handle)
-
-
-def _sweep(home: Path) -> None:
-    """Remove the folders that processes left which were killed."""
-    if sys.platform == "win32":
-        return
-    with suppress(OSError):
-        for path in home.glob(f"{PREFIX}*{SUFFIX}"):
-            with suppress(OSError):
-                handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-                try:
-                    if _lock(handle):  # an owner that has not yet locked its own makes another one
-                        shutil.rmtree(path, ignore_errors=True)
-                finally:
-                    os.close(handle)
-
-
-def _exists(path: Path) -> bool:
-    with suppress(OSError):
-        return path.exists() or path.is_symlink()
-    return True  # but not to be read, which the reader says
-
-
-def _unlock(handle: int, path: Path, made: Sequence[Path]) -> None:
-    if sys.platform != "win32":  # there, a file that is open cannot be removed
-        path.unlink(missing_ok=True)
-    os.close(handle)
-    with suppress(OSError):  # folders in which nothing was kept
-        for folder in made:
-            folder.rmdir()
-
-
-NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # and no pipe that is waited for
-
-
-def _open_locked(path: Path) -> int | None:
-    """The locked file, or None if it is locked by another process."""
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o666)
-        try:
-            if not stat.S_ISREG(os.fstat(handle).st_mode):
-                raise OSError(errno.EEXIST, f"{path.name} is no file")
-            if not _lock(handle):
-                os.close(handle)
-                return None
-            if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
-                return handle
-        except FileNotFoundError:
-            pass
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)  # its last owner removed it in between: this one is nobody's lock any more
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _lock(handle: int) -> bool:
-        try:
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-
-else:
-    import fcntl
-
-    def _lock(handle: int) -> bool:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from softstart import sweep
 from softstart.drive import Drive
 from softstart.study import Verdict, find_study
 from softstart_studies.benchmarks import lsoda
-from softstart_studies.benchmarks.sweeps.process import finished
 from softstart_studies.benchmarks.sweeps.study import BenchmarkSweeps, Found, _same, claims
 from softstart_studies.benchmarks.sweeps.task import PERIOD, Task, sample
 
@@ -61,16 +59,6 @@ def test_the_same_is_the_same_to_the_bit(few):
     holes.k_dyn[0, 0, 0, 0] = np.nan
     assert not _same(few, holes)
     assert _same(holes, holes.copy(deep=True))
-
-
-def test_a_chunk_killed_before_its_seal_is_not_counted_as_finished(tmp_path):
-    """A kill between the values of a chunk and its seal makes the next run compute that chunk again."""
-    chunk = tmp_path / "status" / "c" / "0" / "1"
-    chunk.parent.mkdir(parents=True)
-    chunk.write_bytes(b"")
-    assert finished(tmp_path) == {}
-    chunk.with_name("1.sha256").write_text("")
-    assert set(finished(tmp_path)) == {str(Path("status", "c", "0", "1.sha256"))}
 
 
 def test_verdicts():

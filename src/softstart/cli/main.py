@@ -4,29 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import threading
-import time
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from types import FrameType, TracebackType
+from functools import partial
+from types import TracebackType
 from typing import TextIO
 
-import click
-
-from softstart.cli.commands import cli, usage_sentence
 from softstart.errors import DamagedWarning, InputError, SimulationError
-from softstart.processes import end_now
-from softstart.views.numbers import printable
+from softstart.stopping import STOPPING, at_stop, stop_now
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
-REPEAT_AFTER = 0.5  # s until a stop signal that was lost is raised again
-PATIENCE = 1.3  # s from a stop signal until the process ends, whatever it is doing
-BUSY = 5.0  # times that at most, where processes queue for the processors
 STOP = "interrupted; no incomplete file was left behind."
-_STOPS: list[int] = []  # signals that this process was sent: however the command ends then, it was stopped
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,18 +31,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     >>> main(["drives", "crane-4amtk"])
     2
     """
-    given = sys.argv[1:] if arguments is None else list(arguments)
     if arguments is not None:
-        return _main(given)
+        return _main(list(arguments))
     sys.excepthook = _internal_error
-    _watch_for_stops()
+    watcher = _stop_on_signals()
     _replace_unprintable()
-    code = _main(given)
-    if code == INTERRUPTED:
-        end_now(code)  # threads in compiled code would be waited for
-    for number in (signal.SIGINT, signal.SIGTERM):  # what is left is the interpreter's own end
-        if signal.getsignal(number) is _stop:
-            signal.signal(number, signal.SIG_DFL)
+    with at_stop(partial(_fail, [STOP], INTERRUPTED)):
+        code = _main(sys.argv[1:])
+        if STOPPING.is_set():
+            watcher.join()  # until the process is ended
     return code
 
 
@@ -59,22 +49,17 @@ def _main(given: list[str]) -> int:
             _show_damage()
             code = _run(given)
             sys.stdout.flush()
-        if code != DONE and _STOPS:
-            raise KeyboardInterrupt  # it was lost, and what should have ended has failed instead
         return code
     except BaseException as error:
-        if not _STOPS and not _is_stop(error):
-            return _failed(error)
-        _end_repetition()
-        if os.environ.get(DEBUG) and not isinstance(error, KeyboardInterrupt):
-            sys.__excepthook__(type(error), error, error.__traceback__)
-        return _fail([STOP], INTERRUPTED)  # whatever a library has made of it
-    finally:
-        _end_repetition()
+        return INTERRUPTED if STOPPING.is_set() else _failed(error)
 
 
 def _failed(error: BaseException) -> int:
     """Say what failed; an error that is a bug of softstart is raised again."""
+    import click
+
+    from softstart.cli.commands import usage_sentence
+
     match error:
         case click.UsageError():
             return _fail([usage_sentence(error)], BAD_INPUT)
@@ -90,10 +75,16 @@ def _failed(error: BaseException) -> int:
             return _fail([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
         case MemoryError():
             return _fail(["there is not enough memory for this."], NO_SOLUTION)
+        case KeyboardInterrupt():
+            return _fail([STOP], INTERRUPTED)
     raise error
 
 
 def _run(arguments: list[str]) -> int:
+    import click
+
+    from softstart.cli.commands import cli
+
     if "_SOFTSTART_COMPLETE" in os.environ:
         with suppress(InputError, click.UsageError):  # the line is wrong before its last word
             cli.main(arguments, prog_name="softstart")
@@ -108,6 +99,8 @@ def _run(arguments: list[str]) -> int:
 
 def _fail(sentences: Sequence[str], code: int) -> int:
     """Sentences on standard error, numbered if there are several."""
+    from softstart.views.numbers import printable
+
     lines = [printable(sentence.strip()) for sentence in sentences]
     if len(lines) == 1:
         text = f"softstart: {lines[0]}"
@@ -159,71 +152,36 @@ def _show_damage() -> None:
     warnings.showwarning = show
 
 
-def _watch_for_stops() -> None:
-    """Let Ctrl-C and TERM raise KeyboardInterrupt, and end the process if nothing comes of that.
+def _stop_on_signals() -> threading.Thread:
+    """Let Ctrl-C and TERM end the process, whatever its main thread is doing.
 
-    Python runs its handlers between two of its own instructions: not as long as the main thread is in
-    compiled code, or waits for a thread that is. The system writes the signal's number into a pipe at once,
-    where another thread reads it.
+    Python runs its own handlers between two instructions of Python: not as long as compiled code runs, and in
+    callbacks of libraries their exceptions are lost. The number of a signal is put into a socket at once,
+    where another thread waits for it. Whoever sets a handler of his own, as a server, is left alone.
     """
-    sys.unraisablehook = _unraisable
-    signal.signal(signal.SIGTERM, _stop)
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, _stop)
-    if sys.platform == "win32":  # only sockets will do there
-        return
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    threading.Thread(target=_end_in_time, args=(reader,), daemon=True).start()
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
 
+    def handler(number: int, frame: object) -> None:
+        STOPPING.set()
 
-def _end_in_time(reader: int) -> None:
-    while os.read(reader, 1)[0] not in (signal.SIGTERM, signal.SIGINT):
-        pass  # the timer's
-    queue = os.getloadavg()[0] / (os.cpu_count() or 1)
-    time.sleep(PATIENCE * min(max(queue, 1.0), BUSY))
-    _fail([STOP], INTERRUPTED)
-    end_now(INTERRUPTED)
+    def watch() -> None:
+        with writer:
+            while signal.getsignal(reader.recv(1)[0]) is not handler:
+                pass
+            stop_now(INTERRUPTED)
 
-
-def _stop(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C or TERM. Callbacks of compiled libraries lose the exception, so a timer raises it again."""
-    _STOPS.append(number)
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, _stop_again)
-        signal.setitimer(signal.ITIMER_REAL, REPEAT_AFTER, REPEAT_AFTER)
-    raise KeyboardInterrupt
-
-
-def _unraisable(lost: sys.UnraisableHookArgs) -> None:
-    """What was raised where nothing can catch it, as in callbacks of weak references: a stop comes again."""
-    if not issubclass(lost.exc_type, KeyboardInterrupt):
-        sys.__unraisablehook__(lost)
-
-
-def _stop_again(number: int, frame: FrameType | None) -> None:
-    if not _is_stop(sys.exc_info()[1]):  # else it is being handled
-        raise KeyboardInterrupt
-
-
-def _is_stop(error: BaseException | None) -> bool:
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
-
-
-def _end_repetition() -> None:
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    return watcher
 
 
 def _internal_error(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """Report a bug of softstart itself. The interpreter then exits with 1, after Ctrl-C by its signal."""
-    if issubclass(kind, KeyboardInterrupt):
-        return
+    """Report a bug of softstart itself. The interpreter then exits with 1."""
     if os.environ.get(DEBUG):
         sys.__excepthook__(kind, error, traceback)
         return

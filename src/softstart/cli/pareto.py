@@ -45,7 +45,7 @@ else:  # no numba for a help, a wrong option or the Tab key
     views = late("softstart.views.optima")
     optima = late("softstart.optimal.optimize")
 
-STATE = "pareto.jsonl"
+STATE = "pareto.sqlite"
 
 
 @click.command(cls=Command)

@@ -13,6 +13,7 @@ from softstart.cli.options import code_allowed, command_line
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
+from softstart.stopping import at_stop
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import print_json
 
@@ -50,7 +51,7 @@ def working(doing: str) -> Iterator[Progress]:
             with _announced(None):
                 yield _seldom()
             return
-        with console.status(doing) as status, _announced(status):
+        with console.status(doing) as status, at_stop(status.stop), _announced(status):
             yield lambda now: status.update(f"{now} ...")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 else:  # no numba for a help, a wrong option or the Tab key
     views = late("softstart.views.tuning")
 
-STATE = "tuning.jsonl"
+STATE = "tuning.sqlite"
 LARGEST_GRID = 100  # values of one axis
 
 

@@ -40,7 +40,7 @@ from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.planning import plan_experiments
 from softstart.identification.result import AT_LIMIT, Estimate, Identification
-from softstart.processes import on_one_thread
+from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
 
 CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere

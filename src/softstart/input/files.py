@@ -6,7 +6,7 @@ import os
 import stat
 import tempfile
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import IO, Any
 
 from softstart.errors import InputError
 from softstart.quantities import RefusedError, nearest, show
+from softstart.stopping import at_stop
 
 __all__ = ["ABSENT", "Library", "read_text", "refusal_of", "text_of", "write_whole"]
 
@@ -154,7 +155,10 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
         raise InputError(f"{refused}: {error.strerror or error}; {remedy}.") from None
     temporary = Path(name)
     try:
-        with os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream:
+        with (
+            at_stop(partial(temporary.unlink, missing_ok=True)),
+            os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream,
+        ):
             write(stream)
         umask = os.umask(0)
         os.umask(umask)

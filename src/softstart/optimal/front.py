@@ -21,7 +21,7 @@ from softstart.late import late
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
-from softstart.processes import Pool, checked_workers
+from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target

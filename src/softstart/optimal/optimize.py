@@ -31,7 +31,7 @@ from softstart.optimal.result import (
     Trial,
     Verdict,
 )
-from softstart.processes import on_one_thread
+from softstart.parallel import on_one_thread
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
 from softstart.start.rows import rows_of

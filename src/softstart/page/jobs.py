@@ -1,25 +1,27 @@
-"""Long computations in processes of their own: a fair queue, progress, and a cancel that stops."""
+"""Long computations in processes of their own: a queue, progress, and a cancel that stops."""
 
 from __future__ import annotations
 
-import itertools
 import logging
 import os
 import pickle
 import threading
 import time
 from collections.abc import Callable, Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from enum import Enum
 from typing import Any
 
 from softstart.errors import InputError, SimulationError
-from softstart.processes import DiedError, Progress, Worker
+from softstart.parallel import DiedError, Message, Progress, Worker
 
 NICENESS = 10  # the live page comes first
-STOP_CHECK = 0.1  # s between two checks whether a job is to stop
-MOST_WAITING = 8  # jobs of one user
-
 OUT_OF_MEMORY = "The computation needs more memory than there is; ask for fewer points or a smaller grid."
+DIED = (
+    "The process of this computation was ended from outside ({}), perhaps because memory ran out; start it "
+    "again, or ask for less."
+)
 MISTAKE = (
     "There is a mistake in softstart, and this could not be computed; the log of the server "
     "says more. Everything else goes on."
@@ -48,13 +50,12 @@ class Job:
 
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
     `parts` what came out so far; `result` what came out at the end; `sentences` why there is no result.
-    `changes` counts what happened, so that whoever looks now and then sees whether to look closer.
-    `subject` is for those who show it: what the result is of.
+    `changes` counts what happened, so that whoever looks now and then sees whether to look closer; it is
+    raised last. `subject` is for those who show it: what the result is of. `ahead` waiting jobs come before.
     """
 
-    def __init__(self, jobs: Jobs, user: Hashable, title: str, packed: bytes) -> None:
-        self.user = user
-        self.title = title
+    def __init__(self, user: Hashable, title: str, packed: bytes, ahead: Callable[[Job], int]) -> None:
+        self.user, self.title, self._packed, self._ahead = user, title, packed, ahead
         self.state = State.WAITING
         self.share: float | None = None
         self.message = ""
@@ -62,12 +63,11 @@ class Job:
         self.result: Any = None
         self.sentences: tuple[str, ...] = ()
         self.changes = 0
-        self.pid: int | None = None
         self.subject: Any = None
-        self._jobs = jobs
-        self._packed = packed
+        self.pid: int | None = None
         self._stop = threading.Event()
-        self._over = threading.Event()
+        self._lock = threading.Lock()
+        self._worker: Worker | None = None
         self._began = self._ended = 0.0
 
     @property
@@ -82,77 +82,107 @@ class Job:
 
     @property
     def ahead(self) -> int:
-        """How many waiting jobs come before this one; 0 for one that does not wait."""
-        return self._jobs.ahead(self)
+        """How many waiting jobs come before this one."""
+        return self._ahead(self)
 
     @property
     def seconds(self) -> float:
         """Time since its process was started, or that its process took."""
-        if not self._began:
-            return 0.0
-        return (self._ended or time.monotonic()) - self._began
+        return (self._ended or time.monotonic()) - self._began if self._began else 0.0
 
     def cancel(self) -> None:
         """Stop it; its process is gone within a second. Does nothing to a job that is over."""
-        self._stop.set()
-        self._jobs.withdraw(self)
+        with self._lock:
+            self._stop.set()
+            if self._worker is not None:
+                self._worker.kill()
+            elif not self.state.over:
+                self._conclude(State.CANCELLED)
 
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait until it is over; False if that takes longer than `timeout` seconds."""
-        return self._over.wait(timeout)
+    def run(self, start: Callable[[], Worker]) -> None:
+        """Run it in a process and listen to that, unless it was cancelled; the process is ended."""
+        sentences: tuple[str, ...] = (MISTAKE,)
+        state = State.FAILED
+        try:
+            with self._lock:
+                if self.state.over:
+                    return
+                self._worker = start()
+                self.pid, self._began, self.state = self._worker.pid, time.monotonic(), State.RUNNING
+                self.changes += 1
+            state, sentences = self._heard(self._worker)
+        except Exception:
+            log.exception("The process of %r could not be attended.", self.title)
+        finally:
+            if self._worker is not None:
+                self._worker.kill()
+        self._conclude(state, *sentences)
+
+    def _heard(self, worker: Worker) -> tuple[State, tuple[str, ...]]:
+        worker.submit(_unpacked, self._packed, reports=True)
+        try:
+            while message := worker.receive():
+                match message:
+                    case Message("progress", (share, text)):
+                        self.share, self.message = share, text
+                    case Message("part", part):
+                        self.parts.append(part)
+                    case Message("result", result):
+                        self.result, self.share = result, 1.0
+                        break
+                    case Message("error", (InputError() as error, _)):
+                        return State.FAILED, error.sentences
+                    case Message("error", (SimulationError() as error, _)):
+                        return State.FAILED, (str(error),)
+                    case Message("error", (MemoryError(), _)):
+                        return State.FAILED, (OUT_OF_MEMORY,)
+                    case Message("error", (_, text)):
+                        log.error("In the process of %r:\n%s", self.title, text)
+                        return State.FAILED, (MISTAKE,)
+                self.changes += 1
+        except DiedError as death:
+            if self._stop.is_set():
+                return State.CANCELLED, ()
+            return State.FAILED, (DIED.format(death),)
+        return State.DONE, ()
+
+    def _conclude(self, state: State, *sentences: str) -> None:
+        self._ended = time.monotonic() if self._began else 0.0
+        self.sentences, self.state = sentences, state
+        self.changes += 1
 
 
 class Jobs:
-    """Runs at most `limit` jobs at once, and those of one user one after another.
+    """Runs at most `limit` jobs at once, the others in the order in which they were begun.
 
-    Whose last job began longest ago is served next, so that nobody waits for another one's long queue. By
-    default two jobs at once, more where there are more than three processors. `end` must be called when the
-    server ends; processes whose server was killed end by themselves. `modules` are imported by each process
-    before it is given work: with `warm` that is done before anybody waits for it.
+    By default two jobs at once, more where there are more than three processors. `end` must be called when
+    the server ends; processes whose server was killed end by themselves. `modules` are imported by each
+    process before it is given work: with `warm` that is done before anybody waits for it.
     """
 
     def __init__(self, limit: int | None = None, modules: Sequence[str] = ()) -> None:
-        self.limit = limit or max(2, (os.cpu_count() or 1) - 1)
         self.modules = modules
         self._spare: Worker | None = None
-        self._warming = False
-        self._lock = threading.RLock()
-        self._waiting: list[Job] = []
-        self._running: dict[Job, threading.Thread] = {}
-        self._served: dict[Hashable, int] = {}
+        self._lock = threading.Lock()
+        self._jobs: list[Job] = []  # that are not over
         self._tabs: dict[Hashable, set[Hashable]] = {}
         self._shown: dict[tuple[Hashable, str], Job] = {}
-        self._turns = itertools.count(1)
+        self._threads = ThreadPoolExecutor(limit or max(2, (os.cpu_count() or 1) - 1))
         self._ended = False
 
-    def begin(self, user: Hashable, title: str, work: Callable[..., Any], *args: Any, **keywords: Any) -> Job:
-        """Put `work(*args, progress=..., **keywords)` into the queue of `user`.
+    def begin(self, user: Hashable, title: str, work: Callable[..., Any], *args: Any) -> Job:
+        """Put `work(*args, progress=...)` into the queue.
 
         The function must be importable, its arguments and its result picklable; `progress` is a
-        `softstart.processes.Progress`. Raises InputError if too many jobs of this user wait already.
+        `softstart.parallel.Progress`. Raises InputError if the server is ending.
         """
-        job = Job(self, user, title, pickle.dumps((work, args, keywords)))
+        job = Job(user, title, pickle.dumps((work, args)), self._ahead)
         with self._lock:
             if self._ended:
                 raise InputError("The server is ending; nothing new is begun.")
-            if sum(one.user == user for one in self._waiting) >= MOST_WAITING:
-                raise InputError(
-                    f"{MOST_WAITING} computations of yours are waiting already; cancel one, or wait for it."
-                )
-            self._waiting.append(job)
-            self._advance()
+            self._jobs.append(job)
+            self._threads.submit(self._attend, job)
         return job
-
-    def of(self, user: Hashable) -> list[Job]:
-        """The jobs of a user that are not over, the running one first."""
-        with self._lock:
-            return [job for job in (*self._running, *self._waiting) if job.user == user]
-
-    def ahead(self, job: Job) -> int:
-        """How many waiting jobs come before this one."""
-        with self._lock:
-            order = self._order()
-            return order.index(job) if job in order else 0
 
     def show(self, user: Hashable, place: str, job: Job | None) -> None:
         """Let all tabs of a user show this job at this place, or none."""
@@ -168,8 +198,7 @@ class Jobs:
 
     def enter(self, user: Hashable, tab: Hashable) -> None:
         """A user has opened a tab."""
-        with self._lock:
-            self._tabs.setdefault(user, set()).add(tab)
+        self._tabs.setdefault(user, set()).add(tab)
 
     def leave(self, user: Hashable, tab: Hashable = None) -> None:
         """A tab was closed; with the last one of a user all that is computed for them is cancelled."""
@@ -178,166 +207,50 @@ class Jobs:
             tabs.discard(tab)
             if tabs:
                 return
-            for job in self.of(user):
-                job.cancel()
-            self._served.pop(user, None)
             self._tabs.pop(user, None)
-            for key in [one for one in self._shown if one[0] == user]:
-                del self._shown[key]
+            self._shown = {key: job for key, job in self._shown.items() if key[0] != user}
+            mine = [job for job in self._jobs if job.user == user]
+        for job in mine:
+            job.cancel()
 
-    def end(self, timeout: float = 5.0) -> None:
+    def warm(self) -> None:
+        """Have a process wait for the next job, so that it begins at once."""
+        with self._lock:
+            if self._spare is None and not self._ended:
+                self._spare = Worker(self.modules, NICENESS)
+
+    def end(self) -> None:
         """Cancel everything, and wait until no process is left. Nothing can be begun afterwards."""
         with self._lock:
             self._ended = True
-            spare, self._spare = self._spare, None
-            threads = list(self._running.values())
-            for job in (*self._waiting, *self._running):
-                job.cancel()
+            jobs, spare = list(self._jobs), self._spare
+        for job in jobs:
+            job.cancel()
         if spare is not None:
-            spare.end()
-        latest = time.monotonic() + timeout
-        for thread in threads:
-            thread.join(max(0.0, latest - time.monotonic()))
+            spare.kill()
+        self._threads.shutdown()
 
-    def withdraw(self, job: Job) -> None:
-        """Take a cancelled job out of the queue, if it waits there."""
-        with self._lock:
-            if job in self._waiting:
-                self._waiting.remove(job)
-                _conclude(job, State.CANCELLED)
-            elif not job.state.over:
-                job.changes += 1
-
-    # the queue -----------------------------------------------------------------------------------------
-
-    def _order(self) -> list[Job]:
-        """Waiting jobs in the order in which they would be served: turn by turn, one of each user."""
-        rank: dict[Hashable, int] = {}
-        keys = []
-        for place, job in enumerate(self._waiting):
-            turn = rank[job.user] = rank.get(job.user, -1) + 1
-            keys.append((turn, self._served.get(job.user, 0), place, job))
-        return [job for *_, job in sorted(keys, key=lambda key: key[:3])]
-
-    def _advance(self) -> None:
-        """Start what may be started now. Called with the lock held."""
-        for job in self._order():
-            busy = {one.user for one in self._running}
-            if self._ended or len(self._running) >= self.limit:
-                return
-            if job.user in busy:
-                continue
-            self._waiting.remove(job)
-            self._served[job.user] = next(self._turns)
-            job.state, job._began = State.RUNNING, time.monotonic()
-            job.changes += 1
-            thread = threading.Thread(target=self._attend, args=(job,), name=f"job {job.title}", daemon=True)
-            self._running[job] = thread
-            thread.start()
-
-    # one job -------------------------------------------------------------------------------------------
+    def _ahead(self, job: Job) -> int:
+        waiting = [one for one in self._jobs if one.state is State.WAITING]
+        return waiting.index(job) if job in waiting else 0
 
     def _attend(self, job: Job) -> None:
-        """Run a job in a process, listen to it, and end the process: the work of one thread."""
-        state = State.FAILED
-        sentences: tuple[str, ...] = (MISTAKE,)
-        try:
-            worker = self._worker()
-            try:
-                job.pid = worker.pid
-                worker.submit(_run, job._packed, reports=True)
-                state, sentences = _listen(job, worker)
-            finally:
-                worker.end()
-        except Exception:  # a thread that died would keep its turn in the queue indefinitely
-            log.exception("The process of %r could not be attended.", job.title)
+        """Run a job, in the process that waits or a new one: the work of one thread."""
+        job.run(self._worker)
         with self._lock:
-            del self._running[job]
-            _conclude(job, state, sentences)
-            self._advance()
-        self.warm()
-
-    def warm(self) -> None:
-        """Have a process wait for the next job, so that it begins at once. Returns before it is ready."""
-        with self._lock:
-            if self._ended or self._spare is not None or self._waiting or self._warming:
-                return
-            self._warming = True
-        threading.Thread(target=self._warm, daemon=True).start()
-
-    def _warm(self) -> None:
-        worker: Worker | None = None
-        try:
-            worker = self._started()
-        except OSError:  # no process to be had now: a job will say so, or find one
-            log.exception("No process could be made ready.")
-        with self._lock:
-            self._warming = False
-            if self._ended and worker is not None:
-                worker.end()
-            else:
-                self._spare = worker
+            self._jobs.remove(job)
+        with suppress(OSError):  # no process can be started now; the next job finds one, or says so
+            self.warm()
 
     def _worker(self) -> Worker:
-        """The process that waits, or a new one."""
         with self._lock:
             spare, self._spare = self._spare, None
-        if spare is not None:
-            if spare.alive:
-                return spare
-            spare.end()
-        return self._started()
-
-    def _started(self) -> Worker:
+        if spare is not None and spare.alive:
+            return spare
         return Worker(self.modules, NICENESS)
 
 
-def _run(packed: bytes, *, progress: Progress) -> Any:
+def _unpacked(packed: bytes, *, progress: Progress) -> Any:
     """What a job's process does."""
-    work, arguments, keywords = pickle.loads(packed)
-    return work(*arguments, progress=progress, **keywords)
-
-
-def _conclude(job: Job, state: State, sentences: tuple[str, ...] = ()) -> None:
-    job._ended = time.monotonic() if job._began else 0.0
-    job._packed = b""
-    job.sentences, job.state = sentences, state
-    job.changes += 1
-    job._over.set()
-
-
-def _listen(job: Job, worker: Worker) -> tuple[State, tuple[str, ...]]:
-    """Take in what the process sends until it has ended or is to stop."""
-    while not job._stop.is_set():
-        try:
-            message = worker.receive(STOP_CHECK)
-        except DiedError as death:
-            return State.FAILED, (
-                f"The process of this computation was ended from outside ({death}), perhaps because memory "
-                "ran out; start it again, or ask for less.",
-            )
-        if message is None:
-            continue
-        if message.kind == "progress":
-            job.share, job.message = message.content
-        elif message.kind == "part":
-            job.parts.append(message.content)
-        elif message.kind == "result":
-            job.result, job.share = message.content, 1.0
-            return State.DONE, ()
-        else:
-            return State.FAILED, _sentences(job, *message.content)
-        job.changes += 1
-    return State.CANCELLED, ()
-
-
-def _sentences(job: Job, error: Exception, text: str) -> tuple[str, ...]:
-    """What a user is told of an exception."""
-    if isinstance(error, InputError):
-        return tuple(error.sentences)
-    if isinstance(error, SimulationError):
-        return (str(error),)
-    if isinstance(error, MemoryError):
-        return (OUT_OF_MEMORY,)
-    log.error("In the process of %r:\n%s", job.title, text)
-    return (MISTAKE,)
+    work, args = pickle.loads(packed)
+    return work(*args, progress=progress)

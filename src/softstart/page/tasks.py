@@ -28,7 +28,7 @@ from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
 from softstart.page.sentences import clipped
-from softstart.processes import Progress
+from softstart.parallel import Progress
 from softstart.quantities import Units, show
 from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue

@@ -17,8 +17,8 @@ from softstart.optimal.front import FrontPoint, Stretch
 from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve
-from softstart.processes import DiedError, Worker
-from softstart.processes import Progress as WorkerProgress
+from softstart.parallel import DiedError, Worker
+from softstart.parallel import Progress as WorkerProgress
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Row
 
@@ -193,7 +193,7 @@ def _in_own_process(
     except DiedError:
         pass  # what it found counts
     finally:
-        worker.end()
+        worker.kill()
     return points
 
 

@@ -21,7 +21,7 @@ from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.late import late
-from softstart.processes import Pool
+from softstart.parallel import Pool
 from softstart.start.engine import run_one, watched
 from softstart.start.recorded import Recorder
 from softstart.start.rows import MAX_EVENTS, Rows, blank, joined, rows_of

@@ -7,7 +7,6 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real
@@ -19,14 +18,14 @@ from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.processes import Pool, checked_workers, why_not_sendable
+from softstart.parallel import Pool, checked_workers, why_not_sendable
 from softstart.quantities import nearest, show
 from softstart.start.batch import has_margin
-from softstart.sweeping.grid import Axis, Plan, checked_chunk, plan_for, read_grid
+from softstart.sweeping.grid import Axis, checked_chunk, plan_for, read_grid
 from softstart.sweeping.maker import Maker, with_whole_path
 from softstart.sweeping.results import Memory, check_netcdf, write_netcdf
 from softstart.sweeping.starts import Question, Task, check_corners, cut, first_start, known_figures
-from softstart.sweeping.store import Folder, compute_and_keep, open_folder, target_of, write_block
+from softstart.sweeping.store import Folder, compute_and_keep
 
 if TYPE_CHECKING:
     import xarray
@@ -130,7 +129,6 @@ def sweep(
     kept = _figures_kept(drive, figures)
     question = Question(drive, maker, kept, _time(until), fitted_to, base, _time(time_limit))
     most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
-    target = None if to is None else target_of(Path(to))
     if netcdf is not None:
         check_netcdf(Path(netcdf))
     check_corners(question, axes)
@@ -146,50 +144,35 @@ def sweep(
         Pool, min(count, plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
         advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
     )  # fmt: skip
-    with nullcontext() if target is None else target.locked():
-        if target is None:
-            memory = Memory(plan, axes, question)
-            _run(memory, None, plan, axes, question, pool, progress)
-            results = memory.dataset()
-        else:
-            folder = Folder(target, plan, axes, question, most)
-            plan = folder.plan
-            _run(None, folder, plan, axes, question, pool, progress)
-            results = open_folder(target.path)
+    with Memory(plan, axes, question) if to is None else Folder(Path(to), plan, axes, question, most) as home:
+        _run(home, axes, question, pool, progress)
+        results = home.results()
         if netcdf is not None:
-            write_netcdf(Path(netcdf), results, plan, axes, question)
+            write_netcdf(Path(netcdf), results, home.plan, axes, question)
     return results
 
 
 def _run(
-    memory: Memory | None,
-    folder: Folder | None,
-    plan: Plan,
+    home: Memory | Folder,
     axes: tuple[Axis, ...],
     question: Question,
     make_pool: Callable[[], Pool],
     progress: Told | None,
 ) -> None:
     """Compute what is not finished, and keep it."""
-    before = 0 if folder is None else folder.finished_starts()
+    plan, before = home.plan, home.finished_starts()
     watch = Watch(plan.starts, before, progress)
     if before == plan.starts:
         return
-    with ExitStack() as stack:
-        if folder is not None:
-            stack.callback(folder.sweep_up)
-        pool = stack.enter_context(make_pool())
-        keep_in = "" if folder is None or pool.scheduler is not None else str(folder.path.resolve())
+    with make_pool() as pool:
+        keep_in = home.folder if pool.scheduler is None else ""
         tasks = (
             Task(number, question, cut(axes, plan.place(number)), plan.place(number), keep_in)
             for number in range(plan.chunks)
-            if folder is None or not folder.finished(number)
+            if not home.finished(number)
         )
-        for task, block in pool.results(compute_and_keep, tasks):
-            if block is not None and memory is not None:
-                memory.keep(task.place, block)
-            elif block is not None and folder is not None:
-                write_block(str(folder.path.resolve()), task.place, block)
+        for task, found in pool.results(compute_and_keep, tasks):
+            home.keep(task, found)
             watch.add(math.prod(task.shape))
 
 

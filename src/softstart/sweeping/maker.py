@@ -16,7 +16,7 @@ from softstart.controller.finding import GAIN_FILES, controller_class, make_cont
 from softstart.controller.tuned import Tuned
 from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
-from softstart.processes import why_not_sendable
+from softstart.parallel import why_not_sendable
 from softstart.quantities import show
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from softstart.late import late
 from softstart.start.status import Status
 from softstart.store import fresh_folder
 from softstart.sweeping.grid import Axis, Plan
-from softstart.sweeping.starts import Block, Question, known_figures
+from softstart.sweeping.starts import Block, Question, Task, known_figures
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -95,7 +95,9 @@ MOST = 10_000_000  # starts
 
 
 class Memory:
-    """Arrays that are filled chunk by chunk."""
+    """Arrays that are filled chunk by chunk; used as a Folder of a sweep is."""
+
+    folder = ""
 
     def __init__(self, plan: Plan, axes: tuple[Axis, ...], question: Question) -> None:
         if plan.starts > MOST:
@@ -109,12 +111,26 @@ class Memory:
             for one in figure_variables(axes, question)
         }
 
-    def keep(self, place: tuple[slice, ...], block: Block) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing is open."""
+
+    def finished(self, number: int) -> bool:
+        """Nothing is finished before."""
+        return False
+
+    def finished_starts(self) -> int:
+        """Nothing is finished before."""
+        return 0
+
+    def keep(self, task: Task, block: Block) -> None:
         """Take in a finished chunk."""
         for name, values in block.items():
-            self.arrays[name][place] = values
+            self.arrays[name][task.place] = values
 
-    def dataset(self) -> xarray.Dataset:
+    def results(self) -> xarray.Dataset:
         """The results."""
         return xarray.Dataset(
             {

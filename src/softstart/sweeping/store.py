@@ -1,10 +1,9 @@
 """A sweep on disk: a Zarr group that any tool opens, written a chunk at a time, going on after any end.
 
 Every chunk of the plan is one Zarr chunk of each variable, so that no two writers meet in a file. zarr writes
-a file beside its place and renames it. The seal of a chunk is written last: it holds the checksums of the
-chunk's files and fits this sweep and this place alone. Where it is and fits, the chunk is finished. So there
-is no list of finished chunks that could be lost, torn or at odds with the data. All other files are written
-once; their checksums are in the manifest.
+a file beside its place and renames it. `Records` in the folder list the inputs, the finished chunks with the
+checksums of their files, and those of all other files, which are written once. A chunk that is listed, and
+whose files are as listed, is finished.
 """
 
 from __future__ import annotations
@@ -13,15 +12,16 @@ import hashlib
 import json
 import os
 import warnings
-from collections.abc import Iterator, Sequence
-from functools import lru_cache, partial
+from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from softstart import __version__
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.store import Record, Target, fingerprint, sealed, unsealed, warn_of_damage
+from softstart.stopping import at_stop
+from softstart.store import Records, Target, fresh_folder, warn_of_damage
 from softstart.sweeping.grid import Axis, Plan
 from softstart.sweeping.maker import about_name
 from softstart.sweeping.results import STATUS, Variable, about, coordinate_variables, figure_variables
@@ -35,8 +35,6 @@ else:
     codecs, errors = late("zarr.codecs"), late("zarr.errors")
     xarray = late("xarray")
     zarr = late("zarr")
-
-Make = partial[None]  # of `_fill`: the folder and the plan are missing
 
 
 def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
@@ -64,42 +62,62 @@ def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
 
 
 class Folder:
-    """The Zarr group of a sweep: made anew, or found with the same inputs."""
+    """The Zarr group of a sweep: made, or found with the same inputs. Use it in a `with`."""
 
     def __init__(
-        self, target: Target, plan: Plan, axes: tuple[Axis, ...], question: Question, chunk: int | None
+        self, path: Path, plan: Plan, axes: tuple[Axis, ...], question: Question, chunk: int | None
     ) -> None:
-        self.path = target.path
+        self.path, self.plan, self._chunk = path, plan, chunk
+        self.folder = str(path.resolve())
+        self._target = Target("to", path, "sweep", LIST)
+        self._asked = axes, question
+        self._inputs = inputs_of(question, axes)
+        self._names = [*(name for name in question.figures if name != STATUS), STATUS]
+
+    def __enter__(self) -> Self:
         _opened.cache_clear()  # what stood at this path before may have been deleted
-        make = partial(_fill, axes=axes, question=question, inputs=inputs_of(question, axes))
-        if self.path.is_dir() and any(self.path.iterdir()):
-            self.plan = _resumed(target, make, plan, chunk)
+        if not (self.path.is_dir() and any(self.path.iterdir())):
+            self._create()
+        elif not (self.path / self._target.inside).exists():
+            raise self._target.foreign()
+        with ExitStack() as stack:
+            self._list = stack.enter_context(Records(self._target, self._inputs, ["part"]))
+            self._resume()
             self.sweep_up()
-        else:
-            self.plan = plan
-            _create(target, make, plan)
-        inputs = make.keywords["inputs"]
-        self._key, self._names = _key({"inputs": inputs, "chunk": list(self.plan.chunk)}), _names(inputs)
+            stack.callback(self.sweep_up)
+            stack.enter_context(at_stop(self.sweep_up))
+            self._open = stack.pop_all()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
 
     def finished(self, number: int) -> bool:
         """Whether a chunk is finished."""
-        return self._seal(self.plan.index(number)).is_file()
+        return self._list.find(self.plan.index(number)) is not None
+
+    def keep(self, task: Task, found: Block) -> None:
+        """List a chunk as finished, after writing it if that is not done."""
+        sums = found if task.keep_in else write_block(self.folder, task.place, found)
+        self._list.add({"part": list(self.plan.index(task.number)), "files": sums})
 
     def finished_starts(self) -> int:
         """How many starts are finished and as they were written; the chunks that are not are given up."""
         found, damaged = 0, []
-        for index in _sealed_chunks(self.path, self.plan):
-            changed = _changed(self.path, index, self._key, self._names)
-            if changed:
-                damaged.append(changed)
-                _free(self.path, self._seal(index))
-            else:
-                found += self.plan.size_at(index)
+        for record in self._list.parts():
+            if isinstance(index := record["part"], list):
+                if changed := self._changed(record["files"]):
+                    damaged.append(changed[0])
+                    self._list.forget(index)
+                else:
+                    found += self.plan.size_at(index)
         warn_of_damage(self.path, damaged)
         return found
 
-    def _seal(self, index: tuple[int, ...]) -> Path:
-        return _chunk_file(self.path, STATUS, index, SEAL)
+    def results(self) -> xarray.Dataset:
+        """The results, read when they are looked at; starts not yet computed are NaN, status -1."""
+        found: xarray.Dataset = xarray.open_zarr(self.path, chunks=None)[self._names]
+        return found
 
     def sweep_up(self) -> None:
         """Remove what a process that was killed left beside the place it was writing to."""
@@ -108,63 +126,73 @@ class Folder:
                 if name.endswith(".partial"):
                     Path(root, name).unlink(missing_ok=True)
 
+    def _changed(self, files: dict[str, str | None]) -> list[str]:
+        return [name for name, checksum in files.items() if _checksum(self.path / name) != checksum]
 
-def compute_and_keep(task: Task) -> Block | None:
-    """Compute a chunk; write it if the task says where, return it otherwise."""
+    def _create(self) -> None:
+        """An empty sweep, put in place by one rename."""
+        with self._target.errors():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with fresh_folder(self.path.parent) as fresh:
+                _fill(fresh, self.plan, *self._asked)
+                sums = {
+                    file.relative_to(fresh).as_posix(): _checksum(file)
+                    for file in fresh.rglob("*")
+                    if file.is_file()
+                }
+                with Records(self._target._replace(path=fresh), self._inputs, ["part"]) as listed:
+                    listed.add({"part": "chunk", "shape": list(self.plan.chunk)})
+                    listed.add({"part": "other files", "files": sums})
+                umask = os.umask(0)
+                os.umask(umask)
+                fresh.chmod(0o777 & ~umask)
+                if self.path.is_dir():
+                    self.path.rmdir()  # an empty folder; rename onto one does not go everywhere
+                fresh.rename(self.path)
+
+    def _resume(self) -> None:
+        """The plan of the sweep that is there; its descriptions are mended."""
+        chunk, other = self._list.find("chunk"), self._list.find("other files")
+        if chunk is None or other is None:
+            raise self._target.damaged()
+        there = Plan(self.plan.shape, tuple(chunk["shape"]))
+        if self._chunk is not None and there != self.plan:
+            raise InputError(
+                f"chunk = {self._chunk}: the sweep in {self.path} was begun in chunks of "
+                f"{' x '.join(map(str, there.chunk))} starts; leave chunk out to go on, or "
+                f"{self._target.other}."
+            )
+        self.plan = there
+        damaged = self._changed(other["files"])
+        warn_of_damage(self.path, damaged)
+        if damaged:
+            with self._target.errors(), fresh_folder(self.path.parent) as fresh:
+                _fill(fresh, there, *self._asked)
+                for file in damaged:
+                    _free(self.path, self.path / file)
+                    (self.path / file).parent.mkdir(parents=True, exist_ok=True)
+                    (fresh / file).replace(self.path / file)
+
+
+def compute_and_keep(task: Task) -> Block:
+    """Compute a chunk; write it and return the checksums of its files if the task says where."""
     block = compute(task)
-    if not task.keep_in:
-        return block
-    write_block(task.keep_in, task.place, block)
-    return None
+    return write_block(task.keep_in, task.place, block) if task.keep_in else block
 
 
-def write_block(path: str, place: tuple[slice, ...], block: Block) -> None:
-    """Write a finished chunk, and then its seal: the checksums of its files, valid at this place only."""
-    home, (arrays, key) = Path(path), _opened(path)
-    step = arrays[STATUS].chunks
-    index = tuple(part.start // size for part, size in zip(place, step, strict=True))
-    sums = {}
+def write_block(path: str, place: tuple[slice, ...], block: Block) -> dict[str, Any]:
+    """Write a finished chunk; the checksums of its files."""
+    home, arrays, sums = Path(path), _opened(path), {}
+    index = [part.start // size for part, size in zip(place, arrays[STATUS].chunks, strict=True)]
     for name in sorted(block):
-        file = _chunk_file(home, name, index)
-        _free(home, file)  # Zarr reads a chunk at the edge before it writes it
+        file = Path(name, "c", *map(str, index))  # as Zarr names it
+        _free(home, home / file)  # Zarr reads a chunk at the edge before it writes it
         arrays[name][place] = block[name]
-        sums[name] = _checksum(file)
-    seal = _chunk_file(home, STATUS, index, SEAL)
-    _free(home, seal)
-    fresh = seal.with_name(f"{seal.name}.partial")
-    fresh.parent.mkdir(parents=True, exist_ok=True)
-    fresh.write_text(sealed(sums, _key_at(key, index)), encoding="utf-8")
-    fresh.replace(seal)
+        sums[file.as_posix()] = _checksum(home / file)
+    return sums
 
 
-def open_folder(path: Path) -> xarray.Dataset:
-    """The results in a folder, read when they are looked at; starts not yet computed are NaN, status -1.
-
-    >>> open_folder(Path("nowhere.zarr"))
-    Traceback (most recent call last):
-    softstart.errors.InputError: to = nowhere.zarr: there is no sweep in this folder.
-    """
-    manifest = _manifest(path)
-    if manifest is None:
-        raise InputError(f"to = {path}: there is no sweep in this folder.")
-    ordered: xarray.Dataset = xarray.open_zarr(path, chunks=None)[_names(manifest["inputs"])]
-    return ordered
-
-
-def target_of(path: Path) -> Target:
-    """The folder of a sweep, as `to` names it."""
-    return Target("to", path, "sweep", "folder")
-
-
-# what is there ------------------------------------------------------------------------------------------
-
-# beside the chunks of `status`, where Zarr does not look: the seal of each chunk, and the manifest
-SEAL, MANIFEST = ".sha256", Path(STATUS, "softstart.json")
-
-
-def _chunk_file(home: Path, name: str, index: Sequence[int], ending: str = "") -> Path:
-    """The file of a chunk of a variable, as Zarr names it."""
-    return home.joinpath(name, "c", *map(str, index[:-1]), f"{index[-1]}{ending}")
+LIST = f"{STATUS}/softstart.sqlite"  # beside the chunks of `status`, where Zarr does not look
 
 
 def _checksum(file: Path) -> str | None:
@@ -177,62 +205,10 @@ def _checksum(file: Path) -> str | None:
         return error.strerror
 
 
-def _manifest(home: Path) -> Record | None:
-    """The inputs, the shape of the chunks, and checksums of all that is not a chunk of results."""
-    return unsealed(_text(home / MANIFEST), "sweep")
-
-
-def _text(file: Path) -> str:
-    """What a file holds, "" if that cannot be read."""
-    try:
-        return file.read_text("utf-8") if file.is_file() else ""
-    except (OSError, UnicodeDecodeError):
-        return ""
-
-
-def _names(inputs: Record) -> list[str]:
-    """The variables with results, the status last."""
-    return [*(name for name in inputs["figures"] if name != STATUS), STATUS]
-
-
-def _key(manifest: Record) -> str:
-    """What the seals of a sweep's chunks have in common."""
-    return fingerprint({name: manifest[name] for name in ("inputs", "chunk")})
-
-
-def _key_at(key: str, index: Sequence[int]) -> str:
-    return f"{key} {list(index)}"
-
-
 @lru_cache(maxsize=4)
-def _opened(path: str) -> tuple[dict[str, Any], str]:
-    """The arrays of a sweep to write to, and the key of its seals."""
-    manifest = _manifest(Path(path))
-    assert manifest is not None
-    return dict(zarr.open_group(path, mode="r+").arrays()), _key(manifest)
-
-
-def _changed(home: Path, index: tuple[int, ...], key: str, names: Sequence[str]) -> str:
-    """A file of a sealed chunk that is not as it was written; "" if all are."""
-    seal = _chunk_file(home, STATUS, index, SEAL)
-    sums = unsealed(_text(seal), _key_at(key, index))
-    if sums is None or set(sums) != set(names):
-        return seal.relative_to(home).as_posix()
-    files = {name: _chunk_file(home, name, index) for name in names}
-    return next((files[n].relative_to(home).as_posix() for n in names if _checksum(files[n]) != sums[n]), "")
-
-
-def _sealed_chunks(home: Path, plan: Plan) -> Iterator[tuple[int, ...]]:
-    """Where the chunks stand that have a seal; what is there is listed, not what could be."""
-    top = home / STATUS / "c"
-    for root, _, names in os.walk(top):
-        above = Path(root).relative_to(top).parts
-        for name in names:
-            parts = (*above, name.removesuffix(SEAL))
-            if name.endswith(SEAL) and len(parts) == len(plan.shape) and all(map(str.isdecimal, parts)):
-                index = tuple(map(int, parts))
-                if all(i < count for i, count in zip(index, plan.counts, strict=True)):
-                    yield index
+def _opened(path: str) -> dict[str, Any]:
+    """The arrays of a sweep to write to."""
+    return dict(zarr.open_group(path, mode="r+").arrays())
 
 
 def _free(home: Path, file: Path) -> None:
@@ -246,53 +222,7 @@ def _free(home: Path, file: Path) -> None:
         file.unlink(missing_ok=True)
 
 
-def _resumed(target: Target, make: Make, plan: Plan, chunk: int | None) -> Plan:
-    """The plan of the sweep that is there, if it is this one; its descriptions are mended."""
-    home, inputs = target.path, make.keywords["inputs"]
-    manifest = _manifest(home)
-    if manifest is None:  # the sweep is this one if a seal fits
-        manifest = {"inputs": inputs, "chunk": list(plan.chunk), "files": {}}
-        names = _names(inputs)
-        if all(_changed(home, index, _key(manifest), names) for index in _sealed_chunks(home, plan)):
-            raise target.older() if (home / STATUS).exists() else target.foreign()
-    target.check_same(manifest["inputs"], inputs)
-    there = Plan(plan.shape, tuple(manifest["chunk"]))
-    if chunk is not None and there != plan:
-        raise InputError(
-            f"chunk = {chunk}: the sweep in {target.path} was begun in chunks of "
-            f"{' x '.join(map(str, there.chunk))} starts; leave chunk out to go on, or {target.other}."
-        )
-    files = manifest["files"]
-    damaged = (
-        [name for name in files if _checksum(home / name) != files[name]] if files else [MANIFEST.as_posix()]
-    )
-    if damaged:
-        warn_of_damage(home, damaged)
-        with target.fresh_folder() as fresh:
-            make(fresh, there)
-            for file in _files_in(fresh):
-                _free(home, home / file)
-                (home / file).parent.mkdir(parents=True, exist_ok=True)
-                (fresh / file).replace(home / file)
-    return there
-
-
-def _create(target: Target, make: Make, plan: Plan) -> None:
-    """An empty sweep, put in place by one rename."""
-    path = target.path
-    with target.fresh_folder() as fresh:
-        make(fresh, plan)
-        umask = os.umask(0)
-        os.umask(umask)
-        fresh.chmod(0o777 & ~umask)
-        if path.is_dir():
-            path.rmdir()  # an empty folder; rename onto one does not go everywhere
-        fresh.rename(path)
-
-
-def _fill(
-    fresh: Path, plan: Plan, *, axes: tuple[Axis, ...], question: Question, inputs: dict[str, Any]
-) -> None:
+def _fill(fresh: Path, plan: Plan, axes: tuple[Axis, ...], question: Question) -> None:
     attributes = about(question, plan)
     samples = [c.name for axis in axes if axis.paired for c in axis.columns]
     if samples:
@@ -306,15 +236,6 @@ def _fill(
         # All metadata in one file is a convention that Zarr 3 has not adopted; xarray asks for it.
         warnings.filterwarnings("ignore", "Consolidated metadata", errors.ZarrUserWarning)
         zarr.consolidate_metadata(fresh)
-    files = {file.as_posix(): _checksum(fresh / file) for file in _files_in(fresh)}
-    manifest = {"inputs": inputs, "chunk": list(plan.chunk), "files": files}
-    (fresh / MANIFEST).write_text(sealed(manifest, "sweep"), encoding="utf-8")
-
-
-def _files_in(home: Path) -> list[Path]:
-    """All files below, the manifest last."""
-    found = (path.relative_to(home) for path in home.rglob("*") if path.is_file())
-    return sorted(found, key=lambda file: (file == MANIFEST, file))
 
 
 def _array(group: Any, one: Variable, shape: tuple[int, ...], chunks: tuple[int, ...]) -> Any:

@@ -11,7 +11,7 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.processes import Pool, checked_workers
+from softstart.parallel import Pool, checked_workers
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target

@@ -15,7 +15,7 @@ from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal.optimize import optimize
 from softstart.optimal.result import InfeasibleError, OptimumError
-from softstart.processes import Pool
+from softstart.parallel import Pool
 from softstart.store import Records
 from softstart.tuning.gains import ScheduleFound, SetFound
 from softstart.tuning.outcome import RobustSet, gains_on_grid

@@ -16,7 +16,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.processes import Pool, checked_workers, why_not_sendable
+from softstart.parallel import Pool, checked_workers, why_not_sendable
 from softstart.tuning.search import Cost, Found, Search, polish, search, together
 from softstart.tuning.trials import Trials, cost
 

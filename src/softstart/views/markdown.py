@@ -18,6 +18,7 @@ from typing import IO, Any
 from softstart import __version__
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.stopping import at_stop
 from softstart.store import fresh_folder
 from softstart.views.drives import controllers_set_up
 from softstart.views.numbers import Column, Table
@@ -156,8 +157,10 @@ def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
     Errors about it name --out.
     """
     state = None if out is None else Path(out) / name
+    sentence = f"softstart: {what} are kept in {state}; run the same command to continue."
     try:
-        yield state
+        with at_stop(lambda: state and state.exists() and print(sentence, file=sys.stderr)):
+            yield state
     except InputError as error:
         raise InputError(
             [
@@ -167,12 +170,6 @@ def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
                 for s in error.sentences
             ]
         ) from error
-    except KeyboardInterrupt:
-        if state is not None and state.exists():
-            print(
-                f"softstart: {what} are kept in {state}; run the same command to continue.", file=sys.stderr
-            )
-        raise
 
 
 def markdown(text: str) -> str:

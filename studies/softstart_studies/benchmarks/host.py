@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from softstart.arrays import Vector
 from softstart.errors import SimulationError
-from softstart.processes import DiedError, Worker
+from softstart.parallel import DiedError, Worker
 from softstart_studies.benchmarks.contenders import Contender, make
 from softstart_studies.benchmarks.problem import Problem, gaps
 
@@ -124,7 +124,7 @@ class Child:
 
     def close(self) -> None:
         """End the child."""
-        self.worker.end()
+        self.worker.kill()
 
     def _ask(self, verb: str, *arguments: object) -> Any:
         try:

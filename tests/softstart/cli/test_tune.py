@@ -5,6 +5,7 @@ import json
 import os
 
 import pytest
+from tests.kept import parts_in
 
 from softstart import Drive, tune
 
@@ -18,7 +19,7 @@ RAMP = ("tune", "--controller", "ramp", *SIXTY, *GRID, *QUICK, "--free", "time")
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """What the command above finds, and the file of its finished parts."""
-    path = tmp_path_factory.mktemp("finished") / "tuning.jsonl"
+    path = tmp_path_factory.mktemp("finished") / "tuning.sqlite"
     options = {"restarts": 1, "workers": 1, "certified": False, "free": {"time": None}, "parameters": {}}
     return tune(CRANE, "ramp", [0.5, 2.0], [0.07, 0.175], save_to=path, **options), path.read_bytes()
 
@@ -27,7 +28,7 @@ def finished(tmp_path_factory):
 def begun(place, finished):
     """A folder that holds these parts already."""
     (place / "tuned").mkdir()
-    (place / "tuned" / "tuning.jsonl").write_bytes(finished[1])
+    (place / "tuned" / "tuning.sqlite").write_bytes(finished[1])
     return "tuned"
 
 
@@ -59,7 +60,7 @@ def test_the_tables_are_shown_and_fit(table):
 PICTURES = {f"{name}.{end}" for name in ("gains", "metric", "robust", "price") for end in ("svg", "png")}
 FILES = PICTURES | {
     "report.md", "schedule.toml", "schedule.csv", "robust.toml", "robust-cells.csv", "between.csv",
-    "price.csv", "tuning.jsonl", "drive.toml",
+    "price.csv", "tuning.sqlite", "drive.toml",
 }  # fmt: skip
 
 
@@ -107,21 +108,21 @@ def test_nothing_in_time_is_no_solution(run):
 def test_parts_of_another_drive_are_refused(place, begun, refused):
     before = {path.name: path.read_bytes() for path in (place / begun).iterdir()}
     said = refused(*RAMP, "--set", "damping=0.6", "--out", begun)
-    for words in ("--out", "tuning.jsonl", "another drive", "give another folder"):
+    for words in ("--out", "tuning.sqlite", "another drive", "give another folder"):
         assert words in said
     assert {path.name: path.read_bytes() for path in (place / begun).iterdir()} == before
 
 
 def test_an_interrupted_command_keeps_its_parts_and_goes_on(interrupted, place):
-    state = place / "tuned" / "tuning.jsonl"
+    state = place / "tuned" / "tuning.sqlite"
     err = interrupted(
         "tune", "--controller", "ramp", *SIXTY, "--gaps", "0.5:2:6", "--inertias", "2J1:5J1:6",
         "--no-optimum", "--workers", "2", "--out", "tuned",
-        begun=lambda: state.exists() and len(state.read_text("utf-8").splitlines()) > 2,
+        begun=lambda: len(parts_in(state)) > 1,
     )  # fmt: skip
-    assert "finished parts are kept in tuned/tuning.jsonl" in err
-    assert os.listdir(place / "tuned") == ["tuning.jsonl"]
-    kept = [json.loads(line) for line in state.read_text("utf-8").splitlines()[1:]]
+    assert "finished parts are kept in tuned/tuning.sqlite" in err
+    assert os.listdir(place / "tuned") == ["tuning.sqlite"]
+    kept = parts_in(state)
     assert {one["part"][0] for one in kept} == {"cell"}
     assert {tuple(one["part"][2:]) for one in kept} <= {(0,), (1,), (2,)}
 

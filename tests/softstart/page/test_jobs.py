@@ -1,4 +1,4 @@
-"""Jobs: a fair queue, progress, a cancel that stops, and no process that outlives its server."""
+"""Jobs: a queue, progress, a cancel that stops, and no process that outlives its server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 from tests.patience import patient
 
 from softstart import InputError
-from softstart.page.jobs import MISTAKE, MOST_WAITING, NICENESS, OUT_OF_MEMORY, Job, Jobs, State
+from softstart.page.jobs import MISTAKE, NICENESS, OUT_OF_MEMORY, Job, Jobs, State
 
 HERE = Path(__file__).parent
 
@@ -52,37 +52,42 @@ def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
         time.sleep(0.01)
 
 
-def test_fair_queue_in_processes_of_low_priority(jobs: Jobs, works: Any, tmp_path: Path) -> None:
-    """One user's queue of three does not keep the others waiting, and each job runs in its own process."""
+def over(*jobs: Job) -> bool:
+    until(lambda: all(job.state.over for job in jobs), 30.0)
+    return True
+
+
+def test_one_after_another_in_processes_of_low_priority(jobs: Jobs, works: Any, tmp_path: Path) -> None:
     log = str(tmp_path / "log")
-    begun = [jobs.begin(user, line, works.noted, log, line) for user, line in
-             (("A", "A1"), ("A", "A2"), ("A", "A3"), ("B", "B1"), ("C", "C1"), ("B", "B2"))]  # fmt: skip
-    assert begun[0].state is State.RUNNING
-    assert {job.title: job.ahead for job in begun[1:]} == {"B1": 0, "C1": 1, "A2": 2, "B2": 3, "A3": 4}
-    assert all(job.wait(30) for job in begun)
-    assert Path(log).read_text().split() == ["A1", "B1", "C1", "A2", "B2", "A3"]
+    begun = [
+        jobs.begin(user, line, works.noted, log, line) for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
+    ]
+    until(lambda: begun[0].state is not State.WAITING)
+    assert [job.ahead for job in begun] == [0, 0, 1]
+    assert over(*begun)
+    assert Path(log).read_text().split() == ["1", "2", "3"]
     for job in begun:
         assert (job.state, job.share, job.message) == (State.DONE, 1.0, "half of it")
         assert (job.parts, job.error) == ([job.title], "")
         pid, niceness, threads = job.result
         assert (pid, niceness, threads) == (job.pid, min(os.nice(0) + NICENESS, 19), "1")
         assert not alive(pid)
-    assert len({job.pid for job in begun} | {os.getpid()}) == 7
-    assert jobs.of("A") == []
+    assert len({job.pid for job in begun} | {os.getpid()}) == 4
 
 
-def test_two_users_at_once_one_job_each(works: Any, tmp_path: Path) -> None:
+def test_two_at_once_and_an_end_with_the_last_tab_and_the_server(works: Any, tmp_path: Path) -> None:
     jobs = Jobs(limit=2)
     try:
-        first, second = (jobs.begin("A", name, works.endless, str(tmp_path / name)) for name in "12")
-        other = jobs.begin("B", "3", works.endless, str(tmp_path / "3"))
-        assert [job.state for job in (first, second, other)] == [State.RUNNING, State.WAITING, State.RUNNING]
-        second.cancel()
-        assert (second.state, second.pid, second.seconds) == (State.CANCELLED, None, 0.0)
-        until((tmp_path / "3").exists)
-        until((tmp_path / "1").exists)
-        jobs.leave("A")
-        assert first.wait(patient(1.0))
+        jobs.enter("A", "tab")
+        first = jobs.begin("A", "1", works.endless, str(tmp_path / "1"))
+        other = jobs.begin("B", "2", works.endless, str(tmp_path / "2"))
+        waits = jobs.begin("A", "3", works.endless, str(tmp_path / "3"))
+        until(lambda: (tmp_path / "1").exists() and (tmp_path / "2").exists())
+        assert waits.state is State.WAITING
+        waits.cancel()
+        assert (waits.state, waits.pid, waits.seconds) == (State.CANCELLED, None, 0.0)
+        jobs.leave("A", "tab")
+        until(lambda: first.state.over, 1.0)
         assert (first.state, other.state) == (State.CANCELLED, State.RUNNING)
     finally:
         began = time.monotonic()
@@ -103,10 +108,10 @@ def test_cancel_ends_even_a_deaf_process_within_a_second(jobs: Jobs, works: Any,
     assert alive(other)
     os.kill(endless.pid, signal.SIGINT)  # Ctrl-C goes to all processes of a terminal
     began = time.monotonic()
-    assert not endless.wait(0.2)
+    time.sleep(0.2)
+    assert endless.state is State.RUNNING
     endless.cancel()
-    assert endless.stopping
-    assert endless.wait(patient(2.0))
+    until(lambda: endless.state.over, 2.0)
     assert time.monotonic() - began < patient(1.2)
     assert endless.state is State.CANCELLED
     assert not alive(own)
@@ -131,7 +136,7 @@ def test_failures_are_sentences(
 ) -> None:
     with caplog.at_level(logging.ERROR, "softstart.page"):
         job = jobs.begin("A", how, works.failing, how)
-        assert job.wait(20)
+        assert over(job)
     assert job.state is State.FAILED
     assert job.result is None
     if sentences is None:
@@ -151,29 +156,20 @@ def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
         assert jobs._spare is not None
         waiting = jobs._spare.pid
         job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
-        assert job.wait(20)
+        assert over(job)
         assert (job.pid, job.state) == (waiting, State.DONE)
         until(lambda: jobs._spare is not None)
         dead = jobs._spare.pid
         os.kill(dead, signal.SIGKILL)
         until(lambda: not alive(dead))
         again = jobs.begin("A", "again", works.noted, str(tmp_path / "log"), "again")
-        assert again.wait(20)
+        assert over(again)
         assert again.state is State.DONE
         until(lambda: jobs._spare is not None)
         last = jobs._spare.pid
     finally:
         jobs.end()
     assert not alive(last)
-
-
-def test_no_user_fills_the_queue(jobs: Jobs, works: Any, tmp_path: Path) -> None:
-    for k in range(MOST_WAITING + 1):
-        jobs.begin("A", "", works.endless, str(tmp_path / f"{k}"))
-    with pytest.raises(InputError, match="waiting already"):
-        jobs.begin("A", "", works.endless, str(tmp_path / "more"))
-    last: Job = jobs.begin("B", "", works.endless, str(tmp_path / "other"))
-    assert last.ahead == 0
 
 
 SERVER = """

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.kept import parts_in
 
 LONG = (
     "from softstart import sweep\n"
@@ -54,9 +55,10 @@ class Sweeping:
 
     @staticmethod
     def finished(folder: Path) -> dict[str, int]:
-        """The finished chunks, and when each was written."""
-        home = folder / "status" / "c"
-        return {str(path.relative_to(home)): path.stat().st_mtime_ns for path in home.rglob("*.sha256")}
+        """The files of the finished chunks, and when each was written."""
+        parts = parts_in(folder / "status" / "softstart.sqlite")
+        files = [name for one in parts if isinstance(one["part"], list) for name in one["files"]]
+        return {name: (folder / name).stat().st_mtime_ns for name in files if name.startswith("status/")}
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
         """Until so many chunks are finished."""

@@ -82,7 +82,7 @@ def test_an_interrupted_tuning_goes_on_to_the_same_bits(tmp_path):
             raise KeyboardInterrupt
 
     asked = {"gaps": ["1x", "2x"], "inertias": ["1x"], "free": ["time"], "robust": False, **QUICK}
-    file = tmp_path / "tuning.jsonl"
+    file = tmp_path / "tuning.sqlite"
     with pytest.raises(KeyboardInterrupt):
         tune(DAMPED, "s-curve", save_to=file, progress=stopped, **asked)
     again, whole = tune(DAMPED, "s-curve", save_to=file, **asked), tune(DAMPED, "s-curve", **asked)

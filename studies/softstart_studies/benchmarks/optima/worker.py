@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from softstart.processes import DiedError, Worker
+from softstart.parallel import DiedError, Worker
 from softstart_studies.benchmarks.host import bind_to_one_processor
 from softstart_studies.benchmarks.optima.entries import ENTRIES, solve
 from softstart_studies.benchmarks.optima.task import Answer, Task
@@ -97,7 +97,7 @@ def work_apart(name: str, task: Task, repetitions: int, options: Mapping[str, An
     except DiedError as death:
         return Work(None, f"its process ended: {death}")
     finally:
-        worker.end()
+        worker.kill()
 
 
 def _in_folder(folder: str, *arguments: Any) -> Work:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from softstart.errors import SimulationError
-from softstart.sweeping.store import SEAL
+from softstart.sweeping.results import STATUS
+from softstart.sweeping.store import LIST
 
 SOFTSTART = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
 GLANCE = 0.02  # s, between looks at the finished chunks
@@ -83,8 +85,14 @@ def begun(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def finished(results: Path) -> dict[str, int]:
-    """The finished chunks in a folder of results, and when each was written: those that have their seal."""
-    return {str(path.relative_to(results)): path.stat().st_mtime_ns for path in results.rglob(f"*{SEAL}")}
+    """The files of the finished chunks in a folder of results, and when each was written."""
+    try:
+        with closing(sqlite3.connect(f"file:{results / LIST}?immutable=1", uri=True)) as base:
+            records = [json.loads(text) for (text,) in base.execute("SELECT record FROM parts")]
+    except sqlite3.Error:  # it is being written
+        return {}
+    files = (name for one in records if isinstance(one.get("part"), list) for name in one["files"])
+    return {name: (results / name).stat().st_mtime_ns for name in files if name.startswith(STATUS)}
 
 
 def _last_words(child: subprocess.Popen[bytes]) -> str:

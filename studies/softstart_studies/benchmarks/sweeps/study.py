@@ -13,7 +13,6 @@ import numpy as np
 
 from softstart.errors import SimulationError
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
-from softstart.sweeping.store import open_folder
 from softstart.sweeping.summary import plan_of
 from softstart_studies.benchmarks.contenders import condition_table, version_of
 from softstart_studies.benchmarks.contest import rounded
@@ -138,18 +137,18 @@ class BenchmarkSweeps(Study):
         local = ("--workers", str(self.workers))
         progress(f"{self.task.size:,} starts on {self.workers} processes")
         whole = process.run(self._arguments(home / "whole", *local))
-        results = open_folder(home / "whole" / RESULTS)
+        results = xarray.open_zarr(home / "whole" / RESULTS, chunks=None)
         progress(f"{self.peer_starts} of them by LSODA")
         peer = _by_lsoda(results, self.peer_starts)
         progress("the same, killed twice")
         again, kept = self._killed(home / "killed", *local)
-        resumed = _same(results, open_folder(home / "killed" / RESULTS))
+        resumed = _same(results, xarray.open_zarr(home / "killed" / RESULTS, chunks=None))
         clustered: Ended | None = None
         on_cluster: bool | None = None
         if self.clustered and version_of("distributed") is not None:
             progress("the same on two dask workers, one of them killed")
             clustered = self._clustered(home)
-            on_cluster = _same(results, open_folder(home / "cluster" / RESULTS))
+            on_cluster = _same(results, xarray.open_zarr(home / "cluster" / RESULTS, chunks=None))
         elif self.clustered:
             progress("dask: not installed: pip install 'softstart[cluster]'")
         chunks = plan_of(results).chunks

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.processes import (
+from softstart.parallel import (
     DiedError,
     Pool,
     Progress,
@@ -35,9 +35,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are k
 def importable(monkeypatch: pytest.MonkeyPatch) -> Any:
     """This file as a module that workers can import too."""
     monkeypatch.syspath_prepend(str(HERE))
-    import test_processes
+    import test_parallel
 
-    return test_processes
+    return test_parallel
 
 
 def environment() -> tuple[str, int, int]:
@@ -115,7 +115,7 @@ def test_a_worker_runs_functions_one_after_another(importable: Any) -> None:
             ("progress", (0.5, "half of it")), ("part", [1, 2]), ("result", "done")
         ]  # fmt: skip
     finally:
-        worker.end()
+        worker.kill()
     assert not alive(pid)
     with pytest.raises(DiedError):
         worker.run(importable.printing, 4)
@@ -140,7 +140,7 @@ def test_what_goes_wrong_reaches_the_caller(importable: Any, kind: str, error: A
             assert len(caught.value.sentences) == 2
             assert "Traceback" in "".join(caught.value.__notes__)
     finally:
-        worker.end()
+        worker.kill()
 
 
 def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> N
     until(lambda: file.exists() and " " in file.read_text())
     pids = [int(word) for word in file.read_text().split()]
     began = time.monotonic()
-    worker.end()
+    worker.kill()
     assert time.monotonic() - began < patient(1.0)
     until(lambda: not any(map(alive, pids)), 1.0)
 
@@ -157,10 +157,10 @@ def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> N
 PARENT = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-import test_processes
-from softstart.processes import Worker
+import test_parallel
+from softstart.parallel import Worker
 worker = Worker()
-worker.submit(test_processes.sleeping, sys.argv[2])
+worker.submit(test_parallel.sleeping, sys.argv[2])
 time.sleep(60)
 """
 
