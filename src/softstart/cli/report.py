@@ -29,11 +29,9 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.views.terminal import present, print_lines, sentence
+from softstart.views.terminal import console, print_json, print_lines, sentence
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from softstart import reporting
     from softstart.identification.result import Identification
     from softstart.views import starts
@@ -138,7 +136,12 @@ def report(
             printed = _printed(page, browser)
         write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
     written = " and ".join(path for path in (out, pdf) if path is not None)
-    present(made.summary, lambda to: _show(to, made), as_json, written or None)
+    if as_json:
+        print_json(made.summary())
+        return
+    _show(made)
+    if written:
+        print(f"\nWritten to {written}.")
 
 
 def _made(
@@ -222,7 +225,8 @@ def _printed(page: str, browser: str) -> bytes:
         return target.read_bytes()
 
 
-def _show(to: Console, made: reporting.Report) -> None:
+def _show(made: reporting.Report) -> None:
+    to = console()
     print_lines(to, starts.machine_lines(made.drive))
     to.print()
     sentence(to, made.answer, "bold")

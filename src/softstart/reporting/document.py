@@ -23,7 +23,7 @@ from softstart.reporting.result import Report
 from softstart.start import fatigue
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
-from softstart.views import chain_schemes, chains, drives, printed, starts
+from softstart.views import chains, drives, printed, starts
 from softstart.views import fatigue as lives
 from softstart.views.drawing import drawing
 from softstart.views.numbers import Column, Table
@@ -175,8 +175,7 @@ def document(report: Report) -> str:
         "natural_vibration": natural_vibration,
         "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
         "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
-        "chain_scheme": lambda: in_page(chain_schemes.scheme_svg(drive)), "at_output": at_output,
-        "best_start": best_start, "figures": figures, "starts": starts, "chains": chains, "lives": lives,
+        "at_output": at_output, "best_start": best_start, "figures": figures, "starts": starts, "chains": chains, "lives": lives,
         "output": "|#at the output, N m" if drive.gear_ratio else "", "strategies": strategies,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
         "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
