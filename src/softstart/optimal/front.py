@@ -422,15 +422,17 @@ def _swept(
         yield point
     missing = [t for t in times if t not in known]
     if workers == 1:
-        near: TorqueProfile | None = None
         too_short = next((one for one in known.values() if one.status == "INFEASIBLE"), None)
         for number, t in enumerate(missing, start=1):
             _tell(progress, f"start time {number} of {len(missing)}: {t:.5g} s, {terminal}")
             if too_short is not None and t < too_short.start_time_bound:
                 point = too_short.for_shorter(t)
             else:
+                longer = {time: one for time, one in known.items() if one.found and time > t}
+                last = longer[min(longer)] if longer else None
+                near = None if last is None else TorqueProfile(last.time, last.torque)
                 (point,) = computed(Stretch(drive, options, terminal, (t,), near))
-            near = TorqueProfile(point.time, point.torque) if point.found else near
+            known[t] = point
             too_short = point if point.status == "INFEASIBLE" else too_short
             if point.status != "NOT_FOUND":  # another attempt may find it
                 saved.add(point.record())
