@@ -79,14 +79,14 @@ def tuned(place: Path) -> Answer:
         "population": 8,
         "restarts": 3,
     }
-    found = tune(CRANE, "reduced-first-stage", ["1x"], ["1x", "2x"], save_to=place / "a.jsonl", **options)
+    found = tune(CRANE, "reduced-first-stage", ["1x"], ["1x", "2x"], save_to=place / "a.sqlite", **options)
     return {"numbers": repr({**found.summary(), "seconds": 0, "starts": 0}), "computed": found.starts}
 
 
 def limited(place: Path) -> Answer:
     """The limit curve in `place`."""
     times = [0.2, 0.2883042, 0.31, 0.33]
-    found = pareto(CRANE, times, terminal="synchronous", controllers=["direct"], save_to=place / "a.jsonl")
+    found = pareto(CRANE, times, terminal="synchronous", controllers=["direct"], save_to=place / "a.sqlite")
     points = [{**point.summary(), "seconds": 0} for point in found.points]
     return {"numbers": repr((points, [one.summary() for one in found.controllers])), "computed": 0}
 
@@ -132,14 +132,6 @@ def exchanged(file: Path, chance: random.Random) -> None:
         other.write_bytes(content)
 
 
-def shuffled(file: Path, chance: random.Random) -> None:
-    """Lines in another order, one twice."""
-    lines = file.read_bytes().splitlines(keepends=True)
-    head, rest = lines[:1], lines[1:]
-    chance.shuffle(rest)
-    file.write_bytes(b"".join([*head, *rest, *rest[:1]]))
-
-
 def replaced(file: Path, chance: random.Random) -> None:
     """Something that is no file."""
     file.unlink()
@@ -173,7 +165,7 @@ def sealed_off(file: Path, chance: random.Random) -> None:
 
 DAMAGES: dict[Callable[..., None], int] = {
     flipped: 6, cut: 2, removed: 2, exchanged: 3, foreign: 2, replaced: 2, lengthened: 1, blanked: 2,
-    shuffled: 1, sealed_off: 1,
+    sealed_off: 1,
 }  # fmt: skip
 
 
@@ -226,9 +218,6 @@ def damaged(
         place, work = home / kind, KINDS[kind]
         shutil.rmtree(place / "store", ignore_errors=True)
         shutil.copytree(place / "pristine", place / "store")
-        (place / "store" / f".a.{'zarr' if kind == 'sweep' else 'jsonl'}.lock").write_bytes(
-            chance.randbytes(9)
-        )
         file = chance.choice(sorted(one for one in (place / "store").rglob("*") if one.is_file()))
         damage = chance.choices(list(DAMAGES), list(DAMAGES.values()))[0]
         what = f"damage {number}, {kind}: {file.relative_to(place / 'store')} {damage.__name__}"
@@ -268,9 +257,9 @@ def damaged(
 
 
 def leftovers(place: Path) -> list[str]:
-    """Locks, temporary files and folders below."""
+    """Temporary files and folders below."""
     found = (str(one.relative_to(place)) for one in place.rglob("*"))
-    return [one for one in found if one.endswith((".lock", ".part", ".partial"))]
+    return [one for one in found if one.endswith((".part", ".partial", "-journal"))]
 
 
 # kills --------------------------------------------------------------------------------------------------

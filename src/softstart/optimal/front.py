@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
@@ -321,7 +321,7 @@ def pareto(
                 Stretch(drive, options, ending, tuple(sorted(asked, reverse=True))), known, pool, tell
             ):
                 t = point.start_time_bound
-                if t not in known and point.status != "NOT_FOUND":  # another attempt may find it
+                if point is not known.get(t) and point.status != "NOT_FOUND":  # another attempt may find it
                     saved.add(asdict(point))
                 if each is not None and t not in points:
                     each(point)
@@ -365,7 +365,6 @@ class Stretch(NamedTuple):
     options: dict[str, Any]
     terminal: Terminal
     start_times: tuple[float, ...] = ()
-    too_short: FrontPoint | None = None  # known to be infeasible, and all shorter ones
 
     def __str__(self) -> str:
         return f"the optima for start times of {self.start_times[-1]:.5g} s to {self.start_times[0]:.5g} s"
@@ -386,20 +385,29 @@ class Stretch(NamedTuple):
             return FrontPoint(start_time, self.terminal, "NOT_FOUND", str(error))
 
 
-def computed(asked: Stretch, tell: Progress = lambda doing: None) -> Iterator[FrontPoint]:
-    """The points of a stretch; a better one comes again. What is infeasible makes all shorter ones so.
+def computed(
+    asked: Stretch, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None
+) -> Iterator[FrontPoint]:
+    """The points of a stretch but those that are known; a better one comes again.
+
+    What is infeasible makes all shorter ones so.
 
     Most are followed from their neighbour. The first, the last and every few are searched from all first
     demands; what that finds is followed back to longer start times as long as it is better there.
     """
     found: list[FrontPoint] = []
-    too_short, count = asked.too_short, len(asked.start_times)
+    too_short: FrontPoint | None = None
+    count = len(asked.start_times)
     for number, t in enumerate(asked.start_times):
+        if t in known:
+            too_short = known[t] if known[t].status == "INFEASIBLE" else too_short
+            found += [known[t]] if known[t].found else []
+            continue
         tell(f"start time {number + 1} of {count}: {t:.5g} s, {asked.terminal}")
         if too_short is not None and t < too_short.start_time_bound:
             shortest = too_short.shortest_start_time
-            known = "" if shortest is None else f"; the shortest found is {shortest:.6g} s"
-            reason = f"A start time of {t:.6g} s is too short ({asked.terminal}){known}."
+            least = "" if shortest is None else f"; the shortest found is {shortest:.6g} s"
+            reason = f"A start time of {t:.6g} s is too short ({asked.terminal}){least}."
             yield replace(too_short, start_time_bound=t, status_text=reason)
             continue
         searched = number % SEARCHED == 0 or number == count - 1
@@ -426,7 +434,7 @@ def computed(asked: Stretch, tell: Progress = lambda doing: None) -> Iterator[Fr
 
 
 def _listed(asked: Stretch) -> list[FrontPoint]:
-    return list(computed(asked))  # a generator does not leave its process
+    return list(computed(asked, {}))  # a generator does not leave its process
 
 
 def _points(
@@ -434,11 +442,10 @@ def _points(
 ) -> Iterator[FrontPoint]:
     """The points kept before, then the others; stretches of them by several workers."""
     yield from sorted(known.values(), key=lambda one: -one.start_time_bound)
-    missing = tuple(t for t in asked.start_times if t not in known)
-    if pool.alone:
-        too_short = next((one for one in known.values() if one.status == "INFEASIBLE"), None)
-        yield from computed(asked._replace(start_times=missing, too_short=too_short), tell)
+    if pool.count == 1 and pool.scheduler is None:
+        yield from computed(asked, known, tell)
         return
+    missing = tuple(t for t in asked.start_times if t not in known)
     size = max(1, math.ceil(len(missing) / (CHUNKS * pool.count)))
     parts = [asked._replace(start_times=missing[i : i + size]) for i in range(0, len(missing), size)]
     for part, points in pool.results(_listed, parts):
