@@ -52,7 +52,6 @@ from softstart.profile import TorqueProfile
 
 KNOTS = 14  # in an elastic period
 MOST_KNOTS = 160  # even ones
-APART = 0.4  # of the distance of even knots, which keep so far from those of a demand
 INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY, DEAR, DEAREST = 20.0, 2e3, 1e5  # of what is missed, as shares, beside the objective as a share
 FIRST_TRUST, MOST_TRUST, LEAST_TRUST = 0.1, 0.5, 1e-4  # of the highest torque
@@ -117,6 +116,7 @@ class Descent:
         stiff = self.players[0].mean_torque(self.latest) / problem.starting_torque
         self.scale = self.base if problem.minimise == "k_dyn" else stiff * stiff * self.latest
         self.penalty, self.fine = PENALTY, 1e-5
+        self.apart = 1e-3  # of the distance of even knots, which keep so far from those of a demand
         count = min(max(math.ceil(KNOTS * self.until / self.period), 24), MOST_KNOTS)
         self.even = np.linspace(0.0, self.until, count + 1)
         self.time = self.even
@@ -128,7 +128,7 @@ class Descent:
         """Take the knots of a demand, and even ones not near to them, as the grid; its torques there."""
         keep = profile.time < self.until
         when = profile.time[keep]
-        far = np.abs(self.even[:, None] - when).min(axis=1, initial=math.inf) > APART * self.even[1]
+        far = np.abs(self.even[:, None] - when).min(axis=1, initial=math.inf) > self.apart * self.even[1]
         far[-1] = True
         far[0] = when.size == 0 or when[0] > 0.0
         new = self.even[far]
@@ -254,16 +254,14 @@ class Descent:
     # descents ----------------------------------------------------------------------------------------------
 
     def down(
-        self, profile: TorqueProfile, end: float, steps: int = STEPS, least: float = 1e-4, dear: bool = True
+        self, profile: TorqueProfile, end: float, steps: int = STEPS, least: float = 1e-4
     ) -> Found | None:
         """Down from a first demand, until a program promises less than the share `least`.
 
         Where a condition is missed after all steps, missing it costs more: near the shortest start time.
         """
         found = self._down(self.onto(profile), end, steps, least)
-        while (
-            found is not None and dear and steps == STEPS and found.missed > MISSED and self.penalty < DEAREST
-        ):
+        while found is not None and steps == STEPS and found.missed > MISSED and self.penalty < DEAREST:
             self.penalty *= 10.0
             found = self._down(found.torques, found.end, steps, least)
         self.penalty = PENALTY
@@ -322,7 +320,7 @@ class Descent:
             down = self.down(demand, self.latest, TASTE, 1e-3)
             if down is not None and down.merit < HOPEFUL * found.merit:
                 down = self._down(down.torques, down.end, STEPS, 1e-3)
-            if down is not None and down.missed <= max(MISSED, found.missed) and down.merit < found.merit:
+            if down is not None and down.missed <= MISSED and down.merit < found.merit:
                 found = down
             else:
                 self.time = kept

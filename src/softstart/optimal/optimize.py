@@ -45,15 +45,15 @@ FIRST, BESIDE, FINISHED = (
     2,
 )  # first demands that are followed a few steps, beside a known one, to the end
 DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
-TRIES, FEW = 8, 4  # starts around one, where one torque serves several machines; the same in between
+TRIES = 1500  # knots in all starts around one, where one torque serves several machines
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 MOST_TRIALS = 24
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
+APART = 0.4  # of the distance of even knots, which keep so far from those of an answer that is followed
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
-NEARLY = 0.05  # by which share conditions are missed by an answer that is only a first demand
 TIGHT = 1e-5  # a bound within this share needs no other one
 
 
@@ -223,6 +223,7 @@ def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> O
 def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float) -> Optimum | None:
     """The local optimum below the answer for a start time close by, as it is or scaled in time, if any."""
     search, firsts = Descent(problem), []
+    search.apart = APART
     for share in (1.0, scale):
         demand = TorqueProfile(near.time * share, near.torque)
         start = search.play(search.onto(demand), search.latest)
@@ -271,7 +272,8 @@ def searched(
     several = len(problem.machines) > 1
     if near is None and not quick:
         for like in _easier(problem):
-            near = _roughly(like, near)
+            known = searched(like, near, quick=True)
+            near = near if known is None or known[1].missed > MISSED else known[2]
     firsts = _first_demands(search, near)
     if problem.terminal != "reached":  # begin with an easier end
         easier = Descent(replace(problem, terminal="reached"), search.players)
@@ -284,7 +286,7 @@ def searched(
             continue
         merits.append(found.merit)
         if several and len(merits) == 1 and found.missed <= MISSED:
-            found = search.around(found, TRIES)
+            found = search.around(found, max(TRIES // search.even.size, 4))
         found = found if quick else search.finished(search.refined(found))
         if found is not None:
             done.append((name, found, TorqueProfile(search.time, found.torques).simplified()))
@@ -307,18 +309,6 @@ def _easier(problem: Problem) -> Iterator[Problem]:
         base = problem.base or problem.drive
         for ratio in DAMPED:
             yield replace(problem, drive=problem.drive.with_damping_ratio(ratio), base=base)
-
-
-def _roughly(problem: Problem, near: TorqueProfile | None) -> TorqueProfile | None:
-    """A local optimum that misses its conditions by little, quickly found; `near` if there is none."""
-    search = Descent(problem)
-    for _, demand in _tasted(search, _first_demands(search, near))[:1]:
-        found = search.down(demand, search.latest, least=1e-3, dear=False)
-        if found is not None and len(problem.machines) > 1:
-            found = search.around(found, FEW)
-        if found is not None and found.missed < NEARLY:
-            return TorqueProfile(search.time, found.torques).simplified()
-    return near
 
 
 def _tasted(search: Descent, firsts: list[tuple[str, TorqueProfile]]) -> list[tuple[str, TorqueProfile]]:

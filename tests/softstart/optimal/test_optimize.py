@@ -271,7 +271,7 @@ def test_no_perturbed_profile_is_better() -> None:
     until = best.end_time + float(drive.elastic_period)
     grid, kept_in_time = np.linspace(0.0, until, 601), 0
     edges = np.union1d(grid, best.profile.time[best.profile.time <= until])
-    level = best.profile.at(edges[:-1])
+    level = best.profile.at(0.5 * (edges[:-1] + edges[1:]))
     for _ in range(600):
         extra = np.zeros(600)
         for sign in (1.0, -1.0):
