@@ -253,6 +253,7 @@ def test_a_report_on_an_identification_has_its_intervals(found: Identification) 
     assert row is not None
     lower, upper = row.intervals["k_dyn"]
     text = made.to_html()
-    assert f"({lower:.3f} to {upper:.3f})" in text
+    assert f">{lower:.3f}<" in text
+    assert f">{upper:.3f}<" in text
     assert "drives that the logs leave possible" in text
     assert made.summary()["strategies"][0]["k_dyn_upper"] == made.comparison.rows[0].intervals["k_dyn"][1]

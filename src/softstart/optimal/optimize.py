@@ -45,7 +45,7 @@ FIRST, BESIDE, FINISHED = (
     2,
 )  # first demands that are followed a few steps, beside a known one, to the end
 DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
-TRIES = 1500  # knots in all starts around one, where one torque serves several machines
+TRIES, MANY = 1500, 100  # with several machines: knots in all starts around one; even knots of a long start
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
@@ -270,7 +270,8 @@ def searched(
     """
     search = Descent(problem)
     several = len(problem.machines) > 1
-    if near is None and not quick:
+    long = several and search.even.size > MANY
+    if near is None and not quick and not long:
         for like in _easier(problem):
             known = searched(like, near, quick=True)
             near = near if known is None or known[1].missed > MISSED else known[2]
@@ -280,7 +281,7 @@ def searched(
         direct = firsts if problem.terminal == "steady" else firsts[:FINISHED]
         firsts = [*_tasted(easier, firsts)[:FINISHED], *direct]
     done, merits = [], list[float]()
-    for name, demand in _tasted(search, firsts)[:FINISHED]:
+    for name, demand in _tasted(search, firsts)[: 1 if long else FINISHED]:
         found = search.down(demand, search.latest)
         if found is None or any(abs(found.merit - one) < ALIKE * one for one in merits):
             continue

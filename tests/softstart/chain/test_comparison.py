@@ -116,7 +116,7 @@ def test_the_commands_take_chains(tmp_path, capsys):
     assert chain.shafts[0].damping_ratio == 0.02
     for row in found["strategies"]:
         assert row["k_dyn"] == simulate(chain, row["controller"]).k_dyn
-    assert "K_dyn" in (out / "report.md").read_text(encoding="utf-8")
+    assert "K\\_dyn" in (out / "report.md").read_text(encoding="utf-8")
     assert main(["simulate", str(out / "chain.toml"), "--controller", "ramp", "--json"]) == 0
     alone = json.loads(capsys.readouterr().out)
     assert alone["k_dyns"] == found["strategies"][1]["k_dyns"]

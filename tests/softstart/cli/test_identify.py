@@ -38,9 +38,9 @@ def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        (["identify", "--drive", "crane-4amtkf"], "LOG... is missing"),
-        (["identify", "a.csv"], "--drive GUESS is missing"),
-        (["plan"], "DRIVE is missing"),
+        (["identify", "--drive", "crane-4amtkf"], "Missing argument 'LOG...'"),
+        (["identify", "a.csv"], "Missing option '--drive'"),
+        (["plan"], "Missing argument 'DRIVE'"),
         (["identify", "nowhere.csv", "--drive", "crane-4amtkf"], "there is no such file"),
         (
             ["identify", "a.csv", "--drive", "crane-4amtkf", "--torque-is", "guess"],

@@ -56,7 +56,7 @@ def test_a_controller_of_ones_own(run):
     ("arguments", "words"),
     [
         (("linear", "--controller", "rampp"), "did you mean ramp?"),
-        (("linear",), "--controller NAME is missing"),
+        (("linear",), "Missing option '--controller'"),
         (("linear", "list.toml", "--controller", "ramp"), "a drive has one value"),
         ((*LOOP, "--param", "dampng=1"), "no such parameter"),
         (("linear", "nosuch.toml", "--controller", "rampp", "--param", "x"), "write a key"),

@@ -137,7 +137,7 @@ def test_an_interrupted_command_says_how_to_go_on(interrupted, place, as_json):
 
 GAP = ("--axis", "shaft.gap=0.5,1")
 ONE_SENTENCE = {
-    "no axis": (("--controller", "ramp"), ["--axis KEY=VALUES is missing"]),
+    "no axis": (("--controller", "ramp"), ["Missing option '--axis'"]),
     "no controller": (GAP, ["--controller = None: name a"]),
     "controller": ((*GAP, "--controller", "rmp"), ["--controller", "did you mean ramp?"]),
     "controller of the axis": (

@@ -34,7 +34,7 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
         assert re.findall(r">([\d.]+)<", row[3]) == [f"{k:.3f}" for k in run.shaft_factors]
     for name in CHAIN.shaft_names:
         assert name in page
-    assert page.count("<figure>") == 7
+    assert page.count("<figure>") == 6
 
 
 def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made):
