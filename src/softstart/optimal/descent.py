@@ -51,7 +51,9 @@ from softstart.optimal.starts import Played, Player, carried, wanted
 from softstart.profile import TorqueProfile
 
 KNOTS = 14  # in an elastic period
-MOST_KNOTS = 160  # even ones
+MOST_KNOTS, MANY = 160, 100  # even ones; of a long start
+APART = 0.4  # of their distance, which they keep from knots that are known, so that these do not add up
+BEND = 1e-3  # of the largest torque: what is kept of the knots of an answer
 INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY, DEAR, DEAREST = 20.0, 2e3, 1e5  # of what is missed, as shares, beside the objective as a share
 FIRST_TRUST, MOST_TRUST, LEAST_TRUST = 0.1, 0.5, 1e-4  # of the highest torque
@@ -307,16 +309,18 @@ class Descent:
         It begins at the best so far each time; the random numbers are the same each time.
         """
         rng = np.random.default_rng(1)
+        apart = self.apart
         for number in range(tries):
-            known = TorqueProfile(self.time, found.torques).simplified(1e-9)
+            kept, many = self.time, self.even.size > MANY  # else the knots of a long start double each time
+            self.apart = APART if many else apart
+            known = TorqueProfile(self.time, found.torques).simplified(BEND if many else 1e-9)
             if number % 2 == 0:
                 demand = TorqueProfile(known.time * rng.uniform(1.0 - STRETCH, 1.0 + STRETCH), known.torque)
             else:
-                time = np.union1d(known.time, self.even)
+                torques = self.onto(known)
                 bumps = rng.normal(0.0, HEIGHT * self.high, BUMPS)
-                torque = known.at(time) + np.interp(time, np.linspace(0.0, self.until, BUMPS), bumps)
-                demand = TorqueProfile(time, np.clip(torque, self.low, self.high))
-            kept = self.time
+                torques += np.interp(self.time, np.linspace(0.0, self.until, BUMPS), bumps)
+                demand = TorqueProfile(self.time, np.clip(torques, self.low, self.high))
             down = self.down(demand, self.latest, TASTE, 1e-3)
             if down is not None and down.merit < HOPEFUL * found.merit:
                 down = self._down(down.torques, down.end, STEPS, 1e-3)
@@ -324,6 +328,7 @@ class Descent:
                 found = down
             else:
                 self.time = kept
+        self.apart = apart
         return found
 
     def _down(self, torques: Vector, end: float, steps: int, least: float) -> Found | None:

@@ -18,6 +18,7 @@ from softstart.controller import Controller, make_controller, ready_controller_n
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
+from softstart.optimal.descent import BEND
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
@@ -36,7 +37,6 @@ SHORT, LONG, COUNT = 1.02, 1.6, 12
 CHUNKS = 2  # stretches of start times for each worker
 SEARCHED = 10  # of so many points one is searched from all first demands
 JUMP = 0.1  # per cent, of the gap between K_dyn and its bound: searched again
-BEND = 1e-3  # of the largest torque: what is kept of the profile of a neighbour
 BETTER = 1e-4  # of K_dyn: a better start is followed back to longer start times
 COLUMNS = (
     "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind", "gap_percent",

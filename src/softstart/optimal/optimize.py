@@ -19,7 +19,7 @@ from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
 from softstart.optimal.check import check, replayed
-from softstart.optimal.descent import MISSED, TASTE, Descent, Found
+from softstart.optimal.descent import APART, MANY, MISSED, TASTE, Descent, Found
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
     InfeasibleError,
@@ -45,14 +45,13 @@ FIRST, BESIDE, FINISHED = (
     2,
 )  # first demands that are followed a few steps, beside a known one, to the end
 DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
-TRIES, MANY = 1500, 100  # with several machines: knots in all starts around one; even knots of a long start
+TRIES = 1500  # knots in all starts around one, where one torque serves several machines
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 MOST_TRIALS = 24
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
-APART = 0.4  # of the distance of even knots, which keep so far from those of an answer that is followed
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
 TIGHT = 1e-5  # a bound within this share needs no other one
 

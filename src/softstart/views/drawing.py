@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,6 +48,7 @@ Box = tuple[float, float, float, float]  # left, bottom, right, top in pixels
 Pixels = NDArray[np.float64]  # x, y
 Named = tuple[str, float, float, Pixels]
 
+LETTERS = 12.0  # of a title, in an inch
 LABEL_SIZE = 8.0  # of the letters, points
 FAR = 14.0  # points between a label and its point from which on a thin line joins them
 SAME = 4.0  # pixels between points that are one to the eye
@@ -98,7 +100,9 @@ def save_figure(figure: mpl_figure.Figure, folder: Path, stem: str) -> list[Path
 
 
 def entitle(figure: Figure, text: str) -> None:
-    """A title over all panels, on the left."""
+    """A title over all panels, on the left; wrapped where the figure is narrow."""
+    width = int(figure.get_figwidth() * LETTERS)
+    text = "\n".join(fill(line, width) for line in text.split("\n"))
     figure.suptitle(text, x=0.01, ha="left", fontsize=11)
 
 
@@ -180,7 +184,8 @@ def heat_map(
         fit_axis(axes, "y", y)
         _contours(axes, np.asarray(x), np.asarray(y), values, margins)
         return drawn
-    drawn = axes.pcolormesh(range(len(x)), range(len(y)), values, **colours)
+    edges = [np.arange(len(one) + 1) - 0.5 for one in (x, y)]
+    drawn = axes.pcolormesh(*edges, values, **(colours | {"shading": "flat"}))
     for (i, j), value in np.ndenumerate(values):
         text, light = (f"{value:.{decimals}f}", scale(value)) if math.isfinite(value) else ("-", 1.0)
         colour = "#000000" if light > LIGHT else "#FFFFFF"

@@ -205,7 +205,7 @@ def plan_figure(plan: Plan) -> Any:
 def wear_conclusion(wear: Wear) -> list[str]:
     """How fast the gap grows, and when it reaches its limit."""
     growth, lower, upper = wear.line.growth
-    said = [f"The gap grows by {growth:.3g} rad a year ({lower:.3g} to {upper:.3g})."]
+    said = [f"Growth of the gap: {growth:.3g} rad a year ({lower:.3g} to {upper:.3g})."]
     if wear.limit is None or wear.worn is None:
         return said
     reached, earliest, latest = wear.worn

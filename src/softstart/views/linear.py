@@ -67,7 +67,8 @@ def margin_rows(view: LinearView, m: Margins) -> list[tuple[str, str]]:
         ("loop is at -180 degrees at", _frequencies(m.phase_crossovers)),
         *([("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}")]
           if mode is not None else []),
-        *([("linear against exact", f"{100.0 * point.mismatch:.2g} % at most")] if point is not None else []),
+        *([("linear against exact", f"{float(f'{100.0 * point.mismatch:.2g}'):g} % at most")]
+          if point is not None else []),
     ]  # fmt: skip
 
 

@@ -232,7 +232,7 @@ def _twists(axes: Axes, run: Run) -> None:
         for (name, line), gap, twist in zip(_shafts(run), gaps, twists, strict=True):
             if gap > 0.0:
                 axes.plot(run.t, 2.0 * twist / gap, label=name, **line)
-        flanks, title, unit = 1.0, "twist over half the gap, flanks dashed", "1"
+        flanks, title, unit = 1.0, "twist over half the gap, flanks dashed", "half gaps"
     for flank in (flanks, -flanks):
         axes.axhline(flank, color="#444444", lw=0.8, ls="--")
     head(axes, title, unit)
@@ -286,10 +286,9 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
 
 
 def _strategy(run: Run) -> str:
-    """The strategy of a start and its parameters."""
+    """The strategy of a start and its parameters, with all digits."""
     assert run.controller is not None
-    given = run.controller.parameters.items()
-    values = ", ".join(f"{key} = {short(v) if isinstance(v, float) else v}" for key, v in given)
+    values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
     return f"{run.controller_name}{' (' + values + ')' if values else ''}"
 
 
@@ -533,7 +532,8 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         stems.append(stem := file_stem(run.controller_name, stems))
         figures[f"run-{stem}"] = run.plot
         files[f"trace-{stem}.csv"] = run.to_csv
-        behind.append(f"### {markdown(stem)}\n\n{markdown(_strategy(run))}\n\n![{stem}](run-{stem}.svg)")
+        about = ". ".join(filter(None, [type(run.controller).summary, _strategy(run)]))
+        behind.append(f"### {markdown(stem)}\n\n{markdown(about)}\n\n![{stem}](run-{stem}.svg)")
     return Sheet(
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),

@@ -194,7 +194,7 @@ def _tables(results: xarray.Dataset, summary: Summary) -> list[Table]:
     """The grid, the figures over all starts, and the starts where they are few."""
     axes = [
         [name, f"{one['count']:,}", *(f"{one[end]:.6g}" if end in one else NOTHING for end in ("from", "to")),
-         one["unit"] or ", ".join(one.get("values", ()))]
+         one["unit"].replace("*", " ") or ", ".join(one.get("values", ()))]
         for name, one in axis_summary(results).items()
     ]  # fmt: skip
     spreads = [

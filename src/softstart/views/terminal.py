@@ -152,7 +152,8 @@ def print_figures(to: rich_console.Console, rows: Sequence[Sequence[str]]) -> No
 
 def print_conclusion(to: rich_console.Console, found: Sequence[str], notes: Sequence[str]) -> None:
     """What came out, and below it the notes."""
-    to.print()
+    if found or notes:
+        to.print()
     for text in found:
         sentence(to, text, "bold")
     for note in notes:

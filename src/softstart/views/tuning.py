@@ -96,7 +96,7 @@ def question(tuning: Tuning) -> str:
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
         f"{tuning.controller}: {_metric(tuning)} minimised, start time {q.bound.text()}, "
-        f"{len(q.gaps)} gaps x {len(q.load_inertias)} load inertias{over}. Tuned: "
+        f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
         f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
     )
 
@@ -228,7 +228,7 @@ def notes(tuning: Tuning) -> list[str]:
             f"At the output shaft, ratio {short(float(drive.gear_ratio))}, without losses: gaps {gaps} rad, "
             f"load inertias {inertias} kg m2; a torque there is the ratio times that at the motor."
         )
-    return [*found, f"{tuning.starts:,} starts."]
+    return [*found, *([f"{tuning.starts:,} starts."] if tuning.starts else [])]
 
 
 def tuning_sheet(tuning: Tuning) -> Sheet:

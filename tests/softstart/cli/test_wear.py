@@ -159,7 +159,7 @@ def test_the_command_reads_folders_and_writes_a_report(
     line = ["wear", str(tmp_path / "2024"), str(tmp_path / "2026"), "--controllers", "direct"]
     result = run(*line, "--worn-gap", "0.2 rad", "--out", str(tmp_path / "worn"))
     assert result.code == 0, result.err
-    assert "The gap grows by 0.01 rad a year" in result.out
+    assert "Growth of the gap: 0.01 rad a year" in result.out
     assert "It reaches 0.2 rad on 2036-0" in " ".join(result.out.split())
     assert {"report.md", "wear.csv", "wear.svg"} <= {path.name for path in (tmp_path / "worn").iterdir()}
     data = as_json(*line)
