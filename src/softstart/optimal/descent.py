@@ -51,7 +51,7 @@ from softstart.optimal.starts import Played, Player, carried, wanted
 from softstart.profile import TorqueProfile
 
 KNOTS = 14  # in an elastic period
-MOST_KNOTS, MANY = 160, 100  # even ones; of a long start
+MOST_KNOTS, MANY = 160, 150  # even ones; of a long start
 APART = 0.4  # of their distance, which they keep from knots that are known, so that these do not add up
 BEND = 1e-3  # of the largest torque: what is kept of the knots of an answer
 INSTANTS = 32  # of the fastest period, at which torques are limited
@@ -317,10 +317,10 @@ class Descent:
             if number % 2 == 0:
                 demand = TorqueProfile(known.time * rng.uniform(1.0 - STRETCH, 1.0 + STRETCH), known.torque)
             else:
-                torques = self.onto(known)
+                time = np.union1d(known.time, self.even)
                 bumps = rng.normal(0.0, HEIGHT * self.high, BUMPS)
-                torques += np.interp(self.time, np.linspace(0.0, self.until, BUMPS), bumps)
-                demand = TorqueProfile(self.time, np.clip(torques, self.low, self.high))
+                torque = known.at(time) + np.interp(time, np.linspace(0.0, self.until, BUMPS), bumps)
+                demand = TorqueProfile(time, np.clip(torque, self.low, self.high))
             down = self.down(demand, self.latest, TASTE, 1e-3)
             if down is not None and down.merit < HOPEFUL * found.merit:
                 down = self._down(down.torques, down.end, STEPS, 1e-3)

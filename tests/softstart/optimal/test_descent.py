@@ -206,16 +206,6 @@ def test_the_first_demands() -> None:
     assert seeds.pulse_coast_hold(Descent(replace(problem, start_time=0.2)), player) is None
 
 
-@pytest.mark.slow
-def test_a_global_search_is_in_time_and_repeatable() -> None:
-    search = Descent(Problem(CRANE, 0.3, "reached"))
-    one, two = seeds.staircase(search), seeds.staircase(search)
-    np.testing.assert_array_equal(one.torque, two.torque)
-    peak, time, _ = search.players[0].figures(one, search.until)
-    assert time <= 0.3 * (1.0 + 1e-3)
-    assert peak / search.base < 1.1
-
-
 # the programs -----------------------------------------------------------------------------------------------
 
 
