@@ -48,7 +48,7 @@ Box = tuple[float, float, float, float]  # left, bottom, right, top in pixels
 Pixels = NDArray[np.float64]  # x, y
 Named = tuple[str, float, float, Pixels]
 
-LETTERS = 12.0  # of a title, in an inch
+LETTERS = 11.0  # of a title, in an inch
 LABEL_SIZE = 8.0  # of the letters, points
 FAR = 14.0  # points between a label and its point from which on a thin line joins them
 SAME = 4.0  # pixels between points that are one to the eye

@@ -282,14 +282,25 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         },
         machine=run.drive,
         fitted_to=fitted_to,
+        behind=["## The strategy", _all_digits(run)],
     )
 
 
 def _strategy(run: Run) -> str:
-    """The strategy of a start and its parameters, with all digits."""
+    """The strategy of a start and its parameters, in short."""
+    assert run.controller is not None
+    given = run.controller.parameters.items()
+    values = ", ".join(f"{key} = {short(v) if isinstance(v, float) else v}" for key, v in given)
+    return f"{run.controller_name}{' (' + values + ')' if values else ''}"
+
+
+def _all_digits(run: Run) -> str:
+    """What the strategy of a start does, and its parameters with all digits."""
     assert run.controller is not None
     values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
-    return f"{run.controller_name}{' (' + values + ')' if values else ''}"
+    return markdown(
+        ". ".join(filter(None, [type(run.controller).summary, f"Parameters: {values or 'none'}."]))
+    )
 
 
 # a comparison --------------------------------------------------------------------------------------------
@@ -532,8 +543,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         stems.append(stem := file_stem(run.controller_name, stems))
         figures[f"run-{stem}"] = run.plot
         files[f"trace-{stem}.csv"] = run.to_csv
-        about = ". ".join(filter(None, [type(run.controller).summary, _strategy(run)]))
-        behind.append(f"### {markdown(stem)}\n\n{markdown(about)}\n\n![{stem}](run-{stem}.svg)")
+        behind.append(f"### {markdown(stem)}\n\n{_all_digits(run)}\n\n![{stem}](run-{stem}.svg)")
     return Sheet(
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),
