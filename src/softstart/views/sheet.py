@@ -128,13 +128,14 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
             content(folder / name)
     links = ", ".join(f"[{name}]({name})" for name in sheet.files)
     about, machine = _machine(sheet, folder)
+    behind = "".join(sheet.behind)
     parts = [
         f"# {markdown(sheet.title)}",
         "\n".join(f"- {markdown(line.strip())}" for line in sheet.lines[1:]),
         markdown(sheet.status),
         *map(markdown, sheet.found),
         facts_table(sheet.facts) if sheet.facts else "",
-        *(f"![{stem}]({stem}.svg)" for stem in sheet.figures),
+        *(f"![{stem}]({stem}.svg)" for stem in sheet.figures if f"({stem}.svg)" not in behind),
         *(part for one in sheet.tables if one.rows for part in table_parts(one)),
         *map(markdown, sheet.notes),
         f"Files: {links}." if links else "",
