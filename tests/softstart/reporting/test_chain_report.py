@@ -63,7 +63,7 @@ def test_the_optimum_lies_between_bound_and_strategy(monkeypatch):
 
 def test_lives_of_shafts_are_those_of_fatigue(made):
     page = Page(made.to_html()).text
-    assert "Lives cannot be given. damping is missing in rotor - pinion" in page
+    assert "Lives cannot be given: damping is missing in rotor - pinion" in page
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report(damped, controllers=["take-up"], budget=0.0).to_html()
     found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
