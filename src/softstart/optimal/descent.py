@@ -449,7 +449,7 @@ class Program:
         rows = (np.concatenate(self.values), np.concatenate(self.places), ends)
         whole = csr_array(rows, shape=(ends.size - 1, self.columns)).tocsc()
         pattern = ca.Sparsity(*whole.shape, whole.indptr.tolist(), whole.indices.tolist())  # type: ignore[call-overload]
-        most = 20 * self.columns  # of iterations: a few programs in a thousand cycle
+        most = 20 * self.columns  # of iterations: a few programs never end
         highs: Any = {"output_flag": False, "presolve": "off", "simplex_iteration_limit": most}
         solver = ca.conic(
             "step", "highs", {"a": pattern, "h": ca.Sparsity(self.columns, self.columns)},

@@ -174,7 +174,8 @@ def optimize(
             raise
         best = solve(replace(problem, terminal="reached"), known, confirm)
         why += ", in which only the load can have the target speed"
-    alone = _alone(best.problem) if len(problem.machines) > 1 and near is None else {}
+    asked = len(problem.machines) > 1 and near is None and problem.start_time is not None
+    alone = _alone(best.problem) if asked else {}
     return replace(best, why=best.why + why, alone=alone)
 
 
@@ -509,8 +510,15 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
         if found is None:
             sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
             raise InfeasibleError(Verdict(problem, math.inf, sentence))
-        timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + EDGE))
-        best = _by_descent(timed, found[1], began)
+        for edge in (EDGE, 10.0 * EDGE, SHORTEST):  # at the very edge no descent may end well
+            timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + edge))
+            with suppress(OptimumError):
+                best = _by_descent(timed, found[1], began)
+                break
+        else:
+            raise OptimumError(
+                f"No start close to the shortest one found, {found[0]:.6g} s, keeps all bounds."
+            )
         why = f"the shortest start found, the gentlest of these; {best.why}"
         best = replace(best, problem=problem, why=why)
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))

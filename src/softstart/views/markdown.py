@@ -1,4 +1,4 @@
-"""The files of --out: the folder, tables, texts and what every report.md holds.
+"""The folder of --out, its tables and texts.
 
 Everything is made ready beside the folder and then put in place, or nothing is.
 """
@@ -8,22 +8,16 @@ from __future__ import annotations
 import csv
 import math
 import os
-import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from softstart import __version__
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.stopping import at_stop
 from softstart.store import fresh_folder
-from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import Column, Table
-
-FITTED_TO = "fitted-to.toml"
 
 
 @contextmanager
@@ -56,12 +50,6 @@ def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[obje
         writer.writerows(rows)
 
     write_whole(path, write)
-
-
-def write_rows(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    """Rows with the same keys as CSV; no file where there are none."""
-    if rows:
-        write_table(path, list(rows[0]), [list(row.values()) for row in rows])
 
 
 def write_columns(path: Path, columns: Mapping[str, Sequence[object]]) -> None:
@@ -176,72 +164,3 @@ def markdown(text: str) -> str:
     """Text that Markdown leaves as it is, within a table too."""
     flat = " ".join(text.split())
     return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
-
-
-def markdown_table(table: Table) -> str:
-    """A table without its title; numbers are set to the right."""
-    headings = [column.heading for column in table.columns]
-    rule = ["---:" if column.number else "---" for column in table.columns]
-    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
-
-
-def table_sections(tables: Sequence[Table]) -> list[str]:
-    """Titles and tables in Markdown, without empty tables."""
-    return [part for one in tables if one.rows for part in (f"## {markdown(one.title)}", markdown_table(one))]
-
-
-def figure_table(rows: Sequence[Sequence[str]]) -> str:
-    """Figures in Markdown, each a name and its value."""
-    return markdown_table(Table("", [Column("figure", False), Column("value")], rows))
-
-
-def drive_table(machine: Any) -> str:
-    """All parameters of a machine that are set."""
-    rows = []
-    for path, (parameter, value) in machine.by_path().items():
-        if value is not None and value != "" and path != "name":
-            values = value if isinstance(value, tuple) else (value,)
-            shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
-            unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
-            rows.append([path, parameter.symbol, shown, unit, parameter.meaning])
-    return markdown_table(Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows))
-
-
-def write_report(folder: Path, parts: Sequence[str], command: str, about: str) -> None:
-    """report.md; its last section says what was run, by which version, and what `about` adds on the input."""
-    ending = (
-        "## Where this comes from\n\n"
-        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
-        f"```sh\n{command}\n```\n\n{about}"
-    )
-    write_text(folder / "report.md", "\n\n".join([*parts, ending]) + "\n")
-
-
-def write_drive_report(
-    folder: Path,
-    parts: Sequence[str],
-    drive: Any,
-    command: str,
-    fitted_to: Any = None,
-    *,
-    behind: Sequence[str] = (),
-    one: bool = True,
-) -> None:
-    """report.md about a machine, whose data stand between `parts` and `behind`, and the machine's files.
-
-    `fitted_to` is the drive for which the controllers are set up, if another; `one`: no parameter is varied.
-    """
-    what = drive.WHAT.removeprefix("a ")
-    write_text(folder / f"{what}.toml", drive.to_toml())
-    about = (
-        f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n"
-        f"```toml\n{drive.to_toml()}```"
-    )
-    if fitted_to is not None:
-        write_text(folder / FITTED_TO, fitted_to.to_toml())
-        set_up = controllers_set_up(drive if one else None, fitted_to)
-        about += (
-            f"\n\nThe {markdown(set_up)}. That drive is in "
-            f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
-        )
-    write_report(folder, [*parts, f"## The {what}", drive_table(drive), *behind], command, about)

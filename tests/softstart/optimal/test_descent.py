@@ -206,9 +206,6 @@ def test_the_first_demands() -> None:
     assert seeds.pulse_coast_hold(Descent(replace(problem, start_time=0.2)), player) is None
 
 
-# the programs -----------------------------------------------------------------------------------------------
-
-
 def test_a_program_is_that_of_another_solver() -> None:
     rng = np.random.default_rng(7)
     for _ in range(10):

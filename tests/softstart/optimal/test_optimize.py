@@ -502,6 +502,9 @@ def test_the_grid_of_scenarios() -> None:
     chains = scenarios_of(damped_crane(), inertias=[1e4])
     assert [one.masses[-1].inertia for one in chains] == [damped_crane().masses[-1].inertia, 1e4]
     assert len(scenarios_of(CRANE.replace(start_position="unknown"), gaps=[1.0])) == 2
+    two = optimize(CRANE, minimise="start_time", scenarios=scenarios_of(CRANE, gaps=[0.6])[1:])
+    alone = optimize(CRANE, minimise="start_time", terminal="reached").end_time
+    assert two.end_time == max(two.start_times) >= 0.999 * alone
 
 
 # limits ----------------------------------------------------------------------------------------------------
