@@ -40,13 +40,11 @@ def done(page: Any, name: str, seconds: float = LONG) -> None:
     assert state(page, name).startswith("Done in"), trouble.inner_text()
 
 
-def facts(page: Any, name: str) -> dict[str, str]:
-    """Figures by what they are."""
-    page.get_by_test_id(f"{name}-figures").locator("dd").first.wait_for()
-    pairs = page.get_by_test_id(f"{name}-figures").locator("div").all()
-    return {
-        pair.locator("dt").inner_text().replace("\n", ""): pair.locator("dd").inner_text() for pair in pairs
-    }
+def answer(page: Any, name: str) -> str:
+    """What the answer of a panel says, in one line."""
+    shown = page.get_by_test_id(f"{name}-answer")
+    shown.locator("p").first.wait_for(timeout=1000 * LONG)
+    return " ".join(shown.inner_text().split())
 
 
 def k_dyn(page: Any, strategy: str) -> str:
@@ -61,11 +59,12 @@ def options(page: Any, name: str, choice: str) -> None:
     page.get_by_role("option", name=choice, exact=True).click()
 
 
-def saved(page: Any, name: str) -> tuple[str, str]:
-    """Name and text of the file that a button gives."""
+def saved(page: Any, panel: str, file: str) -> str:
+    """The text of the file that a button gives."""
     with page.expect_download() as download:
-        page.get_by_test_id(name).click()
-    return download.value.suggested_filename, Path(download.value.path()).read_text(encoding="utf-8")
+        page.get_by_test_id(f"{panel}-file").get_by_text(file, exact=True).click()
+    assert download.value.suggested_filename == file
+    return Path(download.value.path()).read_text(encoding="utf-8")
 
 
 def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_path: Path) -> None:
@@ -75,35 +74,36 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
     page.get_by_test_id("optimum-time").fill("1.2x")
     page.get_by_test_id("optimum-go").click()
     done(page, "optimum")
-    shown = facts(page, "optimum")
-    assert shown["Kdyn"] == f"{best.k_dyn:.4g}"
-    assert shown["lower bound"] == f"{best.bound.k_dyn:.4g}"
-    assert shown["start time"] == f"{best.end_time:.4g} s"
-    assert shown["contacts"] == "1"
+    shown = answer(page, "optimum")
+    assert f"K_dyn {best.k_dyn:.6f} lower bound of K_dyn {best.bound.k_dyn:.6f}" in shown
+    assert "contacts 1" in shown
     label = f"optimum {best.end_time:.4g} s"
     assert k_dyn(page, label) == f"{best.k_dyn:.3f}"
+    page.locator(".answer figure").first.focus()  # a picture is enlarged while it has the focus
+    wide = page.locator(".answer figure").first.bounding_box()
+    assert wide["width"] > 0.9 * page.viewport_size["width"]
+    page.get_by_test_id("optimum-time").focus()
 
+    stem = f"optimum-{best.end_time:.4g}-s"
     for suffix in ("csv", "toml", "c"):
-        name, text = saved(page, f"optimum-{suffix}")
-        assert name == f"optimum-{best.end_time:.4g}-s.{suffix}"
-        (tmp_path / name).write_text(text, encoding="utf-8")
+        text = saved(page, "optimum", f"{stem}.{suffix}")
+        (tmp_path / f"{stem}.{suffix}").write_text(text, encoding="utf-8")
         if suffix == "c":
             assert "double torque_profile(double time)" in text
             continue
-        again = make_controller("profile", {"file": str(tmp_path / name)})
+        again = make_controller("profile", {"file": str(tmp_path / f"{stem}.{suffix}")})
         assert simulate(CRANE, again).k_dyn == best.k_dyn
 
     page.locator(f'tr[data-name="{label}"] input[type=radio]').click()
     tab(page, "Files")
     page.get_by_test_id("export-strategy").get_by_text(label).wait_for()
-    name, text = saved(page, "export-profile-csv")
-    assert (tmp_path / name).read_text(encoding="utf-8") == text
-    name, text = saved(page, "export-c")
-    assert name == f"optimum-{best.end_time:.4g}-s.c"
-    assert "double torque_profile(double time)" in text
-    page.get_by_test_id("command").get_by_text(
-        f"--param profile.file=optimum-{best.end_time:.4g}-s.csv"
-    ).wait_for()
+    for suffix in ("csv", "c"):
+        with page.expect_download() as download:
+            page.get_by_test_id(f"export-profile-{suffix}").click()
+        assert download.value.suggested_filename == f"{stem}.{suffix}"
+        text = Path(download.value.path()).read_text(encoding="utf-8")
+        assert suffix == "c" or text == (tmp_path / f"{stem}.csv").read_text(encoding="utf-8")
+    page.get_by_test_id("command").get_by_text(f"--param profile.file={stem}.csv").wait_for()
     tab(page, "Optimum")
 
     comes_to(page.get_by_test_id("optimum-stale").is_visible, False)
@@ -126,33 +126,28 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
     page.get_by_test_id("optimum-time").fill("soon")
     page.get_by_test_id("optimum-go").click()
     page.get_by_text('Start time = "soon": give a time above 0 s').wait_for()
-    comes_to(
-        lambda: page.get_by_test_id("optimum-figures").is_visible(), False
-    )  # no answer to another question
+    comes_to(lambda: page.get_by_test_id("optimum-answer").is_visible(), False)  # of another question
 
 
-def test_the_limit_grows_point_by_point_and_is_cancelled_in_mid_run(page: Any, server: Any) -> None:
+def test_the_limit_is_cancelled_in_mid_run_and_the_page_lives_on(page: Any, server: Any) -> None:
     tab(page, "Limit")
     until(lambda: bool(server.jobs()), 10.0, page)  # the process that waits for work
     page.get_by_test_id("curve-go").click()
-    page.locator(".curve-point").nth(3).wait_for(timeout=1000 * LONG)
-    assert state(page, "curve").startswith("Computing: ")
+    until(lambda: state(page, "curve").startswith("Computing: start "), LONG, page)
     before = set(server.jobs())
     page.get_by_test_id("curve-cancel").click()
     began = time.monotonic()
     until(lambda: state(page, "curve").startswith("Cancelled after"), 3.0, page)
     assert time.monotonic() - began < patient(1.5)
     assert before - set(server.jobs()), "the process of the cancelled job is still there"
-    page.locator(".curve-point").nth(3).wait_for()  # what was found stays
     comes_to(page.get_by_test_id("curve-go").is_enabled, True)
-    comes_to(lambda: k_dyn(page, "direct"), f"{simulate(CRANE, 'direct').k_dyn:.3f}")  # the page lives on
+    comes_to(lambda: k_dyn(page, "direct"), f"{simulate(CRANE, 'direct').k_dyn:.3f}")
 
 
 def test_tuned_gains_are_those_of_tune_and_join_the_strategies(page: Any, tmp_path: Path) -> None:
     name, gaps = "reduced-first-stage", ["1x", "2x"]
     found = tune(CRANE, name, gaps, ["1x"], restarts=1, certified=False, workers=1)
     assert found.robust is not None
-    assert found.schedule is not None
     tab(page, "Tuning")
     options(page, "tuning-controller", name)
     page.get_by_test_id("tuning-gaps").fill("1x, 2 quarks")
@@ -163,19 +158,13 @@ def test_tuned_gains_are_those_of_tune_and_join_the_strategies(page: Any, tmp_pa
     options(page, "tuning-searches", "one search, quick")
     page.get_by_test_id("tuning-go").click()
     done(page, "tuning")
-    shown = facts(page, "tuning")
-    assert shown["worst Kdyn, one set"] == f"{found.robust.worst:.4g}"
-    assert shown["with the defaults"] == f"{found.robust.worst_default:.4g}"
-    least = page.get_by_test_id("tuning-cells").locator("tbody tr td:nth-child(5)")
-    comes_to(least.all_inner_texts, [f"{one:.3f}" for one in found.schedule.k_dyn.values.ravel()])
-
+    assert f"One set for all: K_dyn at most {found.robust.worst:.4g}" in answer(page, "tuning")
     for what, controller in (("robust", found.robust.controller), ("schedule", found.scheduled)):
-        page.get_by_test_id(f"tuning-use-{what}").click()
+        page.get_by_test_id("tuning-use").get_by_text(f"({what})").click()
         expected = simulate(CRANE, controller).k_dyn
         assert k_dyn(page, f"{name} ({what})") == f"{expected:.3f}"
-        file, text = saved(page, f"tuning-{what}-toml")
-        assert file == f"{name}-{what}.toml"
-        (tmp_path / file).write_text(text, encoding="utf-8")
+        file = f"{name}-{what}.toml"
+        (tmp_path / file).write_text(saved(page, "tuning", file), encoding="utf-8")
         assert simulate(CRANE, make_controller(str(tmp_path / file))).k_dyn == expected
 
 
@@ -188,7 +177,7 @@ def test_two_users_have_their_own_sessions_and_a_closed_tab_ends_its_jobs(
     tab(second, "Optimum")
     second.get_by_test_id("optimum-go").click()
     done(second, "optimum")
-    best = "optimum " + facts(second, "optimum")["start time"]
+    best = f"optimum {optimize(CRANE, '1.2x').end_time:.4g} s"
     assert k_dyn(second, best)
     assert first.get_by_text(best, exact=True).count() == 0
     until(lambda: len(server.jobs()) > 0, 5.0, second)
@@ -237,7 +226,7 @@ def test_jobs_are_shown_in_every_tab_of_their_user_and_after_a_reload(
         one.get_by_role("tab", name="Optimum", exact=True).click()
     page.get_by_test_id("optimum-go").click()
     for one in (page, second):
-        one.get_by_test_id("optimum-figures").wait_for(timeout=60_000)
+        one.get_by_test_id("optimum-answer").wait_for(timeout=60_000)
     found = '.strategies tbody tr[data-name^="optimum"]'
     comes_to(page.locator(found).count, 1)
     comes_to(second.locator(found).count, 0)
@@ -246,7 +235,7 @@ def test_jobs_are_shown_in_every_tab_of_their_user_and_after_a_reload(
     second.locator(found).wait_for()
     page.reload()
     page.get_by_role("tab", name="Optimum", exact=True).click()
-    page.get_by_test_id("optimum-figures").wait_for()
+    page.get_by_test_id("optimum-answer").wait_for()
     comes_to(page.locator(found).count, 1)
     second.close()
 
@@ -262,11 +251,11 @@ def test_positions_limits_and_life_are_checked(page: Any, screenshot: Any) -> No
     done(page, "checks")
     drive = CRANE.with_settings(["limits.shaft_torque=70", "shaft.damping=0.3"])
     run = simulate(drive.replace(start_position="unknown"), "shaped")
-    row = page.get_by_test_id("checks-positions").locator("tr", has_text="shaped")
-    worst = [f"{one.k_dyn:.3f}" for one in (*run.positions.values(), run)]
-    comes_to(lambda: row.inner_text().split()[-4:], worst)
-    page.get_by_test_id("checks-limits").locator("tr", has_text="direct").get_by_text("exceeded").wait_for()
-    page.get_by_test_id("checks-life").locator("tr").nth(5).wait_for()
+    worst = " ".join(["shaped", *(f"{one.k_dyn:.3f}" for one in (*run.positions.values(), run))])
+    shown = answer(page, "checks")
+    assert worst in shown
+    assert "exceeded" in shown
+    assert "life of the shaft line" in shown
     page.get_by_test_id("checks-use").click()
     page.locator('.strategies tbody tr[data-name^="quickest"]').wait_for()
     for width, height in ((1280, 800), (1920, 1080)):

@@ -46,10 +46,10 @@ COMMANDS = {
     "report": "report {} --out report.html",
 }
 PANELS = {  # module, class, the method of its button
-    "Optimum": ("optimum_panel", "OptimumPanel", "_begin"),
-    "Limit": ("curve_panel", "CurvePanel", "_begin"),
-    "Checks": ("checks_panel", "ChecksPanel", "_begin"),
-    "Tuning": ("tuning_panel", "TuningPanel", "_begin"),
+    "Optimum": ("panels", "OptimumPanel", "begin"),
+    "Limit": ("panels", "LimitPanel", "begin"),
+    "Checks": ("panels", "ChecksPanel", "begin"),
+    "Tuning": ("panels", "TuningPanel", "begin"),
     "Report": ("files_panel", "Exports", "_begin_report"),
 }
 # command and machine, or its class: a word of the sentence
@@ -121,7 +121,7 @@ def pressed(panel: str, session: Session) -> Any:
     module, name, button = PANELS[panel]
     asked = Asked()
     built = getattr(import_module(f"softstart.page.{module}"), name)(session, "user")
-    built._view._jobs = asked
+    (built.view if hasattr(built, "view") else built._view)._jobs = asked
     getattr(built, button)()
     return asked.work()
 

@@ -12,7 +12,7 @@ from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
-from softstart.page.panel_parts import action, box, choice, few, field, guarded, hint, notify, reveal, save
+from softstart.page.panel_parts import Troubles, action, box, choice, field, hint, notify, reveal, save
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
@@ -35,7 +35,7 @@ class DataSheetPanel:
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
         self._fields: dict[str, Any] = {}
-        with box().classes("sheet-form"):
+        with box("sheet-form"):
             hint(
                 "Each number as its data sheet gives it, at its own part, in the unit beside its name or "
                 "another one. What is not known stays empty: below it stands what is used then; * is needed."
@@ -44,19 +44,17 @@ class DataSheetPanel:
             for name, title in {"": "", **TITLES}.items():
                 if title:
                     ui.html(title, tag="h3", sanitize=False).classes("panel-title")
-                with box().classes("panel-form"):
+                with box("panel-form"):
                     for p in tables[name]:
                         self._fields[p.name] = made(p)
         machine = self._fields["machine"]
         machine.on_value_change(lambda event: self._about(str(event.value)))
         self._about(str(machine.value))
-        with box().classes("sheet-answer") as self._answer:
-            with box().classes("panel-actions"):
-                action("Use this drive", guarded(self._use), "sheet-use", main=True)
-                action("Save drive as TOML", guarded(self._save), "sheet-save")
-            with box().classes("troubles").props('role=alert data-testid="sheet-trouble"') as self._troubles:
-                pass
-            self._troubles.set_visibility(False)
+        with box("sheet-answer") as self._answer:
+            with box("panel-actions"):
+                action("Use this drive", self._use, "sheet-use", main=True)
+                action("Save drive as TOML", self._save, "sheet-save")
+            self._troubles = Troubles("sheet")
             self._text = ui.label().classes("command lines").props('data-testid="sheet-drive" tabindex=0')
             self._text.set_visibility(False)
 
@@ -81,12 +79,7 @@ class DataSheetPanel:
             title, sentences = "Check these values.", doubts(found.drive)
         except InputError as error:
             found, title, sentences = None, "There is no drive yet.", list(error.sentences)
-        self._troubles.clear()
-        self._troubles.set_visibility(bool(sentences))
-        with self._troubles:
-            ui.label(title).classes("trouble-title")
-            for sentence in few(sentences):
-                ui.label(sentence).classes("trouble")
+        self._troubles.say(sentences, title)
         self._text.set_visibility(found is not None)
         self._text.set_text("" if found is None else found.drive_toml())
         return found

@@ -49,7 +49,7 @@ class Job:
     """A function that runs, ran or will run in a process of its own. Made by `Jobs.begin`.
 
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
-    `parts` what came out so far; `result` what came out at the end; `sentences` why there is no result.
+    `result` what came out; `sentences` why there is no result.
     `changes` counts what happened, so that whoever looks now and then sees whether to look closer; it is
     raised last. `subject` is for those who show it: what the result is of. `ahead` waiting jobs come before.
     """
@@ -59,7 +59,6 @@ class Job:
         self.state = State.WAITING
         self.share: float | None = None
         self.message = ""
-        self.parts: list[Any] = []
         self.result: Any = None
         self.sentences: tuple[str, ...] = ()
         self.changes = 0
@@ -125,8 +124,6 @@ class Job:
                 match message:
                     case Message("progress", (share, text)):
                         self.share, self.message = share, text
-                    case Message("part", part):
-                        self.parts.append(part)
                     case Message("result", result):
                         self.result, self.share = result, 1.0
                         break

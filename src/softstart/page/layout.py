@@ -30,12 +30,12 @@ WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
 # further tabs: title, module and class
 PANELS = (
-    ("Optimum", "optimum_panel", "OptimumPanel"),
-    ("Limit", "curve_panel", "CurvePanel"),
-    ("Checks", "checks_panel", "ChecksPanel"),
-    ("Tuning", "tuning_panel", "TuningPanel"),
+    ("Optimum", "panels", "OptimumPanel"),
+    ("Limit", "panels", "LimitPanel"),
+    ("Checks", "panels", "ChecksPanel"),
+    ("Tuning", "panels", "TuningPanel"),
     ("Sheet", "data_sheet_panel", "DataSheetPanel"),
-    ("Log", "log_panel", "LogPanel"),
+    ("Log", "panels", "LogPanel"),
     ("Files", "files_panel", "FilesPanel"),
 )
 
@@ -58,7 +58,7 @@ def style() -> str:
 
 @cache
 def gentlest(drive: Machine) -> str:
-    """The strategy that is selected at first: computed for the first tab alone, since others would wait."""
+    """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
     session.select_gentlest()
     return session.selected

@@ -1,39 +1,36 @@
-"""What the panels share: fields, tables, buttons to save a file, a job and its progress, the note on an
-earlier drive.
-"""
+"""What the panels share: fields, buttons, a job and its progress, and a form whose answer a job computes."""
 
 from __future__ import annotations
 
 import html
-import math
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Hashable, Sequence
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, ClassVar
 from weakref import WeakMethod
 
 from nicegui import app, context, ui
 
 from softstart.chain.machines import Machine
+from softstart.controller.base import Controller
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
-from softstart.page.sentences import changed_since, plain, sentence_of
+from softstart.page.sentences import changed_since, clipped, plain, sentence_of
 from softstart.page.session import Session
-from softstart.views.printed import NOTHING
 
 if TYPE_CHECKING:
     from nicegui.events import UiEventArguments, UploadEventArguments
 
+    from softstart.page.tasks import Answer
+
 POLL = 0.2  # s between two checks of a job
 MOST_SENTENCES = 12  # about one input; whoever has mended these sees the next ones
-CLASS_OF = {
-    State.WAITING: "job-waiting",
-    State.RUNNING: "job-running",
-    State.DONE: "job-done",
-    State.CANCELLED: "job-cancelled",
-    State.FAILED: "job-failed",
-}
 # what tasks import, in a process that waits for one
-IMPORTED = ("softstart.page.tasks", "softstart.optimal.front", "softstart.tuning.solving", "scipy.optimize")
+IMPORTED = (
+    "softstart.page.tasks",
+    "softstart.optimal.front",
+    "softstart.tuning.solving",
+    "matplotlib.figure",
+)
 TERMINALS = {
     "synchronous": "both masses at target speed",
     "reached": "load at target speed",
@@ -42,37 +39,39 @@ TERMINALS = {
 MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html"}
 
 
-def box() -> Any:
+def box(classes: str) -> Any:
     """A plain box; its class says how it lays out what is in it."""
-    return ui.element("div")
+    return ui.element("div").classes(classes)
 
 
 def field(label: str, value: str, name: str, example: str = "") -> Any:
     """A text field below its label."""
-    with _labelled(label):
+    with box("panel-field"):
+        ui.label(label)
         made = ui.input(value=value).props(f'dense outlined aria-label="{label}" data-testid="{name}"')
-        if example:
-            made.tooltip(example)
-    return made
+        return made.tooltip(example) if example else made
 
 
 def choice(label: str, options: dict[str, str] | list[str], value: str, name: str) -> Any:
     """A choice of one of several, below its label."""
-    with _labelled(label):
-        made = ui.select(options, value=value)
-        made.props(f'dense outlined options-dense aria-label="{label}" data-testid="{name}"')
-    return made
-
-
-def _labelled(label: str) -> Any:
-    with box().classes("panel-field") as made:
+    with box("panel-field"):
         ui.label(label)
-    return made
+        made = ui.select(options, value=value)
+        return made.props(f'dense outlined options-dense aria-label="{label}" data-testid="{name}"')
 
 
 def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> Any:
-    """A button; the main one of a panel stands out."""
-    made = ui.button(text, on_click=act, color=None).props(
+    """A button; the main one of a panel stands out. What goes wrong is said in sentences."""
+
+    def acting() -> None:
+        try:
+            act()
+        except Exception as error:  # nobody who uses the page sees a traceback
+            sentences = error.sentences if isinstance(error, InputError) else (sentence_of(error),)
+            for sentence in few(sentences):
+                ui.notify(sentence, type="negative", position="bottom-left", multi_line=True, timeout=8000)
+
+    made = ui.button(text, on_click=acting, color=None).props(
         f'dense no-caps {"unelevated" if main else "flat"} data-testid="{name}"'
     )
     return made.classes("panel-main" if main else "panel-action")
@@ -125,38 +124,10 @@ def upload(
     return made.on("click", js_handler=f"() => getElement({chooser.id}).pickFiles()")
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """A number with so many significant digits.
-
-    >>> number(0.90924724), number(None), number(float("nan")), number(48.0628, 3)
-    ('0.9092', '\N{EN DASH}', '\N{EN DASH}', '48.1')
-    """
-    return NOTHING if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
-
-
-def percent(value: float | None) -> str:
-    """A small share in per cent, already multiplied by 100.
-
-    >>> percent(9.78e-8), percent(0.095), percent(12.0)
-    ('< 0.001 %', '0.095 %', '12 %')
-    """
-    if value is None or not math.isfinite(value):
-        return NOTHING
-    return "< 0.001 %" if abs(value) < 1e-3 else f"{value:.2g} %"
-
-
-def symbols(text: str) -> str:
-    """A text as HTML, symbols as they are printed.
-
-    >>> symbols("K_dyn < 1")
-    'K<sub>dyn</sub> &lt; 1'
-    """
-    return html.escape(text).replace("K_dyn", "K<sub>dyn</sub>")
-
-
 def hint(text: str) -> Any:
     """A quiet sentence that says what a panel is for."""
-    return ui.html(symbols(text), sanitize=False).classes("panel-hint")
+    written = html.escape(text).replace("K_dyn", "K<sub>dyn</sub>")
+    return ui.html(written, sanitize=False).classes("panel-hint")
 
 
 def save(text: str, name: str) -> None:
@@ -180,6 +151,24 @@ def few(sentences: Sequence[str]) -> list[str]:
     ]
 
 
+class Troubles:
+    """A box for sentences about what is wrong, empty and hidden at first; built in the current slot."""
+
+    def __init__(self, name: str) -> None:
+        self._box = box("troubles").props(f'role=alert data-testid="{name}-trouble"')
+        self._box.set_visibility(False)
+
+    def say(self, sentences: Sequence[str], title: str = "") -> None:
+        """Say these instead of what was said; nothing where there are none."""
+        self._box.clear()
+        self._box.set_visibility(bool(sentences))
+        with self._box:
+            if title:
+                ui.label(title).classes("trouble-title")
+            for sentence in few(sentences):
+                ui.label(sentence).classes("trouble")
+
+
 def reveal(part: Any, block: str = "start") -> None:
     """Scroll to a part of a panel once the browser has drawn it."""
     seen = f"getHtmlElement({part.id})?.scrollIntoView({{block: '{block}', behavior: 'smooth'}})"
@@ -191,50 +180,6 @@ def notify(sentence: str) -> None:
     ui.notify(sentence, position="bottom-left", timeout=2500, classes="note")
 
 
-def guarded(act: Callable[[], Any]) -> Callable[[], Any]:
-    """The action; what goes wrong in it is state_of in sentences, and nothing else happens."""
-
-    def acting() -> None:
-        try:
-            act()
-        except Exception as error:  # nobody who uses the page sees a traceback
-            sentences = error.sentences if isinstance(error, InputError) else (sentence_of(error),)
-            for sentence in few(sentences):
-                ui.notify(sentence, type="negative", position="bottom-left", multi_line=True, timeout=8000)
-
-    return acting
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]], texts: int = 1, name: str = "") -> str:
-    """A table as HTML; the first `texts` columns are text, the others numbers.
-
-    >>> table(["strategy", "K_dyn"], [["direct", "3.118"]])
-    '<table class="panel-table"><thead><tr><th>strategy</th><th class="num">K<sub>dyn</sub></th></tr>...
-    """
-    mark = f' data-testid="{name}"' if name else ""
-
-    def cells(values: Sequence[str], tag: str) -> str:
-        return "".join(
-            f"<{tag}>{symbols(v)}</{tag}>" if k < texts else f'<{tag} class="num">{symbols(v)}</{tag}>'
-            for k, v in enumerate(values)
-        )
-
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    head = f"<thead><tr>{cells(columns, 'th')}</tr></thead>"
-    return f'<table class="panel-table"{mark}>{head}<tbody>{body}</tbody></table>'
-
-
-def facts(pairs: Sequence[tuple[str, str]], name: str = "") -> str:
-    """Figures with what they are, as HTML.
-
-    >>> facts([("K_dyn", "0.9092")])
-    '<dl class="facts"><div><dt>K<sub>dyn</sub></dt><dd>0.9092</dd></div></dl>'
-    """
-    mark = f' data-testid="{name}"' if name else ""
-    inside = "".join(f"<div><dt>{symbols(k)}</dt><dd>{html.escape(v)}</dd></div>" for k, v in pairs)
-    return f'<dl class="facts"{mark}>{inside}</dl>'
-
-
 class StaleNote:
     """Says for which drive a result is, once the session has another one; built in the current slot."""
 
@@ -242,9 +187,9 @@ class StaleNote:
         self._session = session
         self._drive: Machine | None = None
         self._seen = -1
-        self.stale = False
         self._label = ui.label().classes("stale").props(f'role=status data-testid="{name}-stale"')
         self._label.set_visibility(False)
+        ui.timer(POLL, self.refresh)
 
     def show_for(self, drive: Machine) -> None:
         """The result shown is of this drive."""
@@ -257,9 +202,8 @@ class StaleNote:
             return
         self._seen = self._session.version
         sentence = changed_since(self._drive, self._session.machine)
-        self.stale = bool(sentence)
         self._label.set_text(sentence)
-        self._label.set_visibility(self.stale)
+        self._label.set_visibility(bool(sentence))
 
     def check(self) -> None:
         """Refuse what was computed for another machine: it is none of this one's strategies."""
@@ -290,16 +234,13 @@ def state_of(job: Job) -> str:
         return f"Computing: {job.message or 'starting a process'}, {duration(job.seconds)}"
     if job.state is State.CANCELLED:
         return f"Cancelled after {duration(job.seconds)}." if job.seconds else State.CANCELLED.value
-    return (
-        f"{job.state.value[:-1]} in {duration(job.seconds)}." if job.state is State.DONE else job.state.value
-    )
+    return f"Done in {duration(job.seconds)}." if job.state is State.DONE else job.state.value
 
 
 class JobView:
     """The one job of a panel, the same in all tabs of a user; built in the current slot.
 
-    `on_part(value)` is called for each part of the result, `on_done(result)` for the whole; `on_state()`
-    whenever the state has changed, `on_begin()` when a job has begun, here or in another tab. `name` tells it
+    `on_done(result)` is called with its result, `on_state()` whenever the state has changed. `name` tells it
     from those of other panels, and marks the elements for tests.
     """
 
@@ -310,19 +251,15 @@ class JobView:
         name: str,
         *,
         on_done: Callable[[Any], None],
-        on_part: Callable[[Any], None] = lambda part: None,
         on_state: Callable[[], None] = lambda: None,
-        on_begin: Callable[[], None] = lambda: None,
     ) -> None:
-        self._on_begin = on_begin
         self._jobs, self._user, self._name = jobs, user, name
         self._own: Job | None = None  # the one that was begun in this tab
-        self._on_done, self._on_part, self._on_state = on_done, on_part, on_state
+        self._on_done, self._on_state = on_done, on_state
         self.job: Job | None = None
-        self._seen = self._parts = -1
-        self._second = -1
+        self._seen = self._second = -1
         self._given = False  # its result was handed on
-        with ui.element("div").classes("job") as self._box:
+        with box("job") as self._box:
             self._line = ui.label().classes("job-line").props(
                 f'role=status aria-live=polite data-testid="{name}-state"'
             )  # fmt: skip
@@ -330,11 +267,8 @@ class JobView:
             self._cancel.props(f'flat dense no-caps data-testid="{name}-cancel"').classes("job-cancel")
             self._bar = ui.linear_progress(0.0, show_value=False, size="3px", color=None).classes("job-bar")
             self._bar.props('instant-feedback aria-label="progress"')
-        self._troubles = (
-            ui.element("div").classes("troubles").props(f'role=alert data-testid="{name}-trouble"')
-        )
+        self._troubles = Troubles(name)
         self._box.set_visibility(False)
-        self._troubles.set_visibility(False)
         ui.timer(POLL, self._refresh)
 
     @property
@@ -376,7 +310,7 @@ class JobView:
             self.job = None
             self._jobs.show(self._user, self._name, None)
             self._box.set_visibility(False)
-        self._say(error.sentences)
+        self._troubles.say(error.sentences)
         self._on_state()
 
     def cancel(self) -> None:
@@ -385,19 +319,12 @@ class JobView:
             self.job.cancel()
             self._refresh()
 
-    def settle(self, go: Any, result: Any) -> None:
-        """Let a button begin no second job, and hide a result that answers another question."""
-        go.set_enabled(not self.busy)
-        if self.failed:
-            result.set_visibility(False)
-
     def _refresh(self) -> None:
         job = self._jobs.shown(self._user, self._name)
         if job is None:
             return
         if job is not self.job:  # begun here or in another tab
-            self.job, self._seen, self._parts, self._given = job, -1, 0, False
-            self._on_begin()
+            self.job, self._seen, self._given = job, -1, False
         # the job goes on in a thread of its own: each is read once, the count first, since it is raised last
         changes, state = job.changes, job.state
         second = -1 if state.over else int(job.seconds)
@@ -408,9 +335,6 @@ class JobView:
         self._line.set_text(state_of(job))
         if not news:
             return
-        while self._parts < len(job.parts):
-            self._parts += 1
-            self._on_part(job.parts[self._parts - 1])
         self._show(job, state)
         try:
             if state is State.DONE and not self._given:
@@ -422,25 +346,103 @@ class JobView:
             self._on_state()
 
     def _show(self, job: Job, state: State) -> None:
-        over = state.over
         self._box.set_visibility(True)
-        self._box.classes(add=CLASS_OF[state], remove=" ".join(CLASS_OF[s] for s in State if s is not state))
-        self._cancel.set_visibility(not over)
+        each = {one: f"job-{one.name.lower()}" for one in State}
+        self._box.classes(
+            add=each[state], remove=" ".join(text for one, text in each.items() if one is not state)
+        )
+        self._cancel.set_visibility(not state.over)
         self._cancel.set_enabled(not job.stopping)
-        self._bar.set_visibility(not over)
+        self._bar.set_visibility(not state.over)
         share = job.share if state is State.RUNNING else None
         self._bar.props(
             add="indeterminate" if share is None else "", remove="" if share is None else "indeterminate"
         )
         self._bar.set_value(share or 0.0)
-        self._say(job.sentences)
+        self._troubles.say(job.sentences)
 
-    def _say(self, sentences: tuple[str, ...]) -> None:
-        self._troubles.clear()
-        self._troubles.set_visibility(bool(sentences))
-        with self._troubles:
-            for sentence in few(sentences):
-                ui.label(sentence).classes("trouble")
+
+class TaskPanel:
+    """A form, a job, and its `softstart.page.tasks.Answer`; built in the current slot.
+
+    A subclass builds its fields in `form` and says in `question` what is computed: a title, a function of
+    `softstart.page.tasks`, and its arguments; InputError for a wrong field.
+    """
+
+    name: ClassVar[str]
+    about: ClassVar[str]  # what the panel is for
+    verb: ClassVar[str] = "Compute"  # on the button; without one the form has another way to begin
+    joins: ClassVar[bool] = False  # what a tab has asked for is added to its strategies at once
+
+    def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
+        self.session = session
+        self._found: Answer | None = None
+        with box("panel-form"):
+            self.form()
+            if self.verb:
+                self.go = action(self.verb, self.begin, f"{self.name}-go", main=True)
+        self._hint = hint(self.about)
+        self.view = JobView(jobs or jobs_of(user), user, self.name, on_done=self._done, on_state=self._state)
+        with box("panel-result") as self._result:
+            self._stale = StaleNote(session, self.name)
+            self._buttons = box("panel-actions")
+            self._shown = (
+                ui.html("", sanitize=False).classes("answer").props(f'data-testid="{self.name}-answer"')
+            )
+        self._result.set_visibility(False)
+
+    def form(self) -> None:
+        """The fields of the panel."""
+
+    def question(self) -> tuple[Any, ...]:
+        """A title, a task, and its arguments."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Put what is asked for into the queue."""
+        if self.view.busy:  # the Enter key is heard while the button is not
+            return
+        try:
+            title, *work = self.question()
+        except InputError as error:
+            self.view.refuse(error)
+        else:
+            self.view.begin(title, *work, subject=self.session.machine)
+
+    def _state(self) -> None:
+        self.go.set_enabled(not self.view.busy)
+        if self.view.failed or self.view.job is None:
+            self._result.set_visibility(False)  # it answers another question
+
+    def _done(self, found: Answer) -> None:
+        self._found = found
+        self._shown.set_content(found.html)
+        self._hint.set_visibility(False)
+        self._result.set_visibility(True)
+        self._stale.show_for(self.view.subject)
+        self._buttons.clear()
+        with self._buttons:
+            for label in found.controllers:
+                button = action(f"Add {label}", partial(self.add, label), f"{self.name}-use")
+                if self.joins and self.view.mine:
+                    self.add(label)
+                    button.set_visibility(False)
+            if found.drive is not None:
+                action("Use this drive", self._use, f"{self.name}-use", main=True)
+            for file, text in found.files.items():
+                action(file, partial(save, text, file), f"{self.name}-file").props(f'title="Save {file}"')
+
+    def add(self, label: str) -> None:
+        """Let a controller of the answer join the strategies."""
+        controllers: dict[str, Controller] = dict(self._found.controllers) if self._found else {}
+        self._stale.check()
+        label = self.session.add(label, controllers[label], select=False)
+        notify(f"{label} is among the strategies.")
+
+    def _use(self) -> None:
+        if self._found is not None and self._found.drive is not None:
+            self.session.take(self._found.drive)
+            notify(f"{clipped(self._found.drive.name)} is loaded.")
 
 
 def jobs_of(user: Hashable) -> Jobs:

@@ -185,6 +185,7 @@ def application(drive: Machine) -> App:
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(os.devnull) / "nothing")
     for noisy in NOISY:
         logging.getLogger(noisy).setLevel(logging.CRITICAL)
+    layout.gentlest(drive)  # before anybody waits for it
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @ui.page("/", title=f"softstart: {drive.name}")

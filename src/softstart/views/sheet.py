@@ -196,12 +196,14 @@ def _parameters(machine: Any) -> Table:
 # notebook --------------------------------------------------------------------------------------------------
 
 
-def as_html(sheet: Sheet) -> str:
-    """A sheet as the cell of a notebook shows it: facts, tables, the first figure, and what came out."""
+def as_html(sheet: Sheet, figures: int = 1) -> str:
+    """A sheet in a notebook or on a page: facts, tables, the first figures, and what came out."""
     facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
     parts += [_html(table) for table in (*facts, *sheet.tables) if table.rows]
-    parts += [_svg(draw()) for draw in tuple(sheet.figures.values())[:1]]
+    for stem, draw in tuple(sheet.figures.items())[:figures]:
+        name = html.escape(f"{sheet.title}: {stem}")
+        parts.append(f'<figure tabindex="0" role="img" aria-label="{name}">{_svg(draw())}</figure>')
     parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found, *sheet.notes) if text]
     return "\n".join(parts)
 

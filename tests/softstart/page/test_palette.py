@@ -9,8 +9,8 @@ import pytest
 
 import softstart.page
 from softstart.controller.finding import ready_controller_names
-from softstart.page.curve_panel import COLOURS
 
+COLOURS = 12  # of strategies
 WEB = Path(softstart.page.__file__).parent / "web"
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Visualization and Computer Graphics 15 (2009)
 # 1291-1298, table 1, severity 1.0: what is seen of linear RGB

@@ -16,7 +16,6 @@ from softstart.errors import InputError, SimulationError
 def noted(file: str, line: str, *, progress: Any) -> tuple[int, int, str]:
     """Write a line; say the process's number, its niceness, and its limit on threads."""
     progress(0.5, "half of it")
-    progress.part(line)
     with Path(file).open("a", encoding="utf-8") as stream:
         stream.write(line + "\n")
     return os.getpid(), os.nice(0), os.environ["OPENBLAS_NUM_THREADS"]
@@ -27,7 +26,6 @@ def endless(started: str, *, progress: Any) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
     progress(None, "without an end")
-    progress.part((os.getpid(), other.pid))
     Path(started).write_text(f"{os.getpid()} {other.pid}", encoding="utf-8")
     while True:
         time.sleep(60)

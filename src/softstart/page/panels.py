@@ -1,0 +1,193 @@
+"""The tabs whose answer is computed in the background: Optimum, Limit, Checks, Tuning, Log."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from nicegui import ui
+
+from softstart.chain.machines import Machine
+from softstart.controller.finding import controller_class, controller_names
+from softstart.errors import InputError, Mistakes
+from softstart.optimal.problem import StartTime
+from softstart.page import tasks
+from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, field, upload
+from softstart.page.sentences import clipped
+from softstart.quantities import values_in
+from softstart.tuning.question import gaps_of, inertias_of
+from softstart.views.printed import units_of
+
+SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
+MOST_CELLS = 60
+LARGEST = 1000 * 1024  # bytes of a log; a request may have little more
+
+
+class OptimumPanel(TaskPanel):
+    """The optimal start within a time; it joins the strategies."""
+
+    name = "optimum"
+    about = (
+        "The torque over time with the lowest K_dyn, and a bound that no start can go below. Where "
+        "the start position is unknown it is the best fixed profile for all, and feedback can be lower."
+    )
+    joins = True
+
+    def form(self) -> None:
+        """Start time and what holds at its end."""
+        example = "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
+        self.time = field("Start time", "1.2x", "optimum-time", example).classes("panel-narrow")
+        self.time.on("keydown.enter", self.begin)
+        self.end = choice("At its end", TERMINALS, "reached", "optimum-terminal")
+
+    def question(self) -> tuple[Any, ...]:
+        """The gentlest start."""
+        text = str(self.time.value).strip()
+        StartTime.of(text, "Start time")
+        return "optimal start", tasks.gentlest, self.session.machine, text, self.end.value
+
+
+class LimitPanel(TaskPanel):
+    """The least K_dyn over the start time, the strategies beside it."""
+
+    name = "curve"
+    about = (
+        "K_dyn of the best torque profile for each start time; the shaded part is proved out of reach. "
+        "Where the start position is unknown one profile serves all of them, and feedback can be lower."
+    )
+
+    def form(self) -> None:
+        """What holds at the end of each start."""
+        self.end = choice("Start ends with", TERMINALS, "reached", "curve-terminal")
+
+    def question(self) -> tuple[Any, ...]:
+        """The curve."""
+        controllers = list(self.session.controllers.values())
+        return "best profile over start time", tasks.curve, self.session.machine, controllers, self.end.value
+
+
+class ChecksPanel(TaskPanel):
+    """Start positions, limits and life of all strategies, and the quickest start within limits."""
+
+    name = "checks"
+    about = (
+        "K_dyn of each strategy from both flanks and the middle of the gaps, margins to the limits, life "
+        "beside that under direct, and the quickest start that keeps the limits."
+    )
+
+    def question(self) -> tuple[Any, ...]:
+        """All checks."""
+        session = self.session
+        return "positions, limits and life", tasks.checked, session.machine, dict(session.controllers)
+
+
+class TuningPanel(TaskPanel):
+    """Gains for each gap and load inertia, and one set for all of them."""
+
+    name = "tuning"
+    about = (
+        "Gains with the least K_dyn that start no slower than the defaults: for each gap and load "
+        "inertia, and one set for all of them."
+    )
+    verb = "Tune"
+
+    def form(self) -> None:
+        """The controller, the grid, and how long to search."""
+        names = tunable()
+        first = "shaped" if "shaped" in names else names[0]
+        self.controller = choice("Strategy", names, first, "tuning-controller")
+        example = "0.5 (in the page's unit), 30 deg, or 2x the drive's"
+        self.gaps = field("Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", example)
+        example = "0.1 (kg m2), 2x of the drive's own, or 5J1 of the motor's"
+        self.inertias = field("Load inertias", "0.4x, 1x, 2x", "tuning-inertias", example)
+        self.searches = choice("Search", SEARCHES, "3", "tuning-searches")
+        self.certified = ui.checkbox("optimum of each cell", value=False).classes("panel-check")
+        self.certified.props('dense data-testid="tuning-certified"')
+
+    def question(self) -> tuple[Any, ...]:
+        """The tuning."""
+        drive, name = self.session.machine, str(self.controller.value)
+        grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
+        more = bool(self.certified.value), int(self.searches.value)
+        return f"tuning of {name}", tasks.tuning, drive, name, *grid, *more
+
+
+def tunable() -> list[str]:
+    """Names of the installed controllers that say where tuning may look.
+
+    >>> "shaped" in tunable(), "direct" in tunable()
+    (True, False)
+    """
+    found = []
+    for name in controller_names():
+        try:
+            metadata = [field.metadata for field in fields(controller_class(name))]
+        except InputError:  # somebody's broken plug-in
+            continue
+        if any(one.get("multiples") or one.get("between") for one in metadata):
+            found.append(name)
+    return found
+
+
+def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
+    """Gaps in rad and load inertias in kg m2 from lists as typed; all mistakes in one InputError.
+
+    Bare numbers of gaps are in the unit of the drive.
+
+    >>> from softstart.drive import Drive
+    >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
+    ([0.25, 1.0], [0.175, 0.35])
+    """
+    wrong = Mistakes()
+    found: list[list[float]] = []
+    units = units_of(drive)
+    for text, name, read, si in (
+        (gaps, "Gaps", gaps_of, "rad"),
+        (inertias, "Load inertias", inertias_of, "kg*m^2"),
+    ):
+        with wrong.noted():
+            found.append(list(read(drive, [units.typed(one, si) for one in values_in(text, name)], name)))
+    wrong.settle()
+    if len(found[0]) * len(found[1]) > MOST_CELLS:
+        raise InputError(
+            f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
+            f"{MOST_CELLS}; take fewer."
+        )
+    return found[0], found[1]
+
+
+class LogPanel(TaskPanel):
+    """The drive from the log of an inverter; the drive of the page is the guess."""
+
+    name = "log"
+    about = (
+        "A CSV file of a start from standstill: time, torque, and angle or speed of the motor, with "
+        "units in its first line. The drive on this page is the first guess and may be off by a factor "
+        "of 3. A chain with one dominant gap is identified as two masses. The drive of the page changes "
+        "only when you press Use this drive."
+    )
+    verb = ""
+
+    def form(self) -> None:
+        """What the columns are, and the file."""
+        kinds = {"demand": "a demand", "measured": "measured"}
+        self.torque_is = choice("The torque is", kinds, "demand", "log-torque-is")
+        self.columns = field("Column names, optional", "", "log-columns", "torque=M, speed=n[rpm]")
+        remedy = "cut the log to the start"
+        self.go = upload("Load a log ...", "log", ".csv,text/csv", LARGEST, remedy, self.take, self.refuse)
+
+    def take(self, content: bytes, name: str) -> None:
+        """A file was chosen."""
+        self.file = content, name
+        self.begin()
+
+    def refuse(self, name: str, error: InputError) -> None:
+        """A file could not be taken."""
+        self.view.refuse(error)
+
+    def question(self) -> tuple[Any, ...]:
+        """The identification."""
+        content, name = self.file
+        columns = tasks.columns_of(str(self.columns.value or ""))
+        guess, kind = self.session.machine, str(self.torque_is.value)
+        return f"drive from {clipped(name)}", tasks.identified, content, name, guess, kind, columns
