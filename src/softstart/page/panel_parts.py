@@ -36,6 +36,11 @@ TERMINALS = {
     "reached": "load at target speed",
     "steady": "both, and shaft torque at rest",
 }
+ENLARGE = """(event) => {
+  const figure = event.target.closest("figure");
+  if (!figure || (event.type === "keydown" && !["Enter", "Escape"].includes(event.key))) return;
+  figure.classList.toggle("large", event.key !== "Escape" && !figure.classList.contains("large"));
+}"""
 MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html"}
 
 
@@ -386,9 +391,10 @@ class TaskPanel:
         with box("panel-result") as self._result:
             self._stale = StaleNote(session, self.name)
             self._buttons = box("panel-actions")
-            self._shown = (
-                ui.html("", sanitize=False).classes("answer").props(f'data-testid="{self.name}-answer"')
-            )
+            self._shown = ui.html("", sanitize=False).classes("answer")
+            self._shown.props(f'data-testid="{self.name}-answer"')
+            for event in ("click", "keydown"):
+                self._shown.on(event, js_handler=ENLARGE)
         self._result.set_visibility(False)
 
     def form(self) -> None:

@@ -197,14 +197,15 @@ def _parameters(machine: Any) -> Table:
 
 
 def as_html(sheet: Sheet, figures: int = 1) -> str:
-    """A sheet in a notebook or on a page: facts, tables, the first figures, and what came out."""
+    """A sheet in a notebook or on a page: what came out, facts, tables, the first figures, notes."""
     facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
+    parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found) if text]
     parts += [_html(table) for table in (*facts, *sheet.tables) if table.rows]
     for stem, draw in tuple(sheet.figures.items())[:figures]:
         name = html.escape(f"{sheet.title}: {stem}")
         parts.append(f'<figure tabindex="0" role="img" aria-label="{name}">{_svg(draw())}</figure>')
-    parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found, *sheet.notes) if text]
+    parts += [f"<p>{html.escape(text)}</p>" for text in sheet.notes]
     return "\n".join(parts)
 
 
