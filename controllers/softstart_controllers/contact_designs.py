@@ -15,18 +15,11 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.late import late
-
-if TYPE_CHECKING:
-    from scipy import linalg
-else:
-    linalg = late("scipy.linalg")
 
 Array = NDArray[np.float64]
 
@@ -82,6 +75,8 @@ def _steps(value: float, per_decade: int) -> int:
 
 @cache
 def _feedback(step: int, ratio: int, lag: int | None, torque_weight: int, rate_weight: int) -> list[float]:
+    from scipy import linalg
+
     rate = 0.0 if lag is None else 10.0 ** (-lag / PER_DECADE)
     A = np.array([[0.0, 1.0, 0.0], [-1.0, -2.0 * ratio / RATIO_STEPS, 1.0], [0.0, 0.0, -rate]])
     Q = np.diag(
@@ -98,6 +93,8 @@ def _feedback(step: int, ratio: int, lag: int | None, torque_weight: int, rate_w
 
 @cache
 def _observer(step: int, ratio: int, share: int, noise: int) -> list[float]:
+    from scipy import linalg
+
     h, damping, mu = 10.0 ** (step / PER_DECADE), 2.0 * ratio / RATIO_STEPS, share / SHARE_STEPS
     A = np.zeros((5, 5))
     A[0, 1] = A[2, 3] = A[3, 4] = 1.0
@@ -118,6 +115,8 @@ def _regulator(A: Array, B: Array, Q: Array, R: float) -> list[float]:
 
     Of the transposed system it is the predictor of the stationary Kalman filter.
     """
+    from scipy import linalg
+
     try:
         X = linalg.solve_discrete_are(A, B, Q, np.array([[R]]))
     except np.linalg.LinAlgError:

@@ -13,10 +13,6 @@ from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.late import late
-
-profile_files = late("softstart.profile_files")
-
 
 MOST_SAMPLES = 1_000_000
 
@@ -238,16 +234,22 @@ class TorqueProfile:
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and torque as CSV, to the last bit; refused for a profile with `after_contact`."""
+        from softstart import profile_files
+
         profile_files.write_csv(self, Path(path))
 
     def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
         """Write TOML that the `profile` controller follows; `about` says where the profile comes from."""
+        from softstart import profile_files
+
         profile_files.write_toml(self, Path(path), about or {})
 
     def to_c(
         self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
     ) -> None:
         """Write C code with the function `double torque_profile(double time)`; `about` as in `to_toml`."""
+        from softstart import profile_files
+
         profile_files.write_c(self, Path(path), name, about)
 
     @classmethod
@@ -264,6 +266,8 @@ class TorqueProfile:
         InputError
             In one sentence that names the file, the place and the value.
         """
+        from softstart import profile_files
+
         found: TorqueProfile = profile_files.read_profile(Path(path))
         return found
 

@@ -27,14 +27,12 @@ import numpy as np
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.late import late
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softstart.chain.model import Chain, ChainArrays
 
-views = late("softstart.views.chains")
 
 AT_REST = 1e18  # times the inertia of all others: the motion of a mass at rest is below rounding
 FACTOR = 10.0
@@ -84,6 +82,8 @@ class Vibration:
 
     def plot(self, modes: int = 3) -> Figure:
         """The lowest elastic shapes with their nodes."""
+        from softstart.views import chains as views
+
         figure: Figure = views.shapes_figure(self, modes)
         return figure
 

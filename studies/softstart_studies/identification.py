@@ -34,12 +34,9 @@ from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.identification.planning import Experiment, made_up_log
-from softstart.late import late
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, drawing, head, new_figure
-
-casadi = late("casadi")
 
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
 SYMBOLS = ("J1", "J2", "c", "gap", "d")
@@ -123,6 +120,9 @@ def by_lsoda(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
 
 def by_shooting(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
     """Multiple shooting: all states at the samples are unknowns, tied by the equations of motion."""
+    import casadi as ca
+
+    casadi: Any = ca
     n = log.time.size
     p, s, u = casadi.MX.sym("p", 7), casadi.MX.sym("s", 4), casadi.MX.sym("u")
     J1, J2, c, gap, d = (casadi.exp(p[i]) for i in range(5))

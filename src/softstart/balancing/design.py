@@ -27,14 +27,11 @@ from softstart.arrays import Complex, Vector
 from softstart.balancing.engine import HIGHEST, Engine, moment_harmonic
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.quantities import to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
-views = late("softstart.views.balances")
 
 NOTHING = 1e-9  # of the forces of all cylinders: rounding, not a force
 RPM = 30.0 / math.pi  # of one rad/s
@@ -317,11 +314,15 @@ class Balance:
 
     def plot(self) -> Figure:
         """First-order moment, arm and force over the speed, for all designs."""
+        from softstart.views import balances as views
+
         figure: Figure = views.residual_figure(self)
         return figure
 
     def figures(self) -> dict[str, Figure]:
         """All figures by the stem of their file: torque over crank angle, residuals over speed, forces."""
+        from softstart.views import balances as views
+
         return {stem: draw() for stem, draw in views.drawings(self).items()}
 
 

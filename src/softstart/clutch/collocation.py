@@ -20,11 +20,9 @@ from softstart.clutch.engagement import engage
 from softstart.clutch.least_work import Slip
 from softstart.clutch.model import Clutch
 from softstart.errors import SimulationError
-from softstart.late import late
 
 __all__ = ["Collocated", "collocated"]
 
-ca = late("casadi")
 
 DEGREE = 3
 
@@ -45,6 +43,8 @@ def collocated(
 
     Raises SimulationError with IPOPT's verdict if it finds none.
     """
+    import casadi as ca
+
     slip = Slip.of(clutch)
     guess = engage(clutch.replace(law="linear", law_times=None, law_torques=None))
     opti: Any = ca.Opti()

@@ -35,10 +35,7 @@ from softstart.clutch.motion import (
 )
 from softstart.clutch.polynomials import definite, definite_integral, first_root, leading, roots, value
 from softstart.errors import InputError, SimulationError
-from softstart.late import late
 from softstart.quantities import to_si
-
-views = late("softstart.views.clutches")
 
 MOST_STEPS = 400_000
 MOST_AT_ONCE = 40
@@ -321,6 +318,8 @@ class Engagement:
 
     def plot(self) -> Any:
         """Torques, speeds and friction power over time."""
+        from softstart.views import clutches as views
+
         return views.engagement_figure([self], self.clutch.name)
 
 

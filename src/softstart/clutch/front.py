@@ -20,10 +20,7 @@ from softstart.clutch.laws import LAWS
 from softstart.clutch.least_work import Answer, Cut, Program, Slip, least_over_ends
 from softstart.clutch.model import Clutch
 from softstart.errors import InputError, SimulationError
-from softstart.late import late
 from softstart.quantities import nearest, show
-
-views = late("softstart.views.clutches")
 
 Progress = Callable[[str], object]
 
@@ -275,6 +272,8 @@ class EngagementFront:
 
     def plot(self) -> Any:
         """The front with the known laws, and the laws on it."""
+        from softstart.views import clutches as views
+
         return views.front_figure([self])
 
 

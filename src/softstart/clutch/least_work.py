@@ -50,10 +50,6 @@ from numpy.typing import NDArray
 from softstart.arrays import Vector
 from softstart.clutch.model import Clutch
 from softstart.errors import InputError
-from softstart.late import late
-
-optimize = late("scipy.optimize")
-
 
 CHECKS = 4  # instants in each step at which T <= P is asked
 FINER = 8  # points of the bound's grid in a step
@@ -237,6 +233,8 @@ class Program:
 
     def solve(self, end: Vector, P: float) -> Answer:
         """The least A with T <= P that ends at `end` = (a, b, D), or as near to it as PRICE allows."""
+        from scipy import optimize
+
         n, size = self.T.shape[1], self.slip.w0 * self.slip.tM
         MM = self.slip.MM
         # variables: M/MM, then what is missed of each end upwards and downwards, in its scale

@@ -15,11 +15,8 @@ from typing import Any
 from softstart.controller.base import Controller, Sensor
 from softstart.errors import InputError
 from softstart.input.files import refusal_of
-from softstart.late import late
 from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
-
-tuned = late("softstart.controller.tuned")
 
 GAIN_FILES = (".toml", ".csv")  # endings of files of tuned gains
 
@@ -75,6 +72,8 @@ def make_controller(
     >>> make_controller("ramp", {"time": "120 ms"}).time
     0.12
     """
+    from softstart.controller import tuned
+
     if isinstance(name, Controller):
         if parameters:
             raise InputError(

@@ -26,14 +26,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.late import late
 
 if TYPE_CHECKING:
     import control
 
     from softstart.drive.model import Drive
-else:
-    control = late("control")
 
 __all__ = ["in_contact", "initial_state", "shaft_torque", "whole_drive"]
 
@@ -55,6 +52,8 @@ def in_contact(drive: Drive) -> control.StateSpace:
     >>> in_contact(Drive.load("crane-4amtkf")).output_labels
     ['z', 'w1', 'w2', 'shaft_torque']
     """
+    import control
+
     J1, J2, c, d = drive.J1, drive.J2, drive.c, drive.d
     torque = np.array([[c, d, -d]])
     states = ["z", "w1", "w2"]
@@ -103,6 +102,8 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     >>> whole_drive(Drive.load("servo-axis-small")).state_labels
     ['phi1', 'w1', 'phi2', 'w2', 'u']
     """
+    import control
+
     states = _states(drive)
     actuator = _actuator(drive, states)
     smoothing = _SMOOTHING * drive.elastic_period

@@ -22,14 +22,11 @@ from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE
 from softstart.identification.traces import FEWEST, Kind
-from softstart.late import late
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
 from softstart.start.batch import prepared
 from softstart.start.engine import ended
 from softstart.start.rows import MAX_EVENTS
-
-views = late("softstart.views.identification")  # above this module; see softstart.late
 
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
@@ -178,6 +175,7 @@ class Plan:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
+        from softstart.views import identification as views
         from softstart.views import sheet
 
         return sheet.as_html(views.plan_sheet(self))

@@ -20,12 +20,9 @@ from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
-from softstart.late import late
 from softstart.quantities import RefusedError
 from softstart.start.comparison import INTERVAL, intervals
 from softstart.start.simulation import simulate
-
-views = late("softstart.views.identification")  # above this module; see softstart.late
 
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 CONFIDENCE = 0.95
@@ -325,11 +322,14 @@ class Identification:
 
     def plot(self) -> Any:
         """The logs beside the start of the drive found, and what is left; a matplotlib figure."""
+        from softstart.views import identification as views
+
         if not self.logs:
             raise InputError("logs: an identification that was loaded has none; their figure is beside it.")
         return views.figure(self)
 
     def _repr_html_(self) -> str:
+        from softstart.views import identification as views
         from softstart.views import sheet
 
         return sheet.as_html(views.identification_sheet(self))

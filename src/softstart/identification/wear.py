@@ -19,12 +19,9 @@ from softstart.chain.machines import varied
 from softstart.controller import Controller
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
-from softstart.late import late
 from softstart.quantities import show, to_si
 from softstart.start.comparison import INTERVAL, compared, make_controllers
 from softstart.start.recommendation import Row
-
-views = late("softstart.views.identification")  # above this module; see softstart.late
 
 YEAR: Final = 365.25  # days
 NOT_BY_CHANCE: Final = 3.0  # standard deviations by which a parameter has changed
@@ -195,12 +192,15 @@ class Wear:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
+        from softstart.views import identification as views
         from softstart.views import sheet
 
         return sheet.as_html(views.wear_sheet(self))
 
     def plot(self) -> Any:
         """The gaps over time, the line with its interval, and the limit; a matplotlib figure."""
+        from softstart.views import identification as views
+
         return views.wear_figure(self)
 
 

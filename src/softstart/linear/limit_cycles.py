@@ -50,15 +50,11 @@ from softstart.arrays import Complex, Vector
 from softstart.drive import Drive
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
-from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint
 from softstart.linear.sampled_plant import SampledPlant, motor_alone, sampled
 from softstart.linear.sampled_start import Part, Sample, SampledStart
 from softstart.linear.systems import System, at_points, zeros_of
 from softstart.start.recorded import FIRST_ROWS
-
-optimize = late("scipy.optimize")
-
 
 FREQUENCIES = 4000  # of the grid
 LARGEST = 100.0  # amplitude, in half gaps and mean windups
@@ -96,6 +92,8 @@ def bias_for(mean_torque: float, amplitude: float, half_gap: float, stiffness: f
     >>> bias_for(0.0, 2.0, 1.0, 5.0), round(bias_for(3.0, 0.1, 1.0, 5.0), 12)
     (0.0, 1.6)
     """
+    from scipy import optimize
+
     if mean_torque == 0.0:
         return 0.0
     wound = mean_torque / stiffness

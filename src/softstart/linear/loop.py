@@ -35,7 +35,6 @@ import numpy as np
 from softstart.arrays import Complex, Vector
 from softstart.chain.machines import Machine
 from softstart.kernel.motor import M_MOTOR_TORQUE
-from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint, closed
 from softstart.linear.sampled_plant import (
     Continuous,
@@ -62,10 +61,6 @@ from softstart.linear.systems import (
 
 if TYPE_CHECKING:
     import control
-else:
-    control = late("control")
-
-optimize = late("scipy.optimize")
 
 
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
@@ -166,6 +161,8 @@ def _phase_crossovers(L: Callable[[Vector], Complex], grid: Vector, period: floa
 
 
 def _modulus(L: Callable[[Vector], Complex], grid: Vector) -> tuple[float, float]:
+    from scipy import optimize
+
     distance = np.abs(1.0 + L(grid))
     index = int(np.argmin(distance))
     left, right = grid[max(index - 1, 0)], grid[min(index + 1, grid.size - 1)]
@@ -225,6 +222,7 @@ def _crossing(
     delay: float, frequency: float, period: float, delayed: Callable[[float], System]
 ) -> tuple[float, float]:
     """Where L_s(e^jwh) = -1, near a guess; infinite if there is none."""
+    from scipy import optimize
 
     def delay_and_frequency(shares: Vector) -> tuple[float, float]:
         return delay + (shares[0] - 1.0) * period, shares[1] * frequency
@@ -325,6 +323,8 @@ class Loop:
 
     def control_system(self, into: str, out: str) -> control.StateSpace:
         """L(z) for python-control."""
+        import control
+
         return control.StateSpace(*self.broken, self.period, inputs=[into], outputs=[out])
 
     @cached_property

@@ -19,11 +19,6 @@ from typing import NamedTuple
 import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
-from softstart.late import late
-
-linalg = late("scipy.linalg")
-optimize = late("scipy.optimize")
-
 
 TOLERANCE = 1e-8
 LOWEST = 1e-5  # of the highest frequency
@@ -93,6 +88,8 @@ def minimal(system: System, tolerance: float = TOLERANCE) -> System:
 
 def scaled(system: System, scales: Matrix, inputs: Matrix, outputs: Matrix) -> System:
     """States, inputs and outputs in units of these sizes, then the states balanced."""
+    from scipy import linalg
+
     n = scales.size
     A = system.A * scales[None, :] / scales[:, None]
     B = system.B * inputs[None, :] / scales[:, None]
@@ -182,6 +179,8 @@ def zeros_of(function: Callable[[Vector], Vector], grid: Vector, largest: float)
 
     A change of sign through infinity (a pole) does not count: at a zero the function is below `largest`.
     """
+    from scipy import optimize
+
     values = function(grid)
     found = []
     for index in np.flatnonzero(np.signbit(values[:-1]) != np.signbit(values[1:])):

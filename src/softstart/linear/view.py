@@ -16,7 +16,6 @@ from softstart.controller.finding import make_controller
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
-from softstart.late import late
 from softstart.linear.limit_cycles import Cycle, Outside, Verdict, check_cycle, cycles
 from softstart.linear.loop import Loop, Margins
 from softstart.linear.operating_point import (
@@ -32,10 +31,7 @@ from softstart.linear.systems import Mode
 
 if TYPE_CHECKING:
     import control
-else:
-    control = late("control")
 
-views = late("softstart.views.linear")
 
 INERTIAS = (0.4, 1.0, 2.5)
 STIFFNESSES = (0.9, 1.1)
@@ -149,6 +145,8 @@ class LinearView:
     @property
     def controller_system(self) -> control.StateSpace:
         """The controller's law, minimal: from the measured quantities to the demand in N m."""
+        import control
+
         point = self._point()
         law = self._loop().minimal_law
         return control.StateSpace(
@@ -186,6 +184,8 @@ class LinearView:
     @property
     def conclusion(self) -> str:
         """One sentence."""
+        from softstart.views import linear as views
+
         sentence: str = views.conclusion(self)
         return sentence
 
@@ -251,12 +251,15 @@ class LinearView:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
+        from softstart.views import linear as views
         from softstart.views import sheet
 
         return sheet.as_html(views.linear_sheet(self))
 
     def plot(self) -> Any:
         """Bode diagram with the margins marked, and Nyquist diagram with the describing function's locus."""
+        from softstart.views import linear as views
+
         self._loop()
         return views.linear_figure(self)
 

@@ -17,7 +17,6 @@ from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.late import late
 from softstart.optimal.descent import BEND
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
@@ -26,8 +25,6 @@ from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
-
-optima = late("softstart.views.optima")  # it draws results of this module
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
@@ -211,12 +208,14 @@ class Front:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
-        from softstart.views import sheet
+        from softstart.views import optima, sheet
 
         return sheet.as_html(optima.front_sheet(self))
 
     def plot(self) -> Any:
         """The curve with its bound, and the controllers as points."""
+        from softstart.views import optima
+
         return optima.front_figure(self)
 
 

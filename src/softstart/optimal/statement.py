@@ -30,20 +30,20 @@ from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.kernel import records as at
-from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged
 from softstart.optimal.starts import carried, parts
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 
-ca: Any = late("casadi")
+ca: Any = casadi
 
 DEGREE = 5
 LEAST = 1e-9  # of the start time: what is shorter is no phase

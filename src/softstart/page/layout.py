@@ -7,24 +7,20 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import new_class
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import nicegui
+from nicegui import ui
+from nicegui.client import Client
+from nicegui.element import Element
 
 from softstart.chain.machines import Machine
-from softstart.late import late
 from softstart.page import USER
 from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
-
-if TYPE_CHECKING:
-    import nicegui
-    from nicegui import ui
-    from nicegui.client import Client
-    from nicegui.element import Element
-else:  # the state and the server need no NiceGUI until a page is built
-    nicegui, ui = late("nicegui"), late("nicegui.ui")
 
 WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
@@ -45,7 +41,7 @@ def instrument() -> type[Element]:
     """The element that draws everything live: `web/softstart_instrument.js`, over the modules beside it."""
     return new_class(
         "Instrument",
-        (late("nicegui.element").Element,),
+        (Element,),
         {"component": WEB / "softstart_instrument.js", "esm": {"softstart-page": str(WEB / "modules")}},
     )
 

@@ -27,20 +27,10 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, quote, urlsplit
 
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.page import USER
 
 if TYPE_CHECKING:
-    import fastapi
-    import nicegui
-    import uvicorn
-    from nicegui import ui
-
     from softstart.chain.machines import Machine
-    from softstart.page import layout
-else:  # of the extra "ui", and only for a server
-    fastapi, uvicorn, nicegui, ui = late("fastapi"), late("uvicorn"), late("nicegui"), late("nicegui.ui")
-    layout = late("softstart.page.layout")
 
 DEFAULT_PORT = 8765
 SHORTEST_TOKEN = 16
@@ -180,9 +170,15 @@ def guarded(app: App, address: Address, port: int) -> Guard:
 
 def application(drive: Machine) -> App:
     """The ASGI application: NiceGUI with the page at `/`. One a process, since NiceGUI is one a process."""
-    # NiceGUI reads and stores things in the folder it is started in; the page stores nothing, and nobody can
-    # put anything for it to read where no file can be
+    # NiceGUI, when it is imported, reads and stores things in the folder it is started in; the page stores
+    # nothing, and nobody can put anything for it to read where no file can be
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(os.devnull) / "nothing")
+    import fastapi
+    import nicegui
+    from nicegui import ui
+
+    from softstart.page import layout
+
     for noisy in NOISY:
         logging.getLogger(noisy).setLevel(logging.CRITICAL)
     layout.gentlest(drive)  # before anybody waits for it
@@ -212,6 +208,8 @@ def application(drive: Machine) -> App:
 
 def run(drive: Machine, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
+    import uvicorn
+
     port = int(listener.getsockname()[1])
     app = guarded(application(drive), address, port)
     config = uvicorn.Config(

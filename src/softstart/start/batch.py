@@ -20,7 +20,6 @@ from softstart.drive.records import Records, each_of
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
-from softstart.late import late
 from softstart.parallel import Pool
 from softstart.start.engine import run_one, watched
 from softstart.start.recorded import Recorder
@@ -29,8 +28,6 @@ from softstart.start.status import status_of
 
 if TYPE_CHECKING:
     import xarray
-else:
-    xarray = late("xarray")
 
 Figures = dict[str, tuple[Any, str, str]]  # name -> values, unit, meaning
 Which = NDArray[np.int64]
@@ -414,6 +411,8 @@ def _different(machines: Sequence[Any]) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.Dataset:
+    import xarray
+
     return xarray.Dataset(
         {name: (dims, values, {"units": unit, "long_name": meaning})
          for name, (dims, values, unit, meaning) in data.items()},

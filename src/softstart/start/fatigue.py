@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,18 +13,10 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
-from softstart.late import late
 from softstart.quantities import to_si
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-
-if TYPE_CHECKING:
-    import rainflow
-else:
-    rainflow = late("rainflow")
-
-views = late("softstart.views.fatigue")  # above this module; see softstart.late
 
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
 DEFAULT_SLOPE = 6.6
@@ -203,12 +195,15 @@ class Fatigue:
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
+        from softstart.views import fatigue as views
         from softstart.views import sheet
 
         return sheet.as_html(views.fatigue_sheet(self))
 
     def plot(self) -> Any:
         """Ranges of the cycles over how many there are, for each strategy, and lives beside `direct`."""
+        from softstart.views import fatigue as views
+
         return views.fatigue_figure(self)
 
 
@@ -325,6 +320,8 @@ def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matr
     >>> rainflow_cycles([0.0, 3.0, 1.0, 2.0], repeated=True).tolist()
     [[3.0, 1.5, 1.0], [1.0, 1.5, 1.0]]
     """
+    import rainflow
+
     history = list(torques)
     if repeated and history:
         sizes = list(map(abs, history))

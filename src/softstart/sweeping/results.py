@@ -11,20 +11,13 @@ import numpy as np
 
 from softstart import __version__
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.start.status import Status
 from softstart.store import fresh_folder
 from softstart.sweeping.grid import Axis, Plan
 from softstart.sweeping.starts import Block, Question, Task, known_figures
 
 if TYPE_CHECKING:
-    import h5netcdf
-    import h5py
     import xarray
-else:
-    h5netcdf = late("h5netcdf")
-    h5py = late("h5py")
-    xarray = late("xarray")
 
 STATUS = "status"
 NOT_COMPUTED = -1  # in `status`, of a start that has not been computed yet
@@ -132,6 +125,8 @@ class Memory:
 
     def results(self) -> xarray.Dataset:
         """The results."""
+        import xarray
+
         return xarray.Dataset(
             {
                 one.name: (one.dims, self.arrays[one.name], one.attributes)
@@ -177,6 +172,8 @@ def _write(
     path: Path, results: xarray.Dataset, plan: Plan, axes: tuple[Axis, ...], question: Question
 ) -> None:
 
+    import h5netcdf
+
     samples = [column.name for axis in axes if axis.paired for column in axis.columns]
     with h5netcdf.File(path, "w") as file:
         file.dimensions = {axis.name: axis.size for axis in axes}
@@ -193,6 +190,8 @@ def _write(
 
 
 def _variable(file: Any, one: Variable, chunks: tuple[int, ...] | None) -> Any:
+
+    import h5py
 
     if one.dtype.kind == "O":
         made = file.create_variable(one.name, one.dims, h5py.string_dtype())

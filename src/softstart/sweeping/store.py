@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 from softstart import __version__
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.stopping import at_stop
 from softstart.store import Records, Target, fresh_folder, warn_of_damage
 from softstart.sweeping.grid import Axis, Plan
@@ -29,12 +28,6 @@ from softstart.sweeping.starts import Block, Question, Task, compute
 
 if TYPE_CHECKING:
     import xarray
-    import zarr
-    from zarr import codecs, errors
-else:
-    codecs, errors = late("zarr.codecs"), late("zarr.errors")
-    xarray = late("xarray")
-    zarr = late("zarr")
 
 
 def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
@@ -116,6 +109,8 @@ class Folder:
 
     def results(self) -> xarray.Dataset:
         """The results, read when they are looked at; starts not yet computed are NaN, status -1."""
+        import xarray
+
         found: xarray.Dataset = xarray.open_zarr(self.path, chunks=None)[self._names]
         return found
 
@@ -208,6 +203,8 @@ def _checksum(file: Path) -> str | None:
 @lru_cache(maxsize=4)
 def _opened(path: str) -> dict[str, Any]:
     """The arrays of a sweep to write to."""
+    import zarr
+
     return dict(zarr.open_group(path, mode="r+").arrays())
 
 
@@ -223,6 +220,9 @@ def _free(home: Path, file: Path) -> None:
 
 
 def _fill(fresh: Path, plan: Plan, axes: tuple[Axis, ...], question: Question) -> None:
+    import zarr
+    from zarr import errors
+
     attributes = about(question, plan)
     samples = [c.name for axis in axes if axis.paired for c in axis.columns]
     if samples:
@@ -239,6 +239,8 @@ def _fill(fresh: Path, plan: Plan, axes: tuple[Axis, ...], question: Question) -
 
 
 def _array(group: Any, one: Variable, shape: tuple[int, ...], chunks: tuple[int, ...]) -> Any:
+    from zarr import codecs
+
     return group.create_array(
         one.name,
         shape=shape,

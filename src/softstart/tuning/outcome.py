@@ -25,7 +25,6 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.late import late
 from softstart.tuning.question import Question
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 
     from softstart.chain.machines import Machine
 
-views = late("softstart.views.tuning")
 
 What = Literal["schedule", "robust"]
 
@@ -171,6 +169,7 @@ class Tuning:
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
         from softstart.views import sheet
+        from softstart.views import tuning as views
 
         return sheet.as_html(views.tuning_sheet(self))
 
@@ -179,6 +178,8 @@ class Tuning:
 
         By default the price of robustness if there is one, else the maps of the metric.
         """
+        from softstart.views import tuning as views
+
         return views.figure_of(self, what)
 
     def to_toml(self, path: str | Path, what: What | None = None) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 from softstart.chain.machines import Machine
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.optimal.optimize import optimize
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.parallel import Pool
@@ -26,8 +25,6 @@ from softstart.tuning.work import Log
 
 if TYPE_CHECKING:
     import xarray
-else:
-    xarray = late("xarray")
 
 Columns = dict[str, tuple[Any, str, str]]  # name -> values of the cells, unit, meaning
 
@@ -191,6 +188,8 @@ def _quantile(values: Any, share: float) -> float:
 
 
 def _dataset(trials: Trials, columns: Columns) -> xarray.Dataset:
+
+    import xarray
 
     question = trials.question
     shape = (len(question.gaps), len(question.load_inertias))

@@ -356,7 +356,7 @@ def test_an_unknown_strategy_is_told_with_the_nearest_name():
 
 def test_state_and_server_need_no_nicegui_until_the_page_is_built():
     code = (
-        "import sys, softstart.page.serve, softstart.page.layout, softstart.page.session;"
+        "import sys, softstart.page.serve, softstart.page.session;"
         "import softstart.cli.serve;"
         "sys.exit('nicegui' in sys.modules)"
     )
