@@ -228,7 +228,7 @@ def commands() -> Values:
         ("balance", "--speed", "4500rpm"),
         ("drives",),
         ("controllers",),
-        ("study", "--list"),
+        ("study",),
         ("study", "paper-b"),
         ("compare", "crane-4amtk"),
         ("simulate", "crane-4amtkf", "--controller", "ramp", "--set", "shaft.gap=-1"),

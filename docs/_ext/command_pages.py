@@ -13,7 +13,7 @@ from softstart.cli.commands import cli
 
 def commands() -> str:
     """Every command with its arguments and options, in the order of `softstart --help`."""
-    context = click.Context(cli, info_name="softstart")
+    context = click.Context(cli, info_name="softstart", **cli.context_settings)
     return "\n".join(line for name in cli.list_commands(context) for line in _command(name, context))
 
 

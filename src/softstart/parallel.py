@@ -213,14 +213,13 @@ def _serve(modules: Sequence[str], niceness: int) -> None:
     if niceness and hasattr(os, "nice"):
         os.nice(niceness)
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)  # what a controller or a solver prints must not get between the messages
-    tasks: SimpleQueue[bytes] = SimpleQueue()
+    tasks: SimpleQueue[Any] = SimpleQueue()
     lock = threading.Lock()
 
     def listen() -> None:
-        _collect(questions, tasks)  # type: ignore[arg-type]
+        _collect(questions, tasks)
         _kill_group(os.getpid())  # the parent has died
         os._exit(1)
 
@@ -234,21 +233,17 @@ def _serve(modules: Sequence[str], niceness: int) -> None:
     for module in modules:
         import_module(module)
     while True:
-        _answer(tasks.get(), send)
-
-
-def _answer(task: bytes, send: Callable[[Message], None]) -> None:
-    """Run one function and send its result, or what it raised."""
-    try:
-        function, args, reports = pickle.loads(task)
-        send(Message("result", function(*args, **({"progress": Progress(send)} if reports else {}))))
-    except Exception as error:  # of any kind: it belongs to whoever asked
-        text = "".join(traceback.format_exception(error))
         try:
-            pickle.loads(pickle.dumps(error))
-        except Exception:  # a class that cannot be pickled is sent as its text
-            error = RuntimeError(f"{type(error).__name__}: {error}")
-        send(Message("error", (error, text)))
+            function, args, reports = pickle.loads(tasks.get())
+            result = function(*args, progress=Progress(send)) if reports else function(*args)
+            send(Message("result", result))
+        except Exception as error:  # of any kind: it belongs to whoever asked
+            text, failure = "".join(traceback.format_exception(error)), error
+            try:
+                pickle.loads(pickle.dumps(error))
+            except Exception:  # a class that cannot be pickled is sent as its text
+                failure = RuntimeError(f"{type(error).__name__}: {error}")
+            send(Message("error", (failure, text)))
 
 
 # many tasks ---------------------------------------------------------------------------------------------
@@ -317,7 +312,7 @@ class Pool:
         self.describe, self.advice, self.kept = describe, advice, kept
         self.stopping = threading.Event()
         self._workers: list[Worker] = []
-        self._free: SimpleQueue[Worker | None] = SimpleQueue()
+        self._own = threading.local()
         self._executor: Any = None  # of threads, each of which may have a Worker, or of dask
         self._client: Any = None
 
@@ -327,8 +322,6 @@ class Pool:
             self._executor = self._client.get_executor()
         elif self.count > 1:
             self._executor = ThreadPoolExecutor(self.count)
-            for _ in range(self.count):
-                self._free.put(None)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -361,47 +354,44 @@ class Pool:
                 yield running.pop(future), self._result(future)
 
     def _in_process(self, function: Callable[[T], R], task: T) -> R:
-        worker = self._free.get()
-        try:
-            for _ in range(ATTEMPTS):
-                worker = worker or self._started()
-                try:
-                    return worker.run(function, task)
-                except DiedError as error:
-                    death, worker = error, None
-                    if self.stopping.is_set():
-                        raise
-            raise SimulationError(
-                f"A process died {ATTEMPTS} times ({death}) while it computed {self.describe(task)}; if the "
-                f"system ended it for want of memory, {self.advice}. {self.kept}"
-            )
-        finally:
-            self._free.put(worker)
+        for _ in range(ATTEMPTS):
+            try:
+                return self._worker().run(function, task)
+            except DiedError as error:
+                death = error
+                if self.stopping.is_set():
+                    raise
+        raise SimulationError(
+            f"A process died {ATTEMPTS} times ({death}) while it computed {self.describe(task)}; if the "
+            f"system ended it for want of memory, {self.advice}. {self.kept}"
+        )
 
-    def _started(self) -> Worker:
-        worker = Worker()
-        self._workers.append(worker)
-        if self.stopping.is_set():  # the block has ended meanwhile
-            worker.kill()
+    def _worker(self) -> Worker:
+        """The process of this thread, started when first needed and when the one before has died."""
+        worker: Worker | None = getattr(self._own, "worker", None)
+        if worker is None or not worker.alive:
+            worker = self._own.worker = Worker()
+            self._workers.append(worker)
+            if self.stopping.is_set():  # the block has ended meanwhile
+                worker.kill()
         return worker
 
     def _result(self, future: Future[R]) -> R:
-        if self.scheduler is None:
-            return future.result()
-        distributed: Any = import_module("distributed")
         try:
             return future.result()
-        except distributed.KilledWorker as error:
-            raise SimulationError(
-                f"Several workers of the dask cluster died with the same task ({_short(error)}). {self.kept}"
-            ) from None
-        except ImportError as error:
-            raise InputError(
-                f"scheduler: a worker of the cluster cannot load what it needs ({error}); install there what "
-                "is installed here."
-            ) from None
-        except (CancelledError, OSError) as error:
-            raise SimulationError(f"The dask scheduler was lost ({_short(error)}). {self.kept}") from None
+        except Exception as error:
+            what = type(error)
+            if self.scheduler is None or what.__module__.startswith("softstart"):
+                raise
+            if isinstance(error, ImportError):
+                raise InputError(
+                    f"scheduler: a worker of the cluster cannot load what it needs ({error}); install there "
+                    "what is installed here."
+                ) from None
+            if what.__module__.startswith("distributed") or isinstance(error, OSError | CancelledError):
+                text = f"The dask cluster lost a task: {what.__name__} ({_short(error)}). {self.kept}"
+                raise SimulationError(text) from None
+            raise
 
 
 def _same_version(version: str, function: Callable[[T], R], task: T) -> R:
@@ -419,23 +409,20 @@ def connect(address: str) -> Any:
     try:
         distributed: Any = import_module("distributed")  # optional: comes with softstart[cluster]
     except ImportError:
-        raise InputError(
-            "scheduler: dask.distributed is not installed; it comes with pip install 'softstart[cluster]'."
-        ) from None
+        install = "it comes with pip install 'softstart[cluster]'"
+        raise InputError(f"scheduler: dask.distributed is not installed; {install}.") from None
+    client = None
     try:
         client = distributed.Client(address, timeout=CLUSTER_TIMEOUT, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f'scheduler = "{address}": no dask scheduler answers there ({_short(error)}); start one with '
-            '"dask scheduler" and give its address, as tcp://host:8786.'
-        ) from None
-    try:
         client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT)
-    except TimeoutError:
-        client.close()
-        raise InputError(
-            f'scheduler = "{address}": it has no worker; start some with "dask worker {address}".'
-        ) from None
+    except (OSError, ValueError, TypeError) as error:  # of which TimeoutError is one
+        reason = f'it has no worker; start some with "dask worker {address}"'
+        if client is None:
+            start = 'start one with "dask scheduler" and give its address, as tcp://host:8786'
+            reason = f"no dask scheduler answers there ({_short(error)}); {start}"
+        else:
+            client.close()
+        raise InputError(f'scheduler = "{address}": {reason}.') from None
     return client
 
 

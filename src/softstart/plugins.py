@@ -45,7 +45,7 @@ def load(group: str, kind: str, name: str, lists: str) -> object:
 
     Raises InputError in one sentence for an unknown name and for one that does not load.
 
-    >>> load("softstart.studies", "study", "papper-g", "softstart study --list")
+    >>> load("softstart.studies", "study", "papper-g", "softstart study")
     Traceback (most recent call last):
     softstart.errors.InputError: study = "papper-g": there is no study of this name; did you mean "paper-g"?
     """

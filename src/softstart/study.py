@@ -142,7 +142,7 @@ def find_study(name: str) -> Study:
     Traceback (most recent call last):
     softstart.errors.InputError: study = "papper-g": there is no study of this name; did you mean "paper-g"?
     """
-    found = load(STUDIES, "study", name, "softstart study --list")
+    found = load(STUDIES, "study", name, "softstart study")
     if not (isinstance(found, type) and issubclass(found, Study)):
         raise InputError(f'study = "{name}": {found!r} is no study; derive it from softstart.study.Study.')
     return found()

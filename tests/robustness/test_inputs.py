@@ -129,11 +129,11 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "drives": ["--json"],
     "controllers": ["--json"],
-    "study": ["--list", "--json"],
+    "study": ["--json"],
     "completion": ["--help"],
 }  # fmt: skip
 FLAGS = {
-    "--allow-code", "--json", "--force", "--no-starts", "--optimal", "--nondecreasing", "--expose", "--list",
+    "--allow-code", "--json", "--force", "--no-starts", "--optimal", "--nondecreasing", "--expose",
     "--help",
 }  # fmt: skip
 PATHS = {

@@ -2,58 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
-from itertools import pairwise, takewhile
-from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from softstart import __version__
-from softstart.errors import Mistakes, listed
+from softstart.errors import listed
 
-# name: the module in this package that defines it, and the first sentence of its help
-COMMANDS = {
-    "compare": ("starts", "Compare strategies on a drive or a chain."),
-    "simulate": ("starts", "Simulate one start of a drive or a chain."),
-    "fatigue": ("starts", "Estimate the fatigue life of the shaft line under each strategy."),
-    "optimize": (
-        "optimize", "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound."
-    ),
-    "pareto": (
-        "pareto", "Compute the lowest K_dyn over the start time, and compare the controllers with it."
-    ),
-    "tune": ("tune", "Tune a controller for each gap and load inertia, and one robust set of gains."),
-    "sweep": ("sweep", "Simulate a grid of drives and controllers of any size."),
-    "linear": ("linear", "Linearise the control loop: stability margins, modes, limit cycles."),
-    "reduce": ("reduce", "Compute the natural frequencies of a chain, and reduce it to two masses."),
-    "clutch": ("clutch", "Simulate a clutch engagement: peak shaft torque, friction work, slip time."),
-    "balance": ("balance", "Compute forces and moments of a piston engine by order, and design a balancer."),
-    "report": ("report", "Write a report on the start of a drive or a chain as one HTML file."),
-    "serve": ("serve", "Open the interactive page in the browser."),
-    "init": ("init", "Create a drive file from data sheet values."),
-    "plan": ("identify", "Plan an experiment that identifies a drive accurately."),
-    "identify": (
-        "identify", "Identify the parameters of a drive, with confidence intervals, from inverter logs."
-    ),
-    "wear": (
-        "identify",
-        "Compute the growth of the gap from several identifications, and when it is worn.",
-    ),
-    "drives": ("lists", "List the shipped drives, or print one as TOML."),
-    "controllers": ("lists", "List the controllers, or show the parameters of one."),
-    "study": ("study", "List the studies, or run one."),
-    "completion": ("completion", "Print the script for completion with the Tab key."),
-}  # fmt: skip
+# by purpose: the name of a command, the module in this package that defines it, the beginning of its help
 PURPOSES = {
-    "Your own drive": ("init", "plan", "identify", "wear", "drives", "reduce"),
-    "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
-    "Design": ("optimize", "pareto", "tune", "sweep"),
-    "Results": ("serve", "report"),
-    "Other machines and tools": ("clutch", "balance", "study", "completion"),
-}
+    "Your own drive": (
+        ("init", "init", "Create a drive file from data sheet values."),
+        ("plan", "identify", "Plan an experiment that identifies a drive accurately."),
+        ("identify", "identify",
+         "Identify the parameters of a drive, with confidence intervals, from inverter logs."),
+        ("wear", "identify",
+         "Compute the growth of the gap from several identifications, and when it is worn."),
+        ("drives", "lists", "List the shipped drives, or print one as TOML."),
+        ("reduce", "reduce", "Compute the natural frequencies of a chain, and reduce it to two masses."),
+    ),
+    "Strategies": (
+        ("compare", "starts", "Compare strategies on a drive or a chain."),
+        ("simulate", "starts", "Simulate one start of a drive or a chain."),
+        ("fatigue", "starts", "Estimate the fatigue life of the shaft line under each strategy."),
+        ("controllers", "lists", "List the controllers, or show the parameters of one."),
+        ("linear", "starts", "Linearise the control loop: stability margins, modes, limit cycles."),
+    ),
+    "Design": (
+        ("optimize", "optimize",
+         "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound."),
+        ("pareto", "optimize",
+         "Compute the lowest K_dyn over the start time, and compare the controllers with it."),
+        ("tune", "tune", "Tune a controller for each gap and load inertia, and one robust set of gains."),
+        ("sweep", "sweep", "Simulate a grid of drives and controllers of any size."),
+    ),
+    "Results": (
+        ("serve", "serve", "Open the interactive page in the browser."),
+        ("report", "report", "Write a report on the start of a drive or a chain as one HTML file."),
+    ),
+    "Other machines and tools": (
+        ("clutch", "machines", "Simulate a clutch engagement: peak shaft torque, friction work, slip time."),
+        ("balance", "machines",
+         "Compute forces and moments of a piston engine by order, and design a balancer."),
+        ("study", "lists", "List the studies, or run one."),
+        ("completion", "completion", "Print the script for completion with the Tab key."),
+    ),
+}  # fmt: skip
+COMMANDS = {name: (module, text) for rows in PURPOSES.values() for name, module, text in rows}
 
 GREETING = f"""\
 softstart {__version__}: soft-start torque strategies for drives with backlash.
@@ -73,92 +71,7 @@ For completion with the Tab key: eval "$(softstart completion bash)", or zsh, or
 """
 
 
-TYPED = "softstart.typed"
-
-
-def typed(name: str) -> Any:
-    """The text of this option or argument of the command that runs; None where it is not given."""
-    return click.get_current_context().meta[TYPED][name]
-
-
-class Reading(click.types.StringParamType):
-    """The type of an option whose command is given what `read(text, option, *others)` returns.
-
-    `option` is the option's name, and `others` are what the options `needs` have; one of them without a
-    reading, as --set, is text for this one alone, which the command does not see. `words` are offered to
-    complete it.
-    """
-
-    def __init__(self, read: Callable[..., Any], *needs: str, words: Sequence[str] = ()) -> None:
-        self.read, self.needs, self.words = read, needs, words
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """The words that begin with `incomplete`."""
-        return [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
-
-
-class Command(click.Command):
-    """A command that reads its options, and names itself in its usage errors.
-
-    What is wrong with any option is reported together with what the `checks` find, which are called with all
-    values by name; a value that could not be read is None there.
-    """
-
-    def __init__(
-        self, *arguments: Any, checks: Sequence[Callable[[Mapping[str, Any]], None]] = (), **keywords: Any
-    ) -> None:
-        super().__init__(*arguments, **keywords)
-        self.checks = checks
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Read all options, report all mistakes at once, and run the command with the values."""
-        mistakes = Mistakes()
-        ctx.meta[TYPED] = ctx.params
-        ctx.params = self._read(ctx.params, mistakes)
-        for check in self.checks:
-            with mistakes.noted():
-                check(ctx.params)
-        mistakes.settle()
-        return super().invoke(ctx)
-
-    def _read(self, given: Mapping[str, Any], mistakes: Mistakes) -> dict[str, Any]:
-        options = {str(one.name): one for one in self.params if one.name in given}
-        readings = {name: one.type for name, one in options.items() if isinstance(one.type, Reading)}
-        found = {name: text for name, text in given.items() if name not in readings or text is None}
-
-        def value(name: str) -> Any:
-            if name not in found:
-                found[name] = None  # if it cannot be read
-                others = [value(other) for other in readings[name].needs]
-                with mistakes.noted():
-                    found[name] = readings[name].read(given[name], options[name].opts[0], *others)
-            return found[name]
-
-        texts = {other for one in readings.values() for other in one.needs if other not in readings}
-        return {name: value(name) for name in options if name not in texts}
-
-    def get_help_option_names(self, ctx: click.Context) -> list[str]:
-        """Both names, whichever context asks first: click keeps the option that it has made for that one."""
-        return ["-h", "--help"]
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """The arguments read; a UsageError always has its context, and no option is the value of another."""
-        try:
-            options = [one for one in self.get_params(ctx) if isinstance(one, click.Option)]
-            names = {name for one in options for name in one.opts}
-            valued = {name for one in options if not (one.is_flag or one.count) for name in one.opts}
-            for name, value in pairwise(takewhile("--".__ne__, args)):
-                if name in valued and value in names and not ctx.resilient_parsing:
-                    raise click.BadOptionUsage(name, f"{name} needs a value", ctx)
-            return super().parse_args(ctx, args)
-        except click.UsageError as error:
-            error.ctx = error.ctx or ctx
-            raise
-
-
-class Commands(Command, click.Group):
+class Commands(click.Group):
     """The group: it lists its commands without importing them, and imports one when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -174,15 +87,17 @@ class Commands(Command, click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of commands in the help, by purpose."""
-        limit = formatter.width - 6 - max(map(len, COMMANDS))
         wide = max(map(len, COMMANDS))
-        for purpose, names in PURPOSES.items():
+        for purpose, rows in PURPOSES.items():
             with formatter.section(purpose):
-                formatter.write_dl([(f"{name:{wide}}", short_help(name, limit)) for name in names])
+                limit = formatter.width - 6 - wide
+                formatter.write_dl([(f"{name:{wide}}", short_help(name, limit)) for name, *_ in rows])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options that begin with `incomplete`."""
-        found = [CompletionItem(n, help=short_help(n)) for n in COMMANDS if n.startswith(incomplete)]
+        found = [
+            CompletionItem(name, help=short_help(name)) for name in COMMANDS if name.startswith(incomplete)
+        ]
         return found + click.Command.shell_complete(self, ctx, incomplete)
 
     def resolve_command(
@@ -191,15 +106,16 @@ class Commands(Command, click.Group):
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
-            hint = did_you_mean(name, known, "softstart ")
-            raise click.UsageError(f'there is no command "{name}"; {hint}', ctx)
+            raise click.UsageError(
+                f'there is no command "{name}"; {did_you_mean(name, known, "softstart ")}', ctx
+            )
         return super().resolve_command(ctx, args)
 
 
 @click.group(
     cls=Commands,
     invoke_without_command=True,
-    context_settings={"max_content_width": 100},
+    context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
     no_args_is_help=False,
 )
@@ -226,20 +142,16 @@ def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
     """
     known = list(valid)
     near = get_close_matches(name.lower(), known, n=1, cutoff=0.5)
-    if near:
-        return f"did you mean {before}{near[0]}?"
-    return f"there are {listed(known)}." if known else "there are none."
+    return f"did you mean {before}{near[0]}?" if near else f"there are {listed(known)}."
 
 
-def usage_sentence(error: click.UsageError) -> str:
+def usage_sentence(error: click.UsageError, command: str = "") -> str:
     """One sentence for what click refused, with the command it was about and where help is.
 
-    >>> usage_sentence(click.UsageError("there is no such thing."))
-    'there is no such thing. See "softstart --help".'
+    >>> usage_sentence(click.UsageError("there is no such thing."), "tune")
+    'tune: there is no such thing. See "softstart tune --help".'
     """
-    command = error.ctx.command_path if error.ctx else "softstart"
-    place = command.removeprefix("softstart").strip()
+    place = command if command in COMMANDS else ""
     reason = error.format_message().strip()
-    if reason[-1:] not in (".", "?"):
-        reason += "."
-    return f'{place + ": " if place else ""}{reason} See "{command} --help".'
+    end = "" if reason[-1:] in (".", "?") else "."
+    return f'{place}{": " if place else ""}{reason}{end} See "softstart {place}{" " if place else ""}--help".'

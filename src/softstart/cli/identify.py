@@ -2,102 +2,96 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.commands import Command, Reading
-from softstart.cli.completion import names_or_files
-from softstart.cli.running import answering, working
-from softstart.late import late
+from softstart.cli.completion import one_of
+from softstart.cli.options import reading
+from softstart.cli.running import Answer, answers, working
+from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
     from softstart.drive import Drive
-    from softstart.views import identification as views
-else:  # no numba for a help, a wrong option or the Tab key
-    views = late("softstart.views.identification")
 
 STRATEGIES = ["direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold"]
 
-free_option = click.option("--free", metavar="NAME,...", type=Reading(options.read_list),
+free_option = click.option("--free", metavar="NAME,...", callback=reading(options.read_list),
     help="Parameters to identify, for example gap,stiffness,position; +motor.friction adds one to the "
     "default set.")  # fmt: skip
 strategies_option = click.option(
-    "--controllers", metavar="NAME,...", type=Reading(options.read_names), default=",".join(STRATEGIES),
+    "--controllers", metavar="NAME,...", callback=reading(options.read_names), default=",".join(STRATEGIES),
     help=f"Strategies to simulate. Default: {','.join(STRATEGIES)}.",
 )  # fmt: skip
 
 
-@click.command(cls=Command)
-@options.drive_argument(options.read_drive, needed=True)
-@options.set_option
+@click.command()
 @free_option
 @click.option("--log-period", metavar="TIME", default="4 ms", help="Sample period of the log. Default: 4 ms.")
 @click.option("--ripple", metavar="TORQUE", help="Standard deviation of the torque error in each sample.")
 @click.option("--standard", is_flag=True, help="Evaluate the standard experiments only.")
-@click.option("--wanted", metavar="NAME,...", type=Reading(options.read_list),
+@click.option("--wanted", metavar="NAME,...", callback=reading(options.read_list),
     help="Parameters whose accuracy is optimised, for example gap. Default: all.")  # fmt: skip
 @click.option("--max-torque", metavar="TORQUE", help="Upper bound of the shaft torque.")
 @click.option(
     "--max-travel", metavar="ANGLE", help="Upper bound of the travel of the load, referred to the motor."
 )
-@options.json_option
-@options.out_option("Write torque profiles (CSV, TOML), simulated logs, figure and report into this folder.")
-def plan(*, drive: Drive, standard: bool, as_json: bool, out: str | None, **asked: Any) -> None:
+@options.of_drive(options.read_drive, needed=True)
+@answers("Write torque profiles (CSV, TOML), simulated logs, figure and report into this folder.")
+def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
     """Plan an experiment that identifies a drive accurately.
 
     DRIVE is your estimate, as a TOML file or the name of a shipped drive (see: softstart drives). The
     expected accuracy of standard experiments is computed, and of one that is designed for this drive.
     """
-    with answering(as_json, out) as answer:
-        with working("planning experiments ...") as progress, options.named_as_options():
-            asked["wanted"] = asked["wanted"] or ()
-            made = softstart.plan_experiments(drive, optimise=not standard, progress=progress, **asked)
-        answer(made.summary, views.plan_sheet(made))
+    asked["wanted"] = asked["wanted"] or ()
+    with working("planning experiments ...") as progress:
+        made = softstart.plan_experiments(drive, optimise=not standard, progress=progress, **asked)
+    from softstart.views.identification import plan_sheet
+
+    return made.summary, plan_sheet(made)
 
 
-@click.command(cls=Command)
+@click.command()
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @click.option(
-    "--drive", metavar="GUESS", required=True, shell_complete=names_or_files(options.drive_names, ".toml"),
-    type=Reading(lambda name, _, settings: options.read_machine(name, settings), "settings"),
+    "--drive", metavar="GUESS", required=True, shell_complete=one_of(options.drive_names),
+    callback=reading(lambda name, _: options.read_machine(name, options.typed_settings())),
     help="Initial guess: a drive, or a chain with one dominant gap, as a file or shipped name. Factors of "
     "3 are tolerated.",
 )  # fmt: skip
 @options.set_option
 @click.option("--columns", metavar="SIGNAL=NAME,...",
-    type=Reading(lambda text, option: options.read_params(text.split(","), option, "speed=n_act")),
+    callback=reading(lambda text, option: options.read_params(text.split(","), option, "speed=n_act")),
     help="Names of the columns in the log, for example time=t,torque=-M_act,speed=n_act[rpm]; a minus "
     "inverts the sign, a unit in brackets replaces that of the log.")  # fmt: skip
 @click.option(
-    "--torque-is", metavar="measured|demand", type=options.choice("measured", "demand"), default="measured",
+    "--torque-is", metavar="measured|demand", type=click.Choice(["measured", "demand"]), default="measured",
     help="Meaning of the torque in the log. Default: measured.",
 )  # fmt: skip
-@click.option("--torque-constant", metavar="CONSTANT", type=options.quantity("N*m/A"),
+@click.option("--torque-constant", metavar="CONSTANT", callback=options.quantity("N*m/A"),
     help="Torque constant, for example '1.2 N*m/A', if the log has the current instead of the torque."
 )  # fmt: skip
-@click.option("--rated-torque", metavar="TORQUE", type=options.quantity("N*m"),
+@click.option("--rated-torque", metavar="TORQUE", callback=options.quantity("N*m"),
     help="Torque at 100 %, for example '12 N*m', if the log has the torque in %. Default: that of the drive."
 )  # fmt: skip
 @free_option
-@click.option("--restarts", "searches", metavar="N", type=options.count(), default="12",
+@click.option("--restarts", "searches", metavar="N", callback=options.count(), default="12",
     help="Largest number of independent searches. Default: 12.")  # fmt: skip
 @click.option("--time-limit", metavar="TIME", default="120 s",
-    type=options.quantity("s", "a time in s, 0 or more", least=0.0),
+    callback=options.quantity("s", least=0.0),
     help="Time after which the best fit so far is the answer, without intervals. Default: 120 s."
 )  # fmt: skip
 @strategies_option
-@options.json_option
-@options.out_option(
-    "Write the identified drive (drive.toml), residuals, figure and report.md into this folder."
-)
+@answers("Write the identified drive (drive.toml), residuals, figure and report.md into this folder.")
 def identify(
-    *, logs: tuple[str, ...], drive: Machine, controllers: list[str], as_json: bool, out: str | None,
-    **asked: Any,
-) -> None:  # fmt: skip
+    *, logs: tuple[str, ...], drive: Machine, controllers: list[str], **asked: Any
+) -> Answer:  # fmt: skip
     """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
     LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with units in the first
@@ -105,29 +99,40 @@ def identify(
     logs of the same drive are fitted together.
     """
     asked["columns"] = asked["columns"] or {}
-    with answering(as_json, out) as answer:
-        with working("fitting the drive to the logs ...") as progress, options.named_as_options():
-            found = softstart.identify(list(logs), drive, progress=progress, **asked)
-            k_dyns = found.k_dyn(controllers)
-        of_each = {name: dict(zip(("value", "lower", "upper"), v, strict=True)) for name, v in k_dyns.items()}
-        answer(lambda: found.summary() | {"k_dyn": of_each}, views.identification_sheet(found, k_dyns))
+    with working("fitting the drive to the logs ...") as progress:
+        found = softstart.identify(list(logs), drive, progress=progress, **asked)
+        k_dyns = found.k_dyn(controllers)
+    from softstart.views.identification import identification_sheet
+
+    of_each = {name: dict(zip(("value", "lower", "upper"), v, strict=True)) for name, v in k_dyns.items()}
+    return lambda: found.summary() | {"k_dyn": of_each}, identification_sheet(found, k_dyns)
 
 
-@click.command(cls=Command)
-@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
-@click.option("--dates", metavar="DATE,...", type=Reading(options.read_list),
+def _folders(names: Sequence[str], _: str) -> Sequence[str]:
+    """The folders, each of an identification."""
+    if wrong := next((name for name in names if not Path(name, "identification.json").is_file()), ""):
+        raise InputError(
+            f'"{wrong}": there is no identification.json in such a folder; give folders that softstart '
+            "identify --out has written."
+        )
+    return names
+
+
+@click.command()
+@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, callback=reading(_folders))
+@click.option("--dates", metavar="DATE,...", callback=reading(options.read_list),
     help="Dates of the logs, for example 2025-05-31,2026-05. Default: from the folder names.")  # fmt: skip
-@click.option("--worn-gap", "limit", metavar="GAP", type=options.quantity("rad"),
+@click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),
     help="Gap of a worn drive, for example '0.2 rad', at which the strategies are evaluated.")  # fmt: skip
 @strategies_option
-@options.json_option
-@options.out_option("Write the gaps (CSV), the figure and report.md into this folder.")
-def wear(*, folders: tuple[str, ...], as_json: bool, out: str | None, **asked: Any) -> None:
+@answers("Write the gaps (CSV), the figure and report.md into this folder.")
+def wear(*, folders: tuple[str, ...], **asked: Any) -> Answer:
     """Compute the growth of the gap from several identifications, and when it is worn.
 
     Each FOLDER is what softstart identify --out has written of the same drive, in another year.
     """
-    with answering(as_json, out) as answer:
-        with working("starting the worn drive ..."), options.named_as_options():
-            found = softstart.follow_wear(folders, **asked)
-        answer(found.summary, views.wear_sheet(found))
+    with working("starting the worn drive ..."):
+        found = softstart.follow_wear(folders, **asked)
+    from softstart.views.identification import wear_sheet
+
+    return found.summary, wear_sheet(found)

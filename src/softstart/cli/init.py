@@ -10,9 +10,7 @@ from pathlib import Path
 import click
 
 from softstart.chain.elements import LIBRARY
-from softstart.cli.commands import Command
-from softstart.cli.completion import files_only, table_keys
-from softstart.cli.options import changes_option, json_option, named_as_options, read_changes
+from softstart.cli.options import changes_option, json_option, named_as_options, read_changes, typed_settings
 from softstart.drive import data_sheet as sheets
 from softstart.drive import library
 from softstart.drive.data_sheet import ABOUT, INSTEAD, MACHINES, TYPICAL, USUAL, DataSheet
@@ -31,22 +29,17 @@ AFTER = {
 FIRST = ("name", "source", "machine")
 
 
-@click.command(cls=Command)
-@click.argument("sheet", required=False, metavar="[SHEET]", shell_complete=files_only(".toml"))
+@click.command()
+@click.argument("sheet", required=False, metavar="[SHEET]")
 @changes_option(
-    lambda: table_keys(DataSheet.TABLES),
+    DataSheet.TABLES,
     "Set a value of the data sheet, for example motor.rated_power='3 kW' or gear.ratio=31.5.",
 )
-@click.option(
-    "--out", metavar="FILE", shell_complete=files_only(".toml"),
-    help="Drive file to write, for example mine.toml. Default: print it.",
-)  # fmt: skip
+@click.option("--out", metavar="FILE", help="Drive file to write, for example mine.toml. Default: print it.")
 @click.option("--ask", is_flag=True, help="Ask for missing values; the default on a terminal without SHEET.")
 @click.option("--template", is_flag=True, help="Print an empty data sheet to fill in.")
 @json_option
-def init(
-    *, sheet: str | None, settings: tuple[str, ...], out: str | None, ask: bool, template: bool, as_json: bool
-) -> None:
+def init(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_json: bool) -> None:
     """Create a drive file from data sheet values.
 
     Asks for the values of rating plate, gearbox, shaft and load, and refers them to the motor shaft; comments
@@ -56,7 +49,7 @@ def init(
     if template:
         print(template_text(), end="")
         return
-    given = read_changes(settings)
+    given = read_changes(typed_settings())
     if sheet is None and (ask or (sys.stdin.isatty() and not as_json)):
         given = asked(given)
     found = DataSheet.from_settings(given) if sheet is None else DataSheet.load(sheet, also=given)
@@ -64,7 +57,7 @@ def init(
     if out is not None:
         if Path(out).exists():
             raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
-        with named_as_options():
+        with named_as_options(output="--out"):
             write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
         print_json({"data_sheet": found.values(), "drive": drive.values(), "doubts": doubts(drive)})

@@ -1,29 +1,29 @@
-"""`softstart drives` and `softstart controllers`: what there is to choose from."""
+"""`softstart drives`, `controllers` and `study`: what there is to choose from."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.commands import Command, did_you_mean
-from softstart.cli.completion import controllers as controllers_known
-from softstart.cli.completion import names_or_files
-from softstart.cli.options import check_name, controller_names, drive_names, json_option
-from softstart.cli.running import Attributed, answering, working
+from softstart.cli.commands import did_you_mean
+from softstart.cli.completion import one_of
+from softstart.cli.options import check_name, controller_names, drive_names
+from softstart.cli.running import Answer, answers, attributed, option_value, working
 from softstart.drive import Drive, library
 from softstart.errors import InputError, Mistakes
-from softstart.late import late
-from softstart.views.numbers import Table, printable
-from softstart.views.sheet import Sheet
-from softstart.views.terminal import print_json
+from softstart.plugins import STUDIES, registered
+from softstart.study import Study, StudyResult, find_study, study_names
+from softstart.views.drawing import PICTURE_ENDINGS
+from softstart.views.markdown import file_stem, output_folder
+from softstart.views.numbers import Column, Table, printable
+from softstart.views.sheet import Sheet, rows_file
 
 if TYPE_CHECKING:
-    from softstart import controller
     from softstart.controller import Controller
-else:
-    controller = late("softstart.controller")
 
 OWN = (
     ("softstart drives crane-4amtkf > mine.toml", "then change the numbers in it, and"),
@@ -31,10 +31,10 @@ OWN = (
 )
 
 
-@click.command(cls=Command)
-@click.argument("name", required=False, shell_complete=names_or_files(drive_names))
-@json_option
-def drives(name: str | None, as_json: bool) -> None:
+@click.command()
+@click.argument("name", required=False, shell_complete=one_of(drive_names))
+@answers()
+def drives(*, name: str | None) -> Answer:
     """List the shipped drives, or print one as TOML.
 
     To begin a file of your own: softstart drives crane-4amtkf > mine.toml
@@ -44,41 +44,36 @@ def drives(name: str | None, as_json: bool) -> None:
         rows = [[key, printable(f"{one.name}\n{one.source}")] for key, one in shipped.items()]
         data = [{"name": key, "title": one.name, "source": one.source} for key, one in shipped.items()]
         table = Table.of_texts(("drive", "what it is, and its source"), rows)
-        with answering(as_json, None) as answer:
-            notes = ["A drive of your own begins as a copy of one of these."]
-            shown = Sheet("Drives", ["Shipped drives"], tables=[table], notes=notes, commands=OWN)
-            answer(lambda: {"drives": data}, shown)
-    elif name not in drive_names():
+        notes = ["A drive of your own begins as a copy of one of these."]
+        shown = Sheet("Drives", ["Shipped drives"], tables=[table], notes=notes, commands=OWN)
+        return lambda: {"drives": data}, shown
+    if name not in drive_names():
         raise InputError(
             f'"{name}": there is no shipped drive of this name; {did_you_mean(name, drive_names())}'
         )
-    elif as_json:
-        print_json({"name": name, "drive": Drive.load(name).values()})
-    else:
-        print(library.text(name), end="")
+    return lambda: {"name": name, "drive": Drive.load(name).values()}, library.text(name)
 
 
-@click.command(cls=Command)
-@click.argument("name", required=False, shell_complete=controllers_known)
-@json_option
-def controllers(name: str | None, as_json: bool) -> None:
+@click.command()
+@click.argument("name", required=False, shell_complete=one_of(controller_names))
+@answers()
+def controllers(*, name: str | None) -> Answer:
     """List the controllers, or show the parameters of one.
 
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
     """
+    from softstart.controller import controller_class
+
     broken = Mistakes()
     found: list[dict[str, Any]] = []
     with working("looking at the controllers ..."):
         for one in [check_name(name, "controller")] if name else controller_names():
-            with broken.noted(), Attributed(one):
-                found.append(_described(one, controller.controller_class(one)))
+            with broken.noted(), attributed(one):
+                found.append(_described(one, controller_class(one)))
     if name:
         broken.settle()
-    with answering(as_json, None) as answer:
-        if name:
-            answer(lambda: found[0], _one(found[0]))
-        else:
-            answer(lambda: {"controllers": found}, _all(found, broken.sentences))
+        return lambda: found[0], _one(found[0])
+    return lambda: {"controllers": found}, _all(found, broken.sentences)
 
 
 def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
@@ -122,3 +117,81 @@ def _one(about: dict[str, Any]) -> Sheet:
         notes=["A parameter is set by its name." if rows else "It has no parameters."],
         commands=[(command.format(name, rows[0][0]), "sets one")] if rows else (),
     )
+
+
+@click.command()
+@click.argument("name", required=False, shell_complete=one_of(lambda: registered(STUDIES)))
+@answers("Write pictures (SVG, PNG), tables (CSV) and report.md into this folder.")
+def study(*, name: str | None) -> Answer:
+    """List the studies, or run one."""
+    out = option_value("out")
+    if name is None and out is not None:
+        raise InputError(f'--out = "{out}": a list writes no files; name a study: softstart study NAME.')
+    if name is None:
+        return _studies()
+    found = find_study(name)
+    # what the study writes itself is put in place first
+    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as progress:
+        result = found.run(folder, lambda doing: progress(f"{found.name}: {doing}"))
+    about = {"study": found.name, "title": found.title}
+    return lambda: about | result.summary(), _study_sheet(found, result)
+
+
+def _studies() -> Answer:
+    """All studies as data, and as a table with those that cannot be loaded."""
+    found: list[Study] = []
+    broken = Mistakes()
+    for name in study_names():
+        with broken.noted():
+            found.append(find_study(name))
+    data = [
+        {"name": one.name, "title": one.title, "pictures": one.pictures,
+         "files": [f"{stem}.{ending}" for stem in one.pictures for ending in PICTURE_ENDINGS]}
+        for one in found
+    ]  # fmt: skip
+    rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
+    run = "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR"
+    table = Table.of_texts(("study", "question", "pictures, each as .svg and .png"), rows)
+    return lambda: {"studies": data}, Sheet(
+        "Studies", ["Studies"], tables=[table], notes=[run, *broken.sentences]
+    )
+
+
+def _study_sheet(found: Study, result: StudyResult) -> Sheet:
+    """Tables, claims with their verdicts and evidence, pictures; each table and the claims as CSV."""
+    stems = ["claims"]
+    for table in result.tables:
+        stems.append(file_stem(table.title.lower(), stems))
+    claims = [(one.statement, one.verdict, one.evidence) for one in result.claims]
+    told = [
+        [f"{i:2}. {verdict}", printable(f"{statement}\n{evidence}")]
+        for i, (statement, verdict, evidence) in enumerate(claims, start=1)
+    ]
+    files = {
+        f"{stem}.csv": rows_file(table.columns, table.rows)
+        for stem, table in zip(stems[1:], result.tables, strict=True)
+    }
+    if claims:
+        files["claims.csv"] = rows_file(("statement", "verdict", "evidence"), claims)
+    return Sheet(
+        title=f"{found.name}: {found.title}",
+        lines=[f"{found.name}: {found.title}"],
+        tables=[*map(_shown, result.tables), Table.of_texts(("claims", ""), told)],
+        figures={stem: partial(result.figures.__getitem__, stem) for stem in result.figures},
+        files=files,
+    )
+
+
+def _shown(table: Any) -> Table:
+    """A table of a study, as it is shown: floats with five digits."""
+
+    def text(cell: Any) -> str:
+        if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+            return "-"
+        return printable(f"{cell:.5g}" if isinstance(cell, float) else str(cell))
+
+    columns = [
+        Column(name, all(isinstance(row[i], int | float | None) for row in table.rows))
+        for i, name in enumerate(table.columns)
+    ]
+    return Table(table.title, columns, [list(map(text, row)) for row in table.rows])

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from types import TracebackType
-from typing import TextIO
+from typing import Any
 
 from softstart.errors import DamagedWarning, InputError, SimulationError
 from softstart.stopping import STOPPING, at_stop, stop_now
@@ -35,7 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _main(list(arguments))
     sys.excepthook = _internal_error
     watcher = _stop_on_signals()
-    _replace_unprintable()
+    for stream in (sys.stdout, sys.stderr):  # a question mark for what the terminal's encoding lacks
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
     with at_stop(partial(_fail, [STOP], INTERRUPTED)):
         code = _main(sys.argv[1:])
         if STOPPING.is_set():
@@ -46,15 +48,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(given: list[str]) -> int:
     try:
         with warnings.catch_warnings():
-            _show_damage()
+            usual = warnings.showwarning
+
+            def show(message: Any, category: type[Warning], *where: Any, **also: Any) -> None:
+                if issubclass(category, DamagedWarning):
+                    print(f"softstart: {message}", file=sys.stderr, flush=True)
+                else:
+                    usual(message, category, *where, **also)
+
+            warnings.simplefilter("always", DamagedWarning)
+            warnings.showwarning = show
             code = _run(given)
             sys.stdout.flush()
         return code
     except BaseException as error:
-        return INTERRUPTED if STOPPING.is_set() else _failed(error)
+        return INTERRUPTED if STOPPING.is_set() else _failed(error, given)
 
 
-def _failed(error: BaseException) -> int:
+def _run(given: list[str]) -> int:
+    import click
+
+    from softstart.cli.commands import cli
+
+    if "_SOFTSTART_COMPLETE" in os.environ:
+        with suppress(InputError, click.UsageError):  # the line is wrong before its last word
+            cli.main(given, prog_name="softstart")
+        return DONE
+    try:
+        with cli.make_context("softstart", list(given), obj=tuple(given)) as context:
+            cli.invoke(context)
+    except click.exceptions.Exit as done:
+        return done.exit_code
+    return DONE
+
+
+def _failed(error: BaseException, given: list[str]) -> int:
     """Say what failed; an error that is a bug of softstart is raised again."""
     import click
 
@@ -62,16 +90,18 @@ def _failed(error: BaseException) -> int:
 
     match error:
         case click.UsageError():
-            return _fail([usage_sentence(error)], BAD_INPUT)
+            return _fail([usage_sentence(error, *given[:1])], BAD_INPUT)
         case InputError():
             return _fail(error.sentences, BAD_INPUT)
         case SimulationError():
             return _fail([str(error)], NO_SOLUTION)
-        case BrokenPipeError():
-            _silence_stdout()
-            return PIPE_CLOSED
         case OSError():
-            _silence_stdout()
+            with suppress(
+                OSError, ValueError
+            ):  # what is still buffered is reported at exit, if not discarded
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            if isinstance(error, BrokenPipeError):
+                return PIPE_CLOSED
             return _fail([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
         case MemoryError():
             return _fail(["there is not enough memory for this."], NO_SOLUTION)
@@ -80,76 +110,16 @@ def _failed(error: BaseException) -> int:
     raise error
 
 
-def _run(arguments: list[str]) -> int:
-    import click
-
-    from softstart.cli.commands import cli
-
-    if "_SOFTSTART_COMPLETE" in os.environ:
-        with suppress(InputError, click.UsageError):  # the line is wrong before its last word
-            cli.main(arguments, prog_name="softstart")
-        return DONE
-    try:
-        with cli.make_context("softstart", list(arguments), obj=tuple(arguments)) as context:
-            cli.invoke(context)
-    except click.exceptions.Exit as done:
-        return done.exit_code
-    return DONE
-
-
 def _fail(sentences: Sequence[str], code: int) -> int:
     """Sentences on standard error, numbered if there are several."""
     from softstart.views.numbers import printable
 
     lines = [printable(sentence.strip()) for sentence in sentences]
-    if len(lines) == 1:
-        text = f"softstart: {lines[0]}"
-    else:
-        numbered = (f"  {number}. {line}" for number, line in enumerate(lines, start=1))
-        text = "\n".join([f"softstart: {len(lines)} things are wrong:", *numbered])
-    try:
-        print(text, file=sys.stderr, flush=True)
-    except OSError:
-        return code  # standard error is closed; the exit code remains
+    if len(lines) > 1:
+        lines = [f"{len(lines)} things are wrong:", *(f"  {n}. {line}" for n, line in enumerate(lines, 1))]
+    with suppress(OSError):  # standard error is closed; the exit code remains
+        print("softstart: " + "\n".join(lines), file=sys.stderr, flush=True)
     return code
-
-
-def _silence_stdout() -> None:
-    """Discard what is still buffered: the interpreter would report at exit that it cannot be written."""
-    try:
-        descriptor = sys.stdout.fileno()
-    except (OSError, ValueError):
-        return
-    os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
-
-
-def _replace_unprintable() -> None:
-    """Print a question mark for a character that the terminal's encoding lacks, instead of failing."""
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure = getattr(stream, "reconfigure", None)
-        if reconfigure is not None:
-            reconfigure(errors="replace")
-
-
-def _show_damage() -> None:
-    """Print what is said of damaged results as sentences of the command."""
-    usual = warnings.showwarning
-
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
-        if issubclass(category, DamagedWarning):
-            print(f"softstart: {message}", file=sys.stderr, flush=True)
-        else:
-            usual(message, category, filename, lineno, file, line)
-
-    warnings.simplefilter("always", DamagedWarning)
-    warnings.showwarning = show
 
 
 def _stop_on_signals() -> threading.Thread:
@@ -185,9 +155,9 @@ def _internal_error(kind: type[BaseException], error: BaseException, traceback: 
     if os.environ.get(DEBUG):
         sys.__excepthook__(kind, error, traceback)
         return
-    text = " ".join(str(error).split())
     print(
-        f"softstart: this is a bug in softstart, not in your input ({kind.__name__}: {text}); please "
-        f"report it with the command you ran and what it prints with {DEBUG}=1 set.",
+        f"softstart: this is a bug in softstart, not in your input ({kind.__name__}: "
+        f"{' '.join(str(error).split())}); please report it with the command you ran and what it prints with "
+        f"{DEBUG}=1 set.",
         file=sys.stderr,
     )

@@ -1,103 +1,141 @@
-"""`softstart optimize`: the gentlest start within a given time, and how much better any start could be."""
+"""`softstart optimize` and `pareto`: the start with the lowest K_dyn, for one start time and over many."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import softstart
-from softstart.chain.model import Chain
-from softstart.cli.commands import Command, Reading, typed
-from softstart.cli.optimal_options import (
-    no_solution_reported,
-    quantities,
-    smoothness_option,
-    terminal_option,
-    torque_speed_option,
-)
-from softstart.cli.options import (
-    choice,
-    drive_argument,
-    json_option,
-    named_as_options,
-    out_option,
-    quantity,
-    read_machine,
-    set_option,
-)
-from softstart.cli.running import Attributed, answering, working
-from softstart.drive import Drive
+from softstart.cli import options
+from softstart.cli.options import quantity, reading
+from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.errors import InputError, SimulationError
-from softstart.late import late
-from softstart.optimal.problem import OBJECTIVES, StartTime
+from softstart.optimal.problem import OBJECTIVES, TERMINALS, StartTime
+from softstart.quantities import to_si, values_in
+from softstart.views.markdown import kept_state
+from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
-    from softstart import controller
+    from softstart.chain.machines import Machine
     from softstart.optimal.result import Optimum
     from softstart.start.run import Run
-    from softstart.views import optima as views
-else:  # no numba for a help, a wrong option or the Tab key
-    controller, views = late("softstart.controller"), late("softstart.views.optima")
+
+STATE = "pareto.sqlite"
 
 
-@click.command(cls=Command)
-@drive_argument(read_machine)
+def read_start_times(text: str, option: str = "--start-times") -> list[StartTime]:
+    """Start times with commas between, or as from:to:count.
+
+    >>> read_start_times("0.25, 1.2x")
+    [StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True)]
+    >>> [round(one.value, 3) for one in read_start_times("0.25:0.5:3")]
+    [0.25, 0.375, 0.5]
+    """
+
+    def read(part: str) -> tuple[float, bool]:
+        found = StartTime.of(part, option)
+        return found.value, found.multiple
+
+    return [StartTime(*one) for one in options.read_values(text, option, read)]
+
+
+def _start_time(text: str, option: str) -> str:
+    """The text as it is, if it is one of a start time."""
+    StartTime.of(text, option)
+    return text
+
+
+def _each(unit: str) -> Callable[..., Any]:
+    """The callback of an option that is quantities with commas between."""
+
+    def read(text: str, option: str) -> list[float]:
+        return [float(to_si(one, unit, name=option)) for one in values_in(text, option)]
+
+    return reading(read)
+
+
+def _corners(text: str, option: str) -> list[tuple[float, float]]:
+    """Corners of a torque-speed curve, rad/s and N m.
+
+    >>> _corners("0:62, 900 rpm: 40 N*m", "--torque-speed")[1][1]
+    40.0
+    """
+    pairs = [part.partition(":") for part in values_in(text, option)]
+    if wrong := next(("".join(pair) for pair in pairs if not (pair[0].strip() and pair[2].strip())), ""):
+        raise InputError(f'{option} = "{wrong}": write each corner as speed:torque, as 90:40.')
+    return [
+        (float(to_si(speed, "rad/s", name=option)), float(to_si(torque, "N*m", name=option)))
+        for speed, _, torque in pairs
+    ]
+
+
+def _terminal_option(usual: str, default: str | None = None) -> options.Decorator:
+    return click.option(
+        "--terminal", metavar="|".join(TERMINALS), type=click.Choice(TERMINALS), default=default,
+        help="Terminal condition: motor and load at the target speed (synchronous), with the shaft torque "
+        "equal to the load torque as well (steady), or the load alone at the target speed (reached). "
+        f"Default: {usual}.",
+    )  # fmt: skip
+
+
+torque_speed_option = click.option(
+    "--torque-speed", metavar="SPEED:TORQUE,...", callback=reading(_corners),
+    help="Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 "
+    "N*m'.",
+)  # fmt: skip
+
+
+@contextmanager
+def _no_solution() -> Iterator[None]:
+    """Where there is no optimum: its verdict as the JSON object, one sentence, and exit code 3."""
+    from softstart.optimal.result import InfeasibleError, OptimumError
+
+    try:
+        yield
+    except (InfeasibleError, OptimumError) as error:
+        if option_value("as_json") and isinstance(error, InfeasibleError):
+            print_json(error.verdict.summary())
+        raise SimulationError(str(error)) from error
+
+
+@click.command()
+@click.option("--start-time", metavar="TIME", callback=reading(_start_time),
+    help="Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x."
+)  # fmt: skip
 @click.option(
-    "--start-time",
-    metavar="TIME",
-    type=Reading(StartTime.of),
-    help="Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x.",
-)
-@click.option(
-    "--limits",
-    is_flag=True,
+    "--limits", is_flag=True,
     help="Find the shortest start time that meets the [limits] of the drive instead.",
-)
-@terminal_option("synchronous for one drive at one position, else reached")
-@click.option(
-    "--minimise", metavar="|".join(OBJECTIVES), type=choice(*OBJECTIVES), help="Objective. Default: k_dyn."
-)
-@click.option(
-    "--max-k-dyn", "k_dyn", metavar="NUMBER", type=quantity("1", "give a number above 0", above=0.0),
-    help="Upper bound of K_dyn if another objective is minimised.",
 )  # fmt: skip
-@click.option(
-    "--max-heat", "heat", metavar="TIME", type=quantity("s", "give a time above 0 s", above=0.0),
-    help="Upper bound of the I2t heat, in s of starting torque.",
-)  # fmt: skip
+@_terminal_option("synchronous for one drive at one position, else reached")
+@click.option("--minimise", metavar="|".join(OBJECTIVES), type=click.Choice(OBJECTIVES),
+    help="Objective. Default: k_dyn.")  # fmt: skip
+@click.option("--max-k-dyn", "k_dyn", metavar="NUMBER",
+    callback=quantity("1", above=0.0),
+    help="Upper bound of K_dyn if another objective is minimised.")  # fmt: skip
+@click.option("--max-heat", "heat", metavar="TIME",
+    callback=quantity("s", above=0.0),
+    help="Upper bound of the I2t heat, in s of starting torque.")  # fmt: skip
 @torque_speed_option
-@smoothness_option
-@click.option(
-    "--confirm",
-    is_flag=True,
-    help="Also solve the CasADi problem from its own initial guess, and show both results.",
-)
-@click.option(
-    "--gaps", metavar="GAP,...", type=quantities("rad"),
-    help="Compute one profile for the drive with each of these gaps.",
-)  # fmt: skip
-@click.option(
-    "--inertias", metavar="INERTIA,...", type=quantities("kg*m^2"), help="Likewise for these load inertias."
-)
-@click.option(
-    "--load-torques", metavar="TORQUE,...", type=quantities("N*m"), help="Likewise for these load torques."
-)
-@set_option
-@json_option
-@out_option("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
+@click.option("--smoothness", metavar="TIME", callback=quantity("s", least=0.0),
+    help="Weight of torque smoothness, for example 0.001 (s). Default: 0.")  # fmt: skip
+@click.option("--confirm", is_flag=True,
+    help="Also solve the CasADi problem from its own initial guess, and show both results.")  # fmt: skip
+@click.option("--gaps", metavar="GAP,...", callback=_each("rad"),
+    help="Compute one profile for the drive with each of these gaps.")  # fmt: skip
+@click.option("--inertias", metavar="INERTIA,...", callback=_each("kg*m^2"),
+    help="Likewise for these load inertias.")  # fmt: skip
+@click.option("--load-torques", metavar="TORQUE,...", callback=_each("N*m"),
+    help="Likewise for these load torques.")  # fmt: skip
+@options.of_drive(options.read_machine)
+@answers("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
 def optimize(
-    *,
-    drive: Drive | Chain,
-    gaps: Sequence[float] | None,
-    inertias: Sequence[float] | None,
-    load_torques: Sequence[float] | None,
-    as_json: bool,
-    out: str | None,
-    **given: Any,
-) -> None:
+    *, drive: Machine, gaps: Sequence[float] | None, inertias: Sequence[float] | None,
+    load_torques: Sequence[float] | None, **given: Any,
+) -> Answer:  # fmt: skip
     """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
@@ -105,25 +143,72 @@ def optimize(
     computed for all combinations. For a chain, the largest torque of all its shafts is minimised.
     """
     bounds = {name: value for name, value in given.items() if value is not None}
-    bounds["start_time"] = typed("start_time")
     varied = {"gaps": gaps or (), "inertias": inertias or (), "load_torques": load_torques or ()}
-    with no_solution_reported(as_json), answering(as_json, out) as answer:
-        with working("looking for the gentlest start ..."), named_as_options():
-            others = softstart.scenarios_of(drive, **varied)[1:]
-            best = softstart.optimize(drive, scenarios=others, **bounds)
-        with working("starting the drive under the shipped controllers ..."):
-            beside = [] if others else runs_beside(best)
-        answer(
-            lambda: {**best.summary(), "controllers": [views.controller_summary(run) for run in beside]},
-            views.optimum_sheet(best, beside),
-        )
+    with _no_solution(), working("looking for the gentlest start ..."):
+        others = softstart.scenarios_of(drive, **varied)[1:]
+        best = softstart.optimize(drive, scenarios=others, **bounds)
+    with working("starting the drive under the shipped controllers ..."):
+        beside = [] if others else _runs_beside(best)
+    from softstart.views.optima import controller_summary, optimum_sheet
+
+    data = lambda: {**best.summary(), "controllers": list(map(controller_summary, beside))}  # noqa: E731
+    return data, optimum_sheet(best, beside)
 
 
-def runs_beside(best: Optimum) -> list[Run]:
+def _runs_beside(best: Optimum) -> list[Run]:
     """The same drive under every controller that runs without being given a parameter, and does not fail."""
-    drive, base = best.problem.drive, best.problem.base
+    from softstart.controller import ready_controller_names
+
     runs = []
-    for name in controller.ready_controller_names():
-        with suppress(InputError, SimulationError), Attributed(name):
-            runs.append(softstart.simulate(drive, name, base=base))
+    for name in ready_controller_names():
+        with suppress(InputError, SimulationError), attributed(name):
+            runs.append(softstart.simulate(best.problem.drive, name, base=best.problem.base))
     return runs
+
+
+@click.command()
+@click.option("--start-times", metavar="TIME,...", callback=reading(read_start_times),
+    help="Bounds of the start time: 0.25,0.3 (s), a range from:to:count such as 0.25:0.5:12, or multiples "
+    "of that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.")  # fmt: skip
+@_terminal_option("reached", "reached")
+@torque_speed_option
+@options.controller_option(
+    "--controllers", "A,B,...", "Controllers to compare with the curve. Default: all that need no parameter."
+)
+@click.option("--workers", metavar="N", callback=options.count(), default="1",
+    help="Number of optima computed in parallel. Default: 1.")  # fmt: skip
+@options.scheduler_option
+@options.of_drive(options.read_machine)
+@answers(
+    "Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at "
+    "once, so that an interrupted command resumes."
+)
+def pareto(
+    *, drive: Machine, start_times: list[StartTime] | None, controllers: list[str] | None, **given: Any
+) -> Answer:  # fmt: skip
+    """Compute the lowest K_dyn over the start time, and compare the controllers with it.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
+    default the crane drive of the literature. Each controller is compared with the optimum at its own start
+    time.
+    """
+    given = {name: value for name, value in given.items() if value is not None}
+    with (
+        kept_state(option_value("out"), STATE, "finished points") as state,
+        options.named_as_options(start_time="--start-times"),
+        _no_solution(),
+        working("starting the drive ...") as progress,
+        attributed(),
+    ):
+        from softstart.optimal.optimize import start_time_of_direct
+
+        made, direct = make_controllers(controllers, {}), cache(lambda: start_time_of_direct(drive))
+        times = None if start_times is None else [one.seconds(direct) for one in start_times]
+        found = softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)
+    if not any(point.found for point in found.points):
+        if option_value("as_json"):
+            print_json(found.summary())
+        raise SimulationError(found.points[-1].status_text)
+    from softstart.views.optima import front_sheet
+
+    return found.summary, front_sheet(found)

@@ -2,72 +2,44 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command
-from softstart.cli.options import (
-    controller_option,
-    file_options,
-    json_option,
-    named_as_options,
-    out_option,
-    param_option,
-    quantity,
-)
-from softstart.cli.running import Attributed, answering, make_controllers, working
+from softstart.cli import options
+from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.terminal import print_json
 
-if TYPE_CHECKING:
-    from softstart.chain import two_masses as simulation
-    from softstart.views import chains as views
-    from softstart.views import sheet
-else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
-    simulation, views = late("softstart.chain.two_masses"), late("softstart.views.chains")
-    sheet = late("softstart.views.sheet")
 
-
-@click.command(cls=Command)
-@file_options(Chain, "crane-4-mass", LIBRARY, TABLES, "mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2")
+@click.command()
 @click.option(
-    "--factor",
-    metavar="NUMBER",
-    type=quantity("1", "give a number of 1 or more, as 10", above=0.0),
+    "--factor", metavar="NUMBER", callback=options.quantity("1", above=0.0),
     help="Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.",
-)
+)  # fmt: skip
 @click.option("--force", is_flag=True, help="Continue where a frequency that is left out is too low.")
-@controller_option(
-    "--verify",
-    "A,B,...",
+@options.controller_option(
+    "--verify", "A,B,...",
     "Controllers to set up for the drive and to run on the drive and on the chain. Default: all that need "
     "no parameter.",
-)
+)  # fmt: skip
 @click.option(
     "--no-starts", is_flag=True, help="Skip the starts that determine whether two masses are sufficient."
 )
-@param_option(
-    "Set a parameter of a controller of --verify, for example ramp.time='0.2 s'. May be repeated.", "verify"
+@options.param_option(
+    "Set a parameter of a controller of --verify, for example ramp.time='0.2 s'. May be repeated.",
+    "CONTROLLER.KEY=VALUE",
 )
-@json_option
-@out_option(
-    "Write scheme and figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder."
-)
+@options.of_file(
+    Chain, "crane-4-mass", LIBRARY, TABLES, "mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2",
+)  # fmt: skip
+@answers("Write scheme, figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder.")
 def reduce(
-    *,
-    chain: Chain,
-    verify: list[str] | None,
-    no_starts: bool,
-    params: dict[str, dict[str, str]],
-    as_json: bool,
-    out: str | None,
-    **asked: Any,
-) -> None:
+    *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **asked: Any
+) -> Answer:  # fmt: skip
     """Compute the natural frequencies of a chain, and reduce it to two masses.
 
     CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); by default the crane
@@ -81,21 +53,25 @@ def reduce(
         raise InputError("--no-starts: it leaves out the starts of --verify; give one of the two.")
     if params and verify is None:
         raise InputError("--param: it sets up a controller of --verify; name that, as --verify ramp.")
-    with answering(as_json, out) as answer:
-        try:
-            with working("reducing the chain ..."), named_as_options():
-                found = reduce_chain(chain, **{name: one for name, one in asked.items() if one is not None})
-        except InputError as error:
-            vibration, refused = natural_vibration(chain.freed), error.sentences
-            if as_json:
-                print_json({"chain": chain.name, "vibration": vibration.summary(), "refused": refused})
-            else:
-                sheet.show(views.vibration_sheet(vibration))
-            raise
-        drive = views.drive_of(found) if verify is None else found.to_drive()
-        off = None
-        if drive is not None and not no_starts:
-            with working("starting the drive and the chain ..."), Attributed():
-                made = None if verify is None else make_controllers(verify, params, prefix=True)
-                off = simulation.two_mass_error(found.chain, drive, made)
-        answer(lambda: views.summary(found, off), views.reduction_sheet(found, off))
+    from softstart.views import chains as views
+    from softstart.views import sheet
+
+    try:
+        with working("reducing the chain ..."):
+            found = reduce_chain(chain, **{name: one for name, one in asked.items() if one is not None})
+    except InputError as error:
+        vibration, refused = natural_vibration(chain.freed), error.sentences
+        if option_value("as_json"):
+            print_json({"chain": chain.name, "vibration": vibration.summary(), "refused": refused})
+        else:
+            sheet.show(views.vibration_sheet(vibration))
+        raise
+    drive = views.drive_of(found) if verify is None else found.to_drive()
+    off = None
+    if drive is not None and not no_starts:
+        with working("starting the drive and the chain ..."), attributed():
+            from softstart.chain.two_masses import two_mass_error
+
+            made = None if verify is None else make_controllers(verify, params)
+            off = two_mass_error(found.chain, drive, made)
+    return lambda: views.summary(found, off), views.reduction_sheet(found, off)

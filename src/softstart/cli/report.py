@@ -6,38 +6,21 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.chain.model import Chain
-from softstart.cli.commands import Command, Reading
-from softstart.cli.options import (
-    command_line,
-    controller_option,
-    drive_argument,
-    json_option,
-    param_option,
-    quantity,
-    read_machine_or_identified,
-    set_option,
-)
-from softstart.cli.running import Attributed, make_controllers, working
-from softstart.drive import Drive
+from softstart.cli import options
+from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.late import late
-from softstart.views.terminal import console, print_json, print_lines, sentence
 
 if TYPE_CHECKING:
-    from softstart import reporting
+    from softstart.chain.machines import Machine
     from softstart.identification.result import Identification
-    from softstart.views import starts
-else:
-    reporting = late("softstart.reporting")
-    starts = late("softstart.views.starts")
+    from softstart.reporting import Report
+    from softstart.views.sheet import Sheet
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
@@ -46,78 +29,40 @@ BROWSERS = (
     "C:/Program Files/Google/Chrome/Application/chrome.exe",
     "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
 )
-EXAMPLES = {"--out": "report.html", "--pdf": "report.pdf"}
 PRINTING = 120.0  # s for a browser to print a report
 
 
-def _read_resolution(text: str, option: str) -> reporting.Resolution:
-    return reporting.Resolution.read(text, option)
-
-
-def _check_files(given: Mapping[str, Any]) -> None:
-    if given["out"] is None and given["pdf"] is None and not given["as_json"]:
-        raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
-    for option in ("out", "pdf"):
-        if given[option] is not None:
-            _check_file(f"--{option}", given[option])
-    if given["pdf"] is not None:
-        _browser()
-
-
-@click.command(cls=Command, checks=[_check_files])
-@drive_argument(read_machine_or_identified)
-@click.option(
-    "--out",
-    metavar="FILE",
-    help="HTML file to write, for example report.html.",
-)
-@click.option(
-    "--pdf",
-    metavar="FILE",
-    help="PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.",
-)
-@controller_option(
-    "--controllers",
-    "A,B,...",
+@click.command()
+@click.option("--out", "to", metavar="FILE", help="HTML file to write, for example report.html.")
+@click.option("--pdf", metavar="FILE",
+    help="PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.")  # fmt: skip
+@options.controller_option(
+    "--controllers", "A,B,...",
     "Strategies to compare, including files of tuned gains. Default: all that need no parameter.",
+)  # fmt: skip
+@options.param_option(
+    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "CONTROLLER.KEY=VALUE"
 )
-@set_option
-@param_option(
-    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "controllers"
-)
-@click.option(
-    "--resolution",
-    metavar="KEY=STEP,...",
-    type=Reading(_read_resolution),
+@click.option("--resolution", metavar="KEY=STEP,...",
     help="Resolution of the inverter parameters, for example torque=0.5%,time=10ms,speed=1rpm,"
     "frequency=0.1Hz,share=1%. Torque in % of the rated torque or in N*m. Default: 0.1 %, 1 ms, 1 rpm, "
-    "0.1 Hz and 0.01.",
-)
-@click.option(
-    "--budget",
-    metavar="TIME",
-    type=quantity("s", 'give a time, as 20 or "60 s", or 0 for no search', least=0.0),
+    "0.1 Hz and 0.01.")  # fmt: skip
+@click.option("--budget", metavar="TIME",
+    callback=options.quantity("s", least=0.0),
     help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0 "
-    "disables it.",
-)
-@click.option(
-    "--project",
-    metavar="FILE",
-    type=Reading(lambda path, option: reporting.Project.load(path)),
+    "disables it.")  # fmt: skip
+@click.option("--project", metavar="FILE",
     help="TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and "
-    "decimal sign (example in docs/howto/read-a-report.md).",
+    "decimal sign (example in docs/howto/read-a-report.md).")  # fmt: skip
+@options.machine_argument(
+    "drive", options.read_machine_or_identified, options.drive_names, options.DEFAULT_DRIVE
 )
-@json_option
+@options.set_option
+@answers()
 def report(
-    *,
-    drive: Drive | Chain | Identification,
-    out: str | None,
-    pdf: str | None,
-    controllers: list[str] | None,
-    params: dict[str, dict[str, str]],
-    as_json: bool,
-    **asked: Any,
-) -> None:
+    *, drive: Machine | Identification, to: str | None, pdf: str | None, controllers: list[str] | None,
+    params: dict[str, str], **asked: Any,
+) -> Answer:  # fmt: skip
     """Write a report on the start of a drive or a chain as one HTML file.
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
@@ -126,81 +71,59 @@ def report(
     states its parameters, rounded to the resolution of the inverter and simulated again after rounding. Of a
     chain it gives the figures of each shaft, and no maps.
     """
-    asked = {name: value for name, value in asked.items() if value is not None}
-    browser = None if pdf is None else _browser()
-    made, page = _made(drive, controllers, params, asked, out is not None or pdf is not None)
-    if out is not None:
-        write_whole(Path(out), lambda stream: stream.write(page))
-    if pdf is not None and browser is not None:
-        with working("printing ..."):
-            printed = _printed(page, browser)
-        write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
-    written = " and ".join(path for path in (out, pdf) if path is not None)
-    if as_json:
-        print_json(made.summary())
-        return
-    _show(made)
-    if written:
-        print(f"\nWritten to {written}.")
+    if to is None and pdf is None and not option_value("as_json"):
+        raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
+    for option, path in (("--out", to), ("--pdf", pdf)):
+        if path is not None:
+            _check_file(option, path)
+    browser = "" if pdf is None else _browser()
+    with working("starting the drive ...") as show, attributed():
+        from softstart.reporting import report as compute
 
-
-def _made(
-    drive: Drive | Chain | Identification,
-    names: Sequence[str] | None,
-    given: dict[str, dict[str, str]],
-    asked: dict[str, Any],
-    drawn: bool,
-) -> tuple[reporting.Report, str]:
-    """The report and, if it is `drawn`, its page."""
-    with working("starting the drive ...") as show:
-        controllers = make_controllers(names, given, prefix=True)
-
-        def progress(share: float, what: str) -> None:
-            show(f"{100.0 * share:.0f} %: {what}")
-
-        asked |= {"controllers": controllers, "progress": progress, "command": command_line()}
-        with Attributed():
-            made = reporting.report(drive, **asked)
+        made = compute(
+            drive, controllers=make_controllers(controllers, params), command=options.command_line(),
+            progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **asked,
+        )  # fmt: skip
         show("drawing the figures")
-        return made, made.to_html() if drawn else ""
+        page = "" if to is None and pdf is None else made.to_html()
+    with options.named_as_options(output="--out"):
+        if to is not None:
+            write_whole(Path(to), lambda stream: stream.write(page))
+        if pdf is not None:
+            with working("printing ..."):
+                printed = _printed(page, browser)
+            write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
+    return made.summary, _sheet(made, " and ".join(filter(None, (to, pdf))))
 
 
 def _check_file(option: str, out: str) -> None:
     """Whether the file can be written, found before anything is computed."""
-    example = EXAMPLES[option]
+    path, example = Path(out), "report.html" if option == "--out" else "report.pdf"
+    reason = ""
     if not out.strip() or "\0" in out:
-        raise InputError(f"{option} = {out!r}: this cannot be the name of a file; write one, as {example}.")
-    path = Path(out)
-    try:
-        if path.is_dir():
-            raise InputError(f'{option} = "{out}": this is a folder; name a file in it, as {path / example}.')
-        if path.exists() and not path.is_file():  # a device or a pipe would be replaced by the file
-            raise InputError(f'{option} = "{out}": this is no ordinary file; name one, as {example}.')
-        with tempfile.TemporaryFile(dir=path.parent, prefix=f".{path.name}."):
-            pass
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(
-            f'{option} = "{out}": the file cannot be written there ({reason}); name one in a folder that is '
-            "there and that you may write to."
-        ) from None
+        reason = "this cannot be the name of a file"
+    elif path.exists() and not path.is_file():  # a device or a pipe would be replaced by the file
+        reason = "this is a folder" if path.is_dir() else "this is no ordinary file"
+    else:
+        try:
+            with tempfile.TemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+                return
+        except OSError as error:
+            reason = f"the file cannot be written there ({error.strerror or error})"
+    raise InputError(f'{option} = "{out}": {reason}; name a file in a folder that is there, as {example}.')
 
 
 def _browser() -> str:
     """The browser that prints: that of SOFTSTART_CHROMIUM, or one that is installed."""
-    if named := os.environ.get("SOFTSTART_CHROMIUM"):
-        if shutil.which(named) is None:
-            raise InputError(
-                f'SOFTSTART_CHROMIUM = "{named}": there is no such program; name a Chromium or a Chrome.'
-            )
-        return named
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    named = os.environ.get("SOFTSTART_CHROMIUM")
+    browser = next(filter(None, map(shutil.which, [named] if named else BROWSERS)), None)
     if browser is None:
+        what = f'SOFTSTART_CHROMIUM = "{named}": there is no such program' if named else "--pdf: no browser"
         raise InputError(
-            "--pdf: no Chromium, Chrome or Edge was found to print with; install one (Debian: apt-get "
-            "install chromium), name it in SOFTSTART_CHROMIUM, or print the file of --out in any browser."
+            f"{what} to print with; install Chromium, Chrome or Edge (Debian: apt-get install chromium), "
+            "name it in SOFTSTART_CHROMIUM, or print the file of --out in any browser."
         )
-    return browser
+    return named or browser
 
 
 def _printed(page: str, browser: str) -> bytes:
@@ -225,20 +148,18 @@ def _printed(page: str, browser: str) -> bytes:
         return target.read_bytes()
 
 
-def _show(made: reporting.Report) -> None:
-    to = console()
-    print_lines(to, starts.machine_lines(made.drive))
-    to.print()
-    sentence(to, made.answer, "bold")
-    for sheet in made.sheets:
-        if sheet.rounded is None:
-            sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")
+def _sheet(made: Report, written: str) -> Sheet:
+    """What is printed of a report: its answer, and what rounding does to each strategy."""
+    from softstart.views.sheet import Sheet
+    from softstart.views.starts import machine_lines
+
+    notes = []
+    for one in made.sheets:
+        if one.rounded is None:
+            notes.append(f"{one.name}: cannot be started with rounded values ({one.failure})")
             continue
-        sentence(
-            to,
-            f"{sheet.name}: K_dyn {sheet.exact.k_dyn:.4f} exact, {sheet.rounded.k_dyn:.4f} after rounding"
-            + (f", {sheet.worst_k_dyn:.4f} at most half a step off." if sheet.variants else "."),
-            "dim",
-        )
-    for name, reason in made.failed:
-        sentence(to, f"{name} was left out: {reason}", "dim")
+        off = f", {one.worst_k_dyn:.4f} at most half a step off." if one.variants else "."
+        exact, rounded = one.exact.k_dyn, one.rounded.k_dyn
+        notes.append(f"{one.name}: K_dyn {exact:.4f} exact, {rounded:.4f} after rounding{off}")
+    notes += [*(f"{name} was left out: {reason}" for name, reason in made.failed), f"Written to {written}."]
+    return Sheet("Report", machine_lines(made.drive), found=[made.answer], notes=notes)

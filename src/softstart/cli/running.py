@@ -4,38 +4,35 @@ from __future__ import annotations
 
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from types import TracebackType
+from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.cli.options import code_allowed, command_line
-from softstart.errors import InputError, Mistakes, SimulationError
-from softstart.late import late
+import click
+
+from softstart.cli.commands import did_you_mean
+from softstart.cli.completion import folders
+from softstart.cli.options import Decorator, code_allowed, command_line, json_option, named_as_options
+from softstart.errors import InputError, SimulationError
+from softstart.parallel import LOADED_FROM_FILE
 from softstart.plugins import CONTROLLERS, registered
 from softstart.stopping import at_stop
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
-    import rich.console as rich_console
-    from numba.core import event
-    from rich.status import Status
+    from softstart.controller import Controller
 
-    from softstart import controller
-    from softstart.views import sheet
-    from softstart.views.sheet import Sheet
-else:
-    rich_console, event = late("rich.console"), late("numba.core.event")
-    controller, sheet = late("softstart.controller"), late("softstart.views.sheet")
-
-LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 EVERY = 30.0  # s between two lines of progress in a pipe
 COMPILING = "compiling, once: half a minute at the first command after installation, less at others ..."
+WRITTEN = "## Where this comes from\n\nsoftstart "  # in every report.md of softstart
 _SAID: list[str] = []  # what this process has said of it
 
-
 Progress = Callable[[str], None]
+Answer = tuple[Any, ...]  # of `answers`
 
 
 @contextmanager
@@ -45,142 +42,151 @@ def working(doing: str) -> Iterator[Progress]:
     Gives what changes the line. In a pipe, where there is none, what is being done is a line of its own, at
     first after `EVERY` seconds and then as seldom. Whatever is compiled meanwhile is announced in both.
     """
-    console = rich_console.Console(stderr=True, highlight=False, markup=False)
-    with redirect_stdout(sys.stderr):
-        if not console.is_terminal:
-            with _announced(None):
-                yield _seldom()
-            return
-        with console.status(doing) as status, at_stop(status.stop), _announced(status):
-            yield lambda now: status.update(f"{now} ...")
+    from rich.console import Console
 
-
-def _seldom() -> Progress:
-    """Prints what is being done, and since when."""
+    console = Console(stderr=True, highlight=False, markup=False)
     began = said = time.monotonic()
 
-    def progress(now: str) -> None:
+    def seldom(now: str) -> None:
         nonlocal said
         if (at := time.monotonic()) - said >= EVERY:
             said = at
             print(f"softstart: {now} ... ({at - began:.0f} s)", file=sys.stderr, flush=True)
 
-    return progress
+    with redirect_stdout(sys.stderr), _announced(lambda text: console.print(text, soft_wrap=True)):
+        if not console.is_terminal:
+            yield seldom
+            return
+        with console.status(doing) as status, at_stop(status.stop):
+            yield lambda now: status.update(f"{now} ...")
 
 
 @contextmanager
-def _announced(status: Status | None) -> Iterator[None]:
-    class Notice(event.Listener):
-        """Speaks when this process compiles for the first time; what comes from numba's cache is not."""
+def _announced(say: Callable[[str], None]) -> Iterator[None]:
+    """Say so when this process compiles for the first time; what comes from numba's cache is not compiled."""
+    from numba.core import event
 
+    class Notice(event.Listener):
         def on_start(self, event: event.Event) -> None:
             if not _SAID:
                 _SAID.append(COMPILING)
-                if status is not None:
-                    status.console.print(f"softstart: {COMPILING}")
-                else:
-                    print(f"softstart: {COMPILING}", file=sys.stderr, flush=True)
+                say(f"softstart: {COMPILING}")
 
         def on_end(self, event: event.Event) -> None:
             pass
 
-    notice = Notice()
-    event.register("numba:compile", notice)  # type: ignore[no-untyped-call]
-    try:
+    with event.install_listener("numba:compile", Notice()):
         yield
-    finally:
-        event.unregister("numba:compile", notice)  # type: ignore[no-untyped-call]
 
 
-class Attributed:
+@contextmanager
+def attributed(loading: str = "") -> Iterator[None]:
     """Turns an exception from the lines of a controller into a sentence that names the place.
 
     A controller is anyone's code and may fail in any way; an exception in which none has a part passes.
     With the name of a controller that is being loaded or made, what fails is bad input; without one, a start
     that could not be finished.
     """
-
-    def __init__(self, loading: str = "") -> None:
-        self.loading = loading
-        self.modules = {point.module for point in registered(CONTROLLERS).values()}
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if isinstance(error, KeyboardInterrupt | MemoryError | InputError | SimulationError | None):
-            return
-        place = self._place(traceback)
+    try:
+        yield
+    except (KeyboardInterrupt, MemoryError, InputError, SimulationError):
+        raise
+    except BaseException as error:
+        modules, place = {point.module for point in registered(CONTROLLERS).values()}, ""
+        for frame, line in traceback.walk_tb(error.__traceback__):  # the innermost one is the last
+            module = str(frame.f_globals.get("__name__", ""))
+            if module in modules or module.startswith(LOADED_FROM_FILE):
+                place = f" in {frame.f_code.co_filename}, line {line}"
         what = ": ".join(filter(None, [type(error).__name__, " ".join(str(error).split())]))
-        if self.loading and (place or isinstance(error, ImportError | AttributeError | TypeError)):
-            at = f" in {place}" if place else ""
-            raise InputError(f'controller = "{self.loading}": it cannot be loaded{at} ({what}).') from error
+        if loading and (place or isinstance(error, ImportError | AttributeError | TypeError)):
+            raise InputError(f'controller = "{loading}": it cannot be loaded{place} ({what}).') from error
         if place:
             raise SimulationError(
-                f"The start was given up: the controller failed in {place} ({what})."
+                f"The start was given up: the controller failed{place} ({what})."
             ) from error
-
-    def _place(self, traceback: TracebackType | None) -> str:
-        """File and line of the innermost frame in a controller, empty if there is none."""
-        place = ""
-        while traceback is not None:
-            module = str(traceback.tb_frame.f_globals.get("__name__", ""))
-            if module in self.modules or module.startswith(LOOSE_MODULE):
-                place = f"{traceback.tb_frame.f_code.co_filename}, line {traceback.tb_lineno}"
-            traceback = traceback.tb_next
-        return place
+        raise
 
 
-@contextmanager
-def answering(as_json: bool, out: str | None) -> Iterator[Callable[[Callable[[], Any], Sheet], None]]:
-    """The answer of a command: the block gives the data for JSON and the sheet to what is yielded.
+def answers(text: str = "") -> Decorator:
+    """--json and, with this help, --out; the command returns what is shown.
 
-    That the folder of --out can be written is found before the block begins; it is filled at its end. Then
-    the answer is printed.
+    That is its data for JSON, its sheet or a text and, if there is one, the error to raise at the end. That
+    the folder of --out can be written is found before the command begins; it is filled at its end, and then
+    the answer is printed. Errors name options, see `named_as_options`.
     """
-    given: list[tuple[Callable[[], Any], Sheet]] = []
-    with output_folder(out) as folder:
-        yield lambda data, shown: given.append((data, shown))
-        if folder is not None:
-            with working("drawing the figures ..."):
-                for _, shown in given:
-                    sheet.export(shown, folder, command_line())
-    for data, shown in given:
-        if as_json:
-            print_json(data())
-        else:
-            sheet.show(shown)
-            if out is not None:
-                print(f"\nWritten to {out}: report.md, figures and tables.")
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., None]:
+        @wraps(command)
+        def run(*, as_json: bool, out: str | None = None, **given: Any) -> None:
+            from softstart.views import sheet
+
+            with named_as_options(), output_folder(out) as folder:
+                if out is not None:
+                    _check_report(out)
+                data, shown, *failures = command(**given)
+                if folder is not None:
+                    with working("drawing the figures ..."):
+                        sheet.export(shown, folder, command_line())
+            if as_json:
+                print_json(data())
+            elif isinstance(shown, str):
+                print(shown, end="")
+            else:
+                sheet.show(shown)
+                if out is not None:
+                    print(f"\nWritten to {out}: report.md, figures and tables.")
+            for failure in failures:
+                raise failure
+
+        written = click.option("--out", metavar="DIR", help=text, shell_complete=folders)
+        return json_option(written(run) if text else run)
+
+    return decorate
+
+
+def option_value(name: str) -> Any:
+    """What the command that runs now has for --json ("as_json") or --out."""
+    return click.get_current_context().params[name]
+
+
+def _check_report(out: str) -> None:
+    """Refuse a folder with a report.md that softstart has not written."""
+    report = Path(out, "report.md")
+    if report.is_file() and WRITTEN not in report.read_text(encoding="utf-8", errors="replace"):
+        raise InputError(
+            f'--out = "{out}": the report.md in it was not written by softstart; give another folder, or '
+            "rename that file."
+        )
 
 
 def make_controllers(
-    names: Sequence[str] | None, parameters: Mapping[str, Mapping[str, str]], prefix: bool
-) -> list[controller.Controller]:
-    """The controllers of these names with their parameters; all errors at once.
+    names: Sequence[str] | None, params: Mapping[str, str], several: bool = True
+) -> list[Controller]:
+    """The controllers of these names with the parameters of --param.
 
-    `names`: None stands for all installed ones that need no further parameter. `prefix` puts the controller's
-    name before each key in the sentences.
+    `names`: None stands for all installed ones that need no further parameter. With `several` the keys of
+    `params` begin with the name of a controller.
     """
-    mistakes = Mistakes()
-    made: list[controller.Controller] = []
-    for name in controller.ready_controller_names(parameters) if names is None else names:
-        given = parameters.get(name, {})
+    from softstart import controller
+
+    known = names or list(registered(CONTROLLERS))
+    given: dict[str, dict[str, str]] = {} if several else {known[0]: dict(params)}
+    for whole, value in params.items() if several else ():
+        name, _, key = whole.rpartition(".")
+        if not (name and key):
+            raise InputError(f'--param "{whole}={value}": write CONTROLLER.key=value, as ramp.time=0.2.')
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise InputError(f'--param "{whole}={value}": {name} is not compared here; {hint}')
+        given.setdefault(name, {})[key] = value
+    made: list[Controller] = []
+    for name in controller.ready_controller_names(given) if names is None else names:
+        own = given.get(name, {})
         try:
-            with Attributed(name):
-                made.append(controller.make_controller(name, given, allow_code=code_allowed()))
+            with attributed(name):
+                made.append(controller.make_controller(name, own, allow_code=code_allowed()))
         except InputError as error:
-            mistakes.sentences += [
-                f"--param {name + '.' if prefix else ''}{s}" if s.startswith(tuple(given)) else s
-                for s in map(_one_line, error.sentences)
-            ]
-    mistakes.settle()
+            before = f"--param {name}." if several else "--param "
+            lines = [" ".join(one.split())[:1500] for one in error.sentences]
+            raise InputError(before + s if s.startswith(tuple(own)) else s for s in lines) from None
     return made
-
-
-def _one_line(sentence: str) -> str:
-    """The first lines of an error message of numba, which may fill pages."""
-    lines = [line.strip() for line in sentence.splitlines() if line.strip()]
-    return " ".join(lines[:3]) + (" ..." if len(lines) > 3 else "") if len(lines) > 1 else sentence

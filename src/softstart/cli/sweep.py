@@ -10,65 +10,51 @@ import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.commands import Command, Reading
-from softstart.cli.completion import axes as axes_known
-from softstart.cli.completion import files_only
-from softstart.cli.running import Attributed, answering, working
-from softstart.drive import PARAMETERS
-from softstart.errors import InputError, Mistakes
-from softstart.late import late
+from softstart.cli.completion import one_of
+from softstart.cli.running import Answer, answers, attributed, option_value, working
+from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError
 from softstart.quantities import values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
-    from softstart.drive import Drive
-    from softstart.sweeping import grid as grids
-    from softstart.sweeping import maker as makers
-    from softstart.sweeping import summary as summaries
     from softstart.sweeping.entry import Progress
-    from softstart.views import sweeps as views
-else:  # no numba for a help, a wrong option or the Tab key
-    grids, makers = late("softstart.sweeping.grid"), late("softstart.sweeping.maker")
-    summaries, views = late("softstart.sweeping.summary"), late("softstart.views.sweeps")
+    from softstart.sweeping.maker import Maker, Parameters
 
 RESULTS = "sweep.zarr"
 MOST_VALUES = 1_000_000  # of a range
 
 
-@click.command(cls=Command)
-@options.drive_argument(options.read_machine)
+@click.command()
 @options.controller_option(
-    "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp.",
-    read=lambda name, option: options.check_name(name, option, "several are an axis: --axis controller="),
-)  # fmt: skip
-@click.option("--axis", "axes", metavar="KEY=VALUES", multiple=True, required=True, shell_complete=axes_known,
+    "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp."
+)
+@click.option("--axis", "grid", metavar="KEY=VALUES", multiple=True, required=True,
+    shell_complete=one_of(lambda: ["controller", *options.keys_of(Drive.TABLES)], end="="),
     help="Axis of the grid: a parameter of the drive, shaft.gap=0.25:4:100 (from:to:count, with :log for "
     "geometric spacing), 1x:4x:7 (multiples of the drive's) or load.kind=active,reactive, or of the "
     "controller, controller.torque='10 N*m,20 N*m'. Of a chain shaft.gap is the sum of all gaps, "
     "shaft[2].gap or mass[crane].inertia one part. May be repeated.")  # fmt: skip
 @options.param_option("Set a parameter of the controller for all starts. May be repeated.")
-@options.set_option
 @options.fitted_to_option
 @options.until_option
-@click.option("--figures", metavar="A,B,...", type=Reading(options.read_list),
+@click.option("--figures", metavar="A,B,...", callback=options.reading(options.read_list),
     help="Figures to save, for example k_dyn,start_time; the status is always saved.")  # fmt: skip
 @options.workers_option
 @options.scheduler_option
-@click.option("--chunk", metavar="N", type=options.count(),
+@click.option("--chunk", metavar="N", callback=options.count(),
     help="Largest number of starts that are computed and written at once.")  # fmt: skip
-@click.option(
-    "--netcdf", metavar="FILE", shell_complete=files_only(".nc"), help="Also write the results as netCDF."
-)
-@options.json_option
-@options.out_option(
+@click.option("--netcdf", metavar="FILE", help="Also write the results as netCDF.")
+@options.of_drive(options.read_machine)
+@answers(
     f"Write the results chunk by chunk into DIR/{RESULTS}, with figure, table and report.md; an "
     "interrupted command resumes. Without it only a summary is printed."
 )
 def sweep(
-    *, drive: Machine, controller: str | None, axes: tuple[str, ...], params: dict[str, str],
-    fitted_to: Drive | None, as_json: bool, out: str | None, **asked: Any,
-) -> None:  # fmt: skip
+    *, drive: Machine, controller: str | None, grid: tuple[str, ...], params: dict[str, str],
+    fitted_to: Drive | None, **asked: Any,
+) -> Answer:  # fmt: skip
     """Simulate a grid of drives and controllers of any size.
 
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
@@ -82,38 +68,43 @@ def sweep(
         last = now
         show(str(now))
 
+    code = options.code_allowed()
     with (
-        kept_state(out, RESULTS, "finished chunks") as to,
-        answering(as_json, out) as answer,
-        options.named_as_options(),
+        kept_state(option_value("out"), RESULTS, "finished chunks") as to,
+        options.named_as_options(to="--out"),
+        working("starting the first drive ...") as show,
+        attributed(),
     ):
-        with working("starting the first drive ...") as show:
-            with Attributed():
-                grid = read_axes(axes, makers.Maker(controller or "", params, options.code_allowed()), drive)
-                results = softstart.sweep(
-                    drive, controller, grid, parameters=params, fitted_to=fitted_to, to=to,
-                    progress=progress, allow_code=options.code_allowed(), **asked,
-                )  # fmt: skip
-            show("summing up")
-            summary = summaries.summarise(results)
-        data = {
-            "drive": drive.name,
-            "fitted_to": fitted_to.name if fitted_to else None,
-            "controller": controller,
-            "axes": views.axis_summary(results),
-            **summary.summary(),
-            "cells": views.cells(results).to_dict("records") if summary.starts <= views.MOST_SHOWN else None,
-            "seconds": time.monotonic() - begin,
-            "computed": last.done - last.before if last else 0,
-            "results": None if to is None else str(to),
-        }
-        answer(lambda: data, views.sweep_sheet(results, summary, drive, fitted_to))
-    if last and not as_json:
-        print(views.pace(last))
+        from softstart.sweeping.maker import Maker
+        from softstart.sweeping.summary import summarise
+        from softstart.views import sweeps as views
+
+        axes = read_axes(grid, Maker(controller or "", params, code), drive)
+        results = softstart.sweep(
+            drive, controller, axes, parameters=params, fitted_to=fitted_to, to=to, progress=progress,
+            allow_code=code, **asked,
+        )  # fmt: skip
+        show("summing up")
+        summary = summarise(results)
+    data = {
+        "drive": drive.name,
+        "fitted_to": fitted_to.name if fitted_to else None,
+        "controller": controller,
+        "axes": views.axis_summary(results),
+        **summary.summary(),
+        "cells": views.cells(results).to_dict("records") if summary.starts <= views.MOST_SHOWN else None,
+        "seconds": time.monotonic() - begin,
+        "computed": last.done - last.before if last else 0,
+        "results": None if to is None else str(to),
+    }
+    if last and not option_value("as_json"):
+        pace = views.pace(last)
+        click.get_current_context().call_on_close(lambda: print(pace))
+    return lambda: data, views.sweep_sheet(results, summary, drive, fitted_to)
 
 
-def read_axes(texts: Sequence[str], maker: makers.Maker, machine: Machine | None = None) -> dict[str, Any]:
-    """The grid of several --axis over a drive or chain; all mistakes at once.
+def read_axes(texts: Sequence[str], maker: Maker, machine: Machine | None = None) -> dict[str, Any]:
+    """The grid of several --axis over a drive or chain.
 
     >>> from softstart.sweeping.maker import Maker
     >>> grid = read_axes(["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"], Maker("direct"))
@@ -121,39 +112,41 @@ def read_axes(texts: Sequence[str], maker: makers.Maker, machine: Machine | None
     ([0.5, 1.0, 1.5, 2.0], [0.07, 0.175])
     """
     split = options.read_params(texts, "--axis", "shaft.gap=0.25:4:100 or load.inertia=0.07,0.175")
-    mistakes = Mistakes()
-    parameters: makers.Parameters | None = None  # none where the controllers are wrong
+    parameters: Parameters | None = None
     grid: dict[str, Any] = {}
-    with mistakes.noted():
-        if "controller" in split:
-            names = values_in(split["controller"], "controller", whole=True)
-            for name in names:
-                options.check_name(name, "--axis controller")
-            parameters = maker.common_parameters(names)
-        elif maker.given:
-            parameters = maker.parameters()
+    if "controller" in split:
+        names = values_in(split["controller"], "--axis controller", whole=True)
+        parameters = maker.common_parameters(
+            [options.check_name(name, "--axis controller") for name in names]
+        )
+    elif maker.given:
+        parameters = maker.parameters()
     for key, values in split.items():
-        with mistakes.noted("--axis "):
+        try:
             name, read = _read(key, values, parameters, machine)
-            if name in grid:
-                raise InputError(f"{key}: this parameter is an axis already, by its other name.")
-            grid[name] = read
-    mistakes.settle()
+        except InputError as error:
+            raise InputError(f"--axis {sentence}" for sentence in error.sentences) from None
+        if name in grid:
+            raise InputError(f"--axis {key}: this parameter is an axis already, by its other name.")
+        grid[name] = read
     return grid
 
 
-def _read(
-    key: str, text: str, parameters: makers.Parameters | None, machine: Machine | None
-) -> tuple[str, Any]:
+def _read(key: str, text: str, parameters: Parameters | None, machine: Machine | None) -> tuple[str, Any]:
     """The name and the values of an axis."""
-    owner, name = grids.target_of(key) or ("unknown", "")
+    from softstart.sweeping.grid import read_column, target_of
+
+    def end(part: str) -> tuple[float, str]:
+        column = read_column(key, [part], parameters, machine)
+        if not column.numeric:
+            raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
+        return float(column.values[0]), column.name
+
+    owner, name = target_of(key) or ("unknown", "")
     if text.count(":") not in (2, 3) or owner == "controller" or ".py" in text:
         counts = owner == "drive" and name in PARAMETERS and PARAMETERS[name].limit.startswith("a whole")
         whole = counts or owner in ("controller", "unknown")
-        column = grids.read_column(key, values_in(text, key, whole=whole), parameters, machine)
+        column = read_column(key, values_in(text, key, whole=whole), parameters, machine)
         return column.name, column.values
-    ends, values = options.read_range(text, key, MOST_VALUES)
-    column = grids.read_column(key, ends, parameters, machine)
-    if not column.numeric:
-        raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
-    return column.name, values(*column.values.tolist())
+    found = options.read_values(text, key, end, MOST_VALUES)
+    return found[0][1], [value for value, _ in found]

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.commands import Command, Reading
-from softstart.cli.running import Attributed, answering, make_controllers, working
+from softstart.cli.options import reading
+from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, SimulationError
-from softstart.late import late
 from softstart.quantities import to_si, values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
     from softstart.identification.result import Identification
-    from softstart.views import tuning as views
-else:  # no numba for a help, a wrong option or the Tab key
-    views = late("softstart.views.tuning")
 
 STATE = "tuning.sqlite"
 LARGEST_GRID = 100  # values of one axis
@@ -38,20 +35,17 @@ def read_grid(text: str, option: str, unit: str) -> list[Any]:
     ['2.0J1', '3.5J1', '5.0J1']
     """
 
-    def value(part: str) -> tuple[float, str]:
+    def read(part: str) -> tuple[float, str]:
         ending = next((one for one in ("x", "J1") if part.endswith(one)), "")
         number = part.removesuffix(ending) if ending else part
         return float(to_si(number, "1" if ending else unit, name=option)), ending
 
-    if ":" not in text:
-        found = options.read_each(values_in(text, option), value)
-    else:
-        ends, values = options.read_range(text, option, LARGEST_GRID)
-        (first, ending), (last, other) = options.read_each(ends, value)
-        if ending != other:
-            raise InputError(f'{option} = "{text}": give both ends as quantities, or as the same multiples.')
-        found = [(float(f"{one:.12g}"), ending) for one in values(first, last)]
-    return [f"{one!r}{ending}" if ending else one for one, ending in found]
+    found = options.read_values(text, option, read, LARGEST_GRID)
+    return [f"{float(f'{one:.12g}')!r}{ending}" if ending else float(f"{one:.12g}") for one, ending in found]
+
+
+def _grid(unit: str) -> Callable[..., Any]:
+    return reading(lambda text, option: read_grid(text, option, unit))
 
 
 def read_free(text: str, option: str = "--free") -> dict[str, tuple[str, str] | None]:
@@ -60,19 +54,16 @@ def read_free(text: str, option: str = "--free") -> dict[str, tuple[str, str] | 
     >>> read_free("torque,delay=5 ms:20 ms,time=0.5x:2x")
     {'torque': None, 'delay': ('5 ms', '20 ms'), 'time': ('0.5x', '2x')}
     """
-
-    def named(part: str) -> tuple[str, tuple[str, str] | None]:
+    found: dict[str, tuple[str, str] | None] = {}
+    for part in text.split(","):
         match = re.fullmatch(r"\s*([^=:]+?)\s*(?:=([^:]+):([^:]+))?", part)
         if match is None:
             raise InputError(f'{option} "{part.strip()}": write a name, or name=low:high, as time=0.5x:2x.')
         name, low, high = match.groups()
-        return name, (low.strip(), high.strip()) if low else None
-
-    found = options.read_each(text.split(","), named)
-    names = [name for name, _ in found]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise InputError(f'{option} = "{text}": {twice[0]} is named twice; name it once.')
-    return dict(found)
+        if name in found:
+            raise InputError(f'{option} = "{text}": {name} is named twice; name it once.')
+        found[name] = (low.strip(), high.strip()) if low else None
+    return found
 
 
 def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[str, str | list[str]]:
@@ -88,19 +79,17 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     }
 
 
-@click.command(cls=Command)
-@options.drive_argument(options.read_machine_or_identified)
+@click.command()
 @options.controller_option(
     "--controller", "NAME", "The controller to tune, or path/to/file.py:ClassName.", required=True
 )
-@click.option("--gaps", metavar="GAP,...", type=Reading(lambda text, option: read_grid(text, option, "rad")),
+@click.option("--gaps", metavar="GAP,...", callback=_grid("rad"),
     help="Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as "
     "0.5:2:7; of a chain the sum of all gaps. Default: 0.5x,1x,2x,4x.")  # fmt: skip
-@click.option("--inertias", metavar="INERTIA,...",
-    type=Reading(lambda text, option: read_grid(text, option, "kg*m^2")),
+@click.option("--inertias", metavar="INERTIA,...", callback=_grid("kg*m^2"),
     help="Load inertias, likewise; also multiples of the motor's, 2J1:5J1:4. Default: 0.4x,1x,2x."
 )  # fmt: skip
-@click.option("--free", metavar="NAME[=LOW:HIGH],...", type=Reading(read_free),
+@click.option("--free", metavar="NAME[=LOW:HIGH],...", callback=reading(read_free),
     help="Parameters to tune, with or without a range: torque,delay='5 ms:20 ms',rise=0.5x:2x (multiples "
     "of the default). Default: all that the controller declares tunable.")  # fmt: skip
 @options.param_option("Fix a parameter of the controller, which is then not tuned. May be repeated.")
@@ -109,33 +98,37 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 @click.option("--start-time", metavar="TIME",
     help="Upper bound of the start time: 0.3 (s), or 1.2x that of direct in the same cell. Default: that "
     "of the controller with its default gains.")  # fmt: skip
-@click.option("--tolerance", "tolerances", metavar="KEY=SPREAD", multiple=True, type=Reading(read_tolerances),
+@click.option("--tolerance", "tolerances", metavar="KEY=SPREAD", multiple=True,
+    callback=reading(read_tolerances),
     help="Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover, "
     "encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.")  # fmt: skip
-@click.option("--quantile", metavar="SHARE", type=options.quantity("1"), default="1",
+@click.option("--quantile", metavar="SHARE", callback=options.quantity("1"), default="1",
     help="Quantile of the starts that is minimised. Default: 1, the worst case.")  # fmt: skip
-@click.option("--only", metavar="schedule|robust", type=options.choice("schedule", "robust"),
+@click.option("--only", metavar="schedule|robust", type=click.Choice(["schedule", "robust"]),
     help="Compute the gain schedule or the robust set only.")  # fmt: skip
 @click.option("--optimum/--no-optimum", "certified", default=None,
     help="Compute or skip the optimum of each cell, which takes longest. Default: compute that of drives."
 )  # fmt: skip
 @click.option(
-    "--seed", metavar="N", type=options.count(0), default="0", help="Seed of the random search. Default: 0."
+    "--seed",
+    metavar="N",
+    callback=options.count(0),
+    default="0",
+    help="Seed of the random search. Default: 0.",
 )
-@click.option("--restarts", metavar="N", type=options.count(0), default="3",
+@click.option("--restarts", metavar="N", callback=options.count(0), default="3",
     help="Number of independent searches. Default: 3.")  # fmt: skip
 @options.workers_option
 @options.scheduler_option
-@options.set_option
-@options.json_option
-@options.out_option(
+@options.of_drive(options.read_machine_or_identified)
+@answers(
     "Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished "
     "parts are saved at once, so that an interrupted command resumes."
 )
 def tune(
     *, drive: Machine | Identification, controller: str, params: dict[str, str], only: str | None,
-    as_json: bool, out: str | None, **asked: Any,
-) -> None:  # fmt: skip
+    **asked: Any,
+) -> Answer:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
     DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an
@@ -143,27 +136,38 @@ def tune(
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
     """
-    asked |= {"schedule": only != "robust", "robust": only != "schedule"}
-    with kept_state(out, STATE, "finished parts") as state, answering(as_json, out) as answer:
-        with working("starting the drive ...") as progress:
-            make_controllers([controller], {controller: params}, prefix=False)
-            with Attributed(), options.named_as_options(_as_typed):
-                tuning = softstart.tune(
-                    drive, controller, parameters=params, save_to=state, progress=progress, **asked
-                )
-        answer(tuning.summary, views.tuning_sheet(tuning))
-    if not views.any_in_time(tuning):
-        raise SimulationError(
-            f"No gains within these ranges start in time ({tuning.question.bound.text()}); allow more time "
-            "with --start-time, or wider ranges with --free."
-        )
+    asked |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
+    with (
+        kept_state(option_value("out"), STATE, "finished parts") as state,
+        working("starting the drive ...") as progress,
+        attributed(),
+        _as_typed(),
+    ):
+        make_controllers([controller], params, several=False)
+        tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
+    from softstart.views.tuning import any_in_time, tuning_sheet
+
+    if any_in_time(tuning):
+        return tuning.summary, tuning_sheet(tuning)
+    late = SimulationError(
+        f"No gains within these ranges start in time ({tuning.question.bound.text()}); allow more time with "
+        "--start-time, or wider ranges with --free."
+    )
+    return tuning.summary, tuning_sheet(tuning), late
 
 
-def _as_typed(sentence: str) -> str:
-    """The sentence with ranges as they are typed behind --free.
+@contextmanager
+def _as_typed() -> Iterator[None]:
+    """Errors with ranges as they are typed behind --free.
 
-    >>> _as_typed('controller = mine: name one with its range, as free={"rise": ("0.5x", "2x")}.')
-    'controller = mine: name one with its range, as --free rise=0.5x:2x.'
+    >>> with _as_typed():
+    ...     raise InputError('controller = mine: name one with its range, as free={"rise": ("0.5x", "2x")}.')
+    Traceback (most recent call last):
+    softstart.errors.InputError: controller = mine: name one with its range, as --free rise=0.5x:2x.
     """
-    sentence = re.sub(r'free=\{"(\w+)": \("([^"]+)", "([^"]+)"\)\}', r"--free \1=\2:\3", sentence)
-    return re.sub(r"^(free: \w+ = )\('([^']+)', '([^']+)'\)", r"\1\2:\3", sentence)
+    try:
+        yield
+    except InputError as error:
+        text = re.sub(r'free=\{"(\w+)": \("([^"]+)", "([^"]+)"\)\}', r"--free \1=\2:\3", str(error))
+        text = re.sub(r"(?m)^(free: \w+ = )\('([^']+)', '([^']+)'\)", r"\1\2:\3", text)
+        raise InputError(text.splitlines()) from error

@@ -72,7 +72,12 @@ class Folder:
         if not (self.path.is_dir() and any(self.path.iterdir())):
             self._create()
         elif not (self.path / self._target.inside).exists():
-            raise self._target.foreign()
+            if not (self.path / "zarr.json").exists():
+                raise self._target.foreign()
+            raise self._target.error(
+                "these results were written by an earlier version of softstart or by another program, and a "
+                f"sweep cannot go on with them; {self._target.other}, or delete this one to begin again."
+            )
         with ExitStack() as stack:
             self._list = stack.enter_context(Records(self._target, self._inputs, ["part"]))
             self._resume()

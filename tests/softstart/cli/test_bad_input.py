@@ -14,14 +14,13 @@ ONE_SENTENCE = {
     "command unlike any": (
         ["zzzzzz"],
         [
-            "there are compare, simulate, fatigue, optimize, pareto, tune, sweep, linear, reduce, clutch, "
-            "balance, report, serve, init, plan, identify, wear, drives, controllers, study and completion"
+            "there are init, plan, identify, wear, drives, reduce, compare, simulate, fatigue, controllers, "
+            "linear, optimize, pareto, tune, sweep, serve, report, clutch, balance, study and completion"
         ],
     ),
     "unknown option": (["compare", "--jsno"], ["compare:", "'--jsno'", "Did you mean '--json'?"]),
     "unknown option before a command": (["--verion"], ["'--verion'", "Did you mean '--version'?"]),
     "unknown short option": (["compare", "-z"], ["No such option '-z'"]),
-    "option in place of a file": (["report", "--pdf", "--json"], ["report:", "--pdf needs a value"]),
     "argument as an option": (["tune", "--drive", "crane-4amtkf"], ["tune:", "No such option '--drive'"]),
     "option without value": (["compare", "--set"], ["compare:", "'--set' requires an argument"]),
     "flag with value": (["compare", "--json=yes"], ["'--json' does not take a value"]),
@@ -30,6 +29,7 @@ ONE_SENTENCE = {
     "no controller": (["simulate", "good.toml"], ["Missing option '--controller'"]),
     # the drive
     "missing file": (["compare", "nowhere.toml"], ['"nowhere.toml"', "no such file"]),
+    "no drive and no chain": (["compare", "nosuch"], ["crane-4amtkf", "crane-4-mass", "tractor-like"]),
     "misspelt drive": (["compare", "crane-4amtk"], ["did you mean crane-4amtkf?"]),
     "folder as drive": (["compare", "folder"], ["directory"]),
     "not TOML": (["compare", "broken.toml"], ["line 1", "not valid TOML"]),
@@ -50,7 +50,7 @@ ONE_SENTENCE = {
     # controllers by name
     "unknown controller": (["compare", "--controllers", "dirct"], ["--controllers", "did you mean direct?"]),
     "controller unlike any": ([*START, "zzzzzz"], ["--controller", "there are"]),
-    "empty controller": (["compare", "--controllers", "direct,,ramp"], ["a name is empty"]),
+    "empty controller": (["compare", "--controllers", "direct,,ramp"], ['--controllers = ""', "there are"]),
     "controller twice": (["compare", "--controllers", "ramp,ramp"], ["named twice"]),
     # their parameters
     "parameter without value": ([*START, "ramp", "--param", "time"], ["--param", "equals sign"]),
@@ -87,6 +87,8 @@ ONE_SENTENCE = {
     "impossible output": ([*START, "direct", "--out", "a\0b"], ["cannot be the path"]),
     "too long output": ([*START, "direct", "--out", "x" * 300], ["--out"]),
     # the rest
+    "exposed without a token": (["serve", "--expose"], ["--host ADDRESS and --token TOKEN"]),
+    "no folder of an identification": (["wear", "NOFOLDER"], ['"NOFOLDER"', "identification.json"]),
     "unknown shipped drive": (["drives", "crane"], ["did you mean crane-4amtkf?"]),
     "unknown controller to describe": (["controllers", "rmp"], ["did you mean ramp?"]),
     "unknown study": (["study", "papr-g"], ['did you mean "paper-g"?']),
@@ -109,40 +111,10 @@ def test_one_clear_sentence(arguments, says, refused):
     refused(*arguments, says=says)
 
 
-# a line with several mistakes: what the sentence of each must say
-SEVERAL = {
-    "compare wrong.toml --controllers dirct,ramp --until -1 --param ramp": [
-        "starting_torque", "gap = nan", "did you mean direct?", "--until", "--param"
-    ],
-    "optimize wrong.toml --terminal sync --max-heat 0 --smoothness rough --torque-speed 62": [
-        "starting_torque", "gap = nan", "--terminal", "--max-heat", "--smoothness", "--torque-speed",
-    ],
-    "pareto wrong.toml --start-times soon,0.3 --terminal x --controllers dirct,ramp": [
-        "starting_torque", "gap = nan", "--start-times", "--terminal", "did you mean direct?"
-    ],
-    "tune wrong.toml --controller rmp --gaps x --free a=1 --only b --seed c": [
-        "starting_torque", "gap = nan", "did you mean ramp?", "--gaps", "--free", "--only", "--seed"
-    ],
-    "sweep wrong.toml --axis gapp=1 --controller rmp --workers 0 --until soon": [
-        "starting_torque", "gap = nan", "did you mean ramp?", "--workers", "--until"
-    ],
-    "reduce --factor -2 --verify rmp --set mass[9].inertia=3": [
-        "--factor", "did you mean ramp?", "N from 1 to 4"
-    ],
-    "balance --speed 50Hz --set cylinders.bore=1N --set masses.rotating=-1": [
-        "--speed", "cylinders", "rotating"
-    ],
-    "clutch good.toml": ["[motor]", "[clutch] inertia", "[clutch] torque", "[clutch] speed", "time tM"],
-    "clutch --law x --until soon --points 0": ["--law", "--until", "--points"],
-    "report nowhere.toml --resolution tme=1ms --budget x": [
-        "--out: name the file", "no such file", "did you mean time?", "--budget"
-    ],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("line", "says"), SEVERAL.items())
-def test_all_mistakes_are_told_at_once(line, says, refused):
-    refused(*line.split(), says=says, mistakes=len(says))
+def test_what_is_wrong_in_a_file_is_told_at_once(refused):
+    refused("compare", "wrong.toml", says=["starting_torque", "gap = nan"], mistakes=2)
+    says = ["[motor]", "[clutch] inertia", "[clutch] torque", "[clutch] speed", "time tM"]
+    refused("clutch", "good.toml", says=says, mistakes=5)
 
 
 UNFINISHED = {

@@ -10,6 +10,7 @@ import tomllib
 import pytest
 
 from softstart import Drive, compare, simulate
+from softstart.cli.running import WRITTEN
 from softstart.views.starts import comparison_figure, share_lost
 
 THREE = ("--controllers", "direct,reduced-first-stage,reduced-two-stage")
@@ -175,7 +176,7 @@ def test_the_same_command_replaces_older_files_by_the_same_and_leaves_others(run
     folder = place / "results"
     folder.mkdir()
     (folder / "notes.txt").write_text("mine")
-    (folder / "report.md").write_text("old")
+    (folder / "report.md").write_text(f"old\n\n{WRITTEN}0.1")
     written = []
     for _ in range(2):
         assert run("compare", "--controllers", "direct", "--out", "results", "--json").code == 0
@@ -187,6 +188,12 @@ def test_the_same_command_replaces_older_files_by_the_same_and_leaves_others(run
     mode = (folder / "report.md").stat().st_mode & 0o777
     (place / "usual").touch()
     assert mode == (place / "usual").stat().st_mode & 0o777
+
+
+def test_a_report_of_ones_own_is_not_replaced(place, refused):
+    (place / "report.md").write_text("# My measurements\n")
+    refused("compare", "--controllers", "direct", "--out", ".", says=["was not written by softstart"])
+    assert (place / "report.md").read_text() == "# My measurements\n"
 
 
 def test_compare_tells_limits_and_flags(run, refused):
@@ -205,7 +212,7 @@ def test_compare_tells_limits_and_flags(run, refused):
     assert (code, err) == (0, "")
     assert "exceeded" in out
     assert "shaped (harder x" in out
-    refused("compare", "--worst-case", "gap", says=["write gap x4, J2 x0.4"])
+    refused("compare", "--worst-case", "gap", says=["--worst-case", 'there are "gap x4" and "J2 x0.4"'])
 
 
 @pytest.mark.parametrize("machine", ["crane-4amtkf", "crane-4-mass"])

@@ -14,7 +14,7 @@ import pytest
 
 from softstart import __version__
 from softstart.cli.commands import COMMANDS, cli
-from softstart.cli.running import COMPILING, working
+from softstart.cli.running import COMPILING, WRITTEN, working
 
 HEAVY = ("casadi", "control", "matplotlib", "nicegui", "numba", "scipy.linalg", "xarray")
 QUICK = 0.5  # s of processor time that a help may take, with starting Python
@@ -30,6 +30,7 @@ class Slow(PlainController):
 """
 
 DIRECT = ("--controllers", "direct")
+OLD = f"# old\n\n{WRITTEN}0.1"
 
 LIGHT = {
     "greeting": ([], 0),
@@ -120,10 +121,10 @@ def test_help_and_version(run):
 
 
 def test_the_listed_help_of_each_command_is_its_own():
-    context = click.Context(cli)
+    context = click.Context(cli, **cli.context_settings)
     for name, (_, sentence) in COMMANDS.items():
         command = cli.get_command(context, name)
-        assert command.get_help_option(click.Context(command)).opts == ["-h", "--help"]
+        assert command.get_help_option(click.Context(command, parent=context)).opts == ["-h", "--help"]
         assert (command.name, " ".join(command.help.split("\n\n")[0].split())) == (name, sentence)
         assert "{" not in command.get_help(click.Context(command))  # no placeholder is left
 
@@ -161,7 +162,7 @@ def test_interrupted_write_leaves_nothing(command, place, stop, there_before):
     (place / "slow.py").write_text(SLOW)
     if there_before:
         (place / "results").mkdir()
-        (place / "results" / "report.md").write_text("old")
+        (place / "results" / "report.md").write_text(OLD)
     process = subprocess.Popen(
         [*command, "simulate", "good.toml", "--controller", "slow.py:Slow", "--out", "results"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -177,7 +178,7 @@ def test_interrupted_write_leaves_nothing(command, place, stop, there_before):
     assert not list(place.rglob("*.part"))
     if there_before:
         assert [path.name for path in (place / "results").iterdir()] == ["report.md"]
-        assert (place / "results" / "report.md").read_text() == "old"
+        assert (place / "results" / "report.md").read_text() == OLD
     else:
         assert not (place / "results").exists()
 

@@ -147,7 +147,7 @@ ONE_SENTENCE = {
     "count of one": (["--start-times", "0.3:0.4:1"], ["from 2 to 1000"]),
     "count of a word": (["--start-times", "0.3:0.4:many"], ["from 2 to 1000"]),
     "mixed range": (["--start-times", "0.3:1.2x:5"], ["both ends"]),
-    "terminal": (["--terminal", "steedy"], ["--terminal", "did you mean steady?"]),
+    "terminal": (["--terminal", "steedy"], ["--terminal", "'synchronous', 'steady', 'reached'"]),
     "controller": (["--controllers", "dirct"], ["did you mean direct?"]),
     "a controller that needs a parameter": (["--controllers", "profile"], ["profile"]),
 }

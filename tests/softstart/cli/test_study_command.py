@@ -65,11 +65,10 @@ def registered(monkeypatch):
 
 
 def test_list(done, as_json):
-    for arguments in (["study"], ["study", "--list"]):
-        out = done(*arguments)
-        assert "Does a wider gap raise K_dyn?" in out
-        assert "No module named 'nothing'" in " ".join(out.split())
-    told = as_json("study", "--list")
+    out = done("study")
+    assert "Does a wider gap raise K_dyn?" in out
+    assert "No module named 'nothing'" in " ".join(out.split())
+    told = as_json("study")
     listed = {"name": "example", "title": Example.title, "pictures": ["gap"], "files": ["gap.svg", "gap.png"]}
     assert listed in told["studies"]
 
@@ -99,7 +98,7 @@ def test_files(run, place, as_json):
     code, out, _ = run("study", "example", "--out", "results")
     assert code == 0
     names = {path.name for path in (place / "results").iterdir()}
-    listed = {one["name"]: one["files"] for one in as_json("study", "--list")["studies"]}
+    listed = {one["name"]: one["files"] for one in as_json("study")["studies"]}
     assert set(listed["example"]) == {name for name in names if not name.endswith((".csv", ".md"))}
     assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv", "report.md"}
     table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")

@@ -169,9 +169,9 @@ ONE_SENTENCE = {
         ["--axis: 1,000,000,000 starts", "--out DIR"],
     ),
     "several": (
-        (*GAP, "--controller", "direct, ramp"), ["give one controller", "--axis controller=direct,ramp."]
+        (*GAP, "--controller", "direct, ramp"), ["compare and sweep take several"]
     ),
-    "fitted to": ((*GAP, "--controller", "ramp", "--fitted-to", "crane"), ["--fitted-to:", "shipped drive"]),
+    "fitted to": ((*GAP, "--controller", "ramp", "--fitted-to", "crane"), ["crane", "shipped drive"]),
 }  # fmt: skip
 
 

@@ -142,7 +142,7 @@ ONE_SENTENCE = {
     "tolerance": (["--tolerance", "stiffness"], ["as stiffness=10%"]),
     "tolerance key": (["--tolerance", "stifness=10%"], ["--tolerance", "did you mean stiffness?"]),
     "quantile": (["--quantile", "2"], ["--quantile"]),
-    "only": (["--only", "schedul"], ["--only", "did you mean schedule?"]),
+    "only": (["--only", "schedul"], ["--only", "'schedule', 'robust'"]),
     "seed": (["--seed", "x"], ['--seed = "x"']),
     "restarts": (["--restarts", "0"], ["--restarts"]),
     "workers": (["--workers", "0"], ["--workers"]),

@@ -252,6 +252,9 @@ def test_folders_that_hold_something_else(tmp_path):
         with pytest.raises(InputError, match=r"to = .*file"):
             sweep(CRANE, "ramp", GRID, to=tmp_path / place, **OPTIONS)
     sweep(CRANE, "ramp", GRID, to=tmp_path / "empty", **OPTIONS)
+    (tmp_path / "empty" / "status" / "softstart.sqlite").unlink()  # as those of before were
+    with pytest.raises(InputError, match="written by an earlier version of softstart"):
+        sweep(CRANE, "ramp", GRID, to=tmp_path / "empty", **OPTIONS)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "file", "full"]
 
 
