@@ -31,7 +31,7 @@ from softstart.page.panel_parts import (
     table,
 )
 from softstart.page.session import Session
-from softstart.views.printed import fixed
+from softstart.views.numbers import fixed
 
 if TYPE_CHECKING:
     from softstart.optimal.front import FrontPoint

@@ -18,7 +18,7 @@ from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
 from softstart.page.sentences import changed_since, plain, sentence_of
 from softstart.page.session import Session
-from softstart.views.printed import NOTHING
+from softstart.views.numbers import DASH as NOTHING
 
 if TYPE_CHECKING:
     from nicegui.events import UiEventArguments, UploadEventArguments

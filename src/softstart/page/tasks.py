@@ -35,7 +35,7 @@ from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import recommend
 from softstart.start.simulation import simulate
 from softstart.tuning.solving import tune
-from softstart.views.printed import digits, fixed, unit, units_of
+from softstart.views.numbers import digits, fixed, unit, units_of
 
 if TYPE_CHECKING:
     from softstart import reporting

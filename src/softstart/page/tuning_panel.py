@@ -37,7 +37,7 @@ from softstart.page.panel_parts import (
 from softstart.page.session import Session
 from softstart.quantities import Units, values_in
 from softstart.tuning.question import gaps_of, inertias_of
-from softstart.views.printed import fixed, unit, units_of
+from softstart.views.numbers import fixed, unit, units_of
 
 FIRST = "shaped"  # the controller offered first, if it is there
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}

@@ -40,7 +40,7 @@ from softstart.page.sentences import changed_since
 from softstart.page.tasks import label_of, player_of
 from softstart.page.tuning_panel import cell_table, controller_of, grid_of, tunable
 from softstart.reporting import report
-from softstart.views.printed import units_of
+from softstart.views.numbers import units_of
 
 CRANE = Drive.load("crane-4amtkf")
 
