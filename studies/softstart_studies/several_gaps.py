@@ -15,7 +15,7 @@ from softstart.chain import Chain, reduce_chain
 from softstart.controller import ready_controller_names
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
-from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, name_points, new_figure
+from softstart.views.drawing import COLOURS, GREY, drawing, head, mark_points, new_figure
 
 RATIO = 0.02  # of each shaft
 REPLAYED = 1e-6
@@ -152,16 +152,12 @@ def figure(found: Findings) -> Any:
         bounds = [row.best.bound.k_dyn for row in found.rows]
         axes.plot(times, bounds, ":", color=GREY, label="momentum bound of the chain")
         shown = [run for run in found.runs if run.start_time <= 1.1 * times[-1]]
-        for i, run in enumerate(shown):
-            colour = COLOURS[(i + 2) % len(COLOURS)]
-            axes.plot(run.start_time, run.k_dyn, MARKERS[i % len(MARKERS)], ls="none", ms=6, color=colour)
         axes.set_yscale("log")
         axes.set_yticks([0.7, 1.0, 1.5, 2.0, 3.0, 4.0], ["0.7", "1", "1.5", "2", "3", "4"])
         axes.minorticks_off()
         axes.set_xlabel("start time, s")
         head(axes, "Crane with four masses, three gaps, damping ratio 2 %", "K_dyn")
-        axes.legend(fontsize=7, loc="upper right")
-        name_points(drawn, axes, [(run.controller_name, run.start_time, run.k_dyn) for run in shown])
+        mark_points(axes, [(run.controller_name, run.start_time, run.k_dyn) for run in shown])
     return drawn
 
 

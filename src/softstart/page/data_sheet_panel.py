@@ -16,7 +16,7 @@ from softstart.page.panel_parts import Troubles, action, box, choice, field, hin
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
-from softstart.views.printed import unit as printed
+from softstart.views.numbers import unit as printed
 
 TITLES = {
     "load": "Machine",

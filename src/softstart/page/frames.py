@@ -42,7 +42,7 @@ from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.run import Run
-from softstart.views.printed import unit, units_of
+from softstart.views.numbers import unit, units_of
 from softstart.views.starts import position_notes
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest

@@ -16,7 +16,7 @@ from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, field, uplo
 from softstart.page.sentences import clipped
 from softstart.quantities import values_in
 from softstart.tuning.question import gaps_of, inertias_of
-from softstart.views.printed import units_of
+from softstart.views.numbers import units_of
 
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
 MOST_CELLS = 60

@@ -10,7 +10,7 @@ from softstart.chain.machines import Machine, Values
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest
-from softstart.views.printed import unit, units_of
+from softstart.views.numbers import unit, units_of
 
 log = logging.getLogger("softstart.page")
 LONGEST = 300  # letters of an exception

@@ -23,11 +23,22 @@ from softstart.reporting.result import Report
 from softstart.start import fatigue
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
-from softstart.views import chains, drives, printed, starts
+from softstart.views import chains, drives, starts
 from softstart.views import fatigue as lives
 from softstart.views.drawing import drawing
-from softstart.views.numbers import Column, Table
-from softstart.views.printed import at_output, digits, fixed, percent, short, unit
+from softstart.views.numbers import (
+    RPM,
+    Column,
+    Table,
+    at_output,
+    digits,
+    fixed,
+    percent,
+    printed,
+    short,
+    unit,
+    units_of,
+)
 
 HERE = Path(__file__).parent
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
@@ -99,11 +110,12 @@ def columns(heads: str | list[Column]) -> list[Column]:
 
 
 FILTERS = {
-    "digits": digits, "fixed": fixed, "short": short, "percent": percent, "listed": listed,
-    "times": times, "factor": lives.factor, "printed": printed.printed, "for_customer": for_customer,
+    "digits": digits, "fixed": fixed, "short": lambda value: printed(short(value)),
+    "percent": percent, "listed": listed, "times": times, "factor": lives.factor,
+    "printed": printed, "for_customer": for_customer,
     "css_string": css_string,
     "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
-    "short4": lambda value: short(float(f"{value:.4g}")), "columns": columns,
+    "short4": lambda value: printed(short(float(f"{value:.4g}"))), "columns": columns,
 }  # fmt: skip
 
 
@@ -144,9 +156,11 @@ def document(report: Report) -> str:
         return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
 
     def scheme() -> Markup:
-        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=printed.units_of(drive)))
+        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=units_of(drive)))
 
     several, what = len(drive.shaft_names) > 1, drive.WHAT.removeprefix("a ")
+    asked = several or drive.limits.fatigue is not None  # for lives
+    lasts = asked and not isinstance(report.lives, str)
     sections = {
         "recommendation": "The recommendation, and why",
         "strategies": "The strategies compared",
@@ -156,7 +170,7 @@ def document(report: Report) -> str:
         "limit": "How gentle could a start be?",
         "robustness": "When the gap wears and the load changes" if report.choice.mapped else "",
         "sheets": "Parameter sheets for the inverter",
-        "life": "How long the shaft line lasts" if several or drive.limits.fatigue is not None else "",
+        "life": "How long the shaft line lasts" if lasts else "",
         "validity": "What this report assumes, and where it holds",
         "provenance": "About this document",
     }
@@ -165,11 +179,12 @@ def document(report: Report) -> str:
     by_effort = sorted(choices, key=lambda row: (row.effort.order, -row.run.k_dyn))
     values = {
         "report": report, "drive": drive, "choice": report.choice, "limit": report.limit, "what": what,
+        "no_lives": report.lives if asked and not lasts else "",
         "project": report.project, "sections": [(key, title) for key, title in sections.items() if title],
         "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS,
         "geared": drive.gear_ratio is not None,
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
-        "doubts": doubts.doubts(drive), "units": printed.units_of(drive), "most_torque": report.most_torque,
+        "doubts": doubts.doubts(drive), "units": units_of(drive), "most_torque": report.most_torque,
         "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
@@ -180,7 +195,7 @@ def document(report: Report) -> str:
         "output": "|#at the output, N m" if drive.gear_ratio else "", "strategies": strategies,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
         "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
-        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": printed.RPM, "REACTS": REACTS,
+        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
         "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
     }  # fmt: skip
     with drawing():  # a name may have characters that the font of the figures has not
@@ -217,7 +232,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
     project, units, geared = (
         report.project,
-        printed.units_of(report.drive),
+        units_of(report.drive),
         report.drive.gear_ratio is not None,
     )
     rows, absent = list[list[str]](), list[str]()
@@ -239,7 +254,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         elif numbers and of != unit(si):
             other = f"{digits(value)} {unit(si)}"
         elif numbers and si == "rad/s":
-            other = f"{short(float(f'{value * printed.RPM:.6g}'))} rpm"
+            other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif numbers and si == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
         cells = [parameter.meaning, parameter.symbol, text, of if numbers else "", other]

@@ -24,15 +24,14 @@ from softstart.views.drawing import (
     COLOURS,
     DASHES,
     GREY,
-    MARKERS,
     SHAFTS,
     drawing,
-    name_points,
+    mark_points,
     new_figure,
     plain_ticks,
     shade_open_gap,
 )
-from softstart.views.printed import units_of
+from softstart.views.numbers import units_of
 from softstart.views.starts import run_figure
 
 ACROSS = 4  # panels side by side
@@ -171,22 +170,17 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
     left, right = left - 0.15 * (right - left), right + 0.04 * (right - left)
     values = [row.run.k_dyn for row in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
     with drawing(), mpl.rc_context(STYLE):
-        figure, axes = new_figure(1, 1, (WIDE, 3.6))
+        figure, axes = new_figure(1, 1, (WIDE, 3.4))
         if limit.times:
             t, k = limit.times, np.minimum(limit.bounds, 2.0 * max(values))
             axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
-            axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound: no torque goes below")
+            axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound")
             values.append(float(np.interp(right, t, k)))
         if optima:
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], ".-", color=COLOURS[0],
                 lw=1.2, ms=7, label=f"{best_start(rows[0].run.drive)} found", zorder=3,
             )  # fmt: skip
-        for index, row in enumerate(placed):
-            best, colour = row in strong, COLOURS[(index + 1) % len(COLOURS)]
-            axes.plot([row.run.start_time], [row.run.k_dyn], MARKERS[index % len(MARKERS)],
-                      ms=8 if best else 6.5, mfc=colour if best else "white", mew=1.6,
-                      color=colour, zorder=4)  # fmt: skip
         axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
         low, high = min(values), max(values)
         if high > 4.0 * low:
@@ -199,11 +193,8 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
         axes.set_xlim(left, right)
         axes.set_xlabel("start time, s")
         axes.set_ylabel(K_DYN)
-        handles = axes.get_legend_handles_labels()[0]
-        if handles:
-            figure.legend(handles=handles, loc="outside upper center", ncols=3)
-        points = [(name_in_figure(row.marked), row.run.start_time, row.run.k_dyn) for row in placed]
-        name_points(figure, axes, points)
+        points = [(name_in_figure(row.name), row.run.start_time, row.run.k_dyn) for row in placed]
+        mark_points(axes, points, [index for index, row in enumerate(placed) if row in strong])
     return figure
 
 

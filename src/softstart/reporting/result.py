@@ -32,7 +32,7 @@ from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compare
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
-from softstart.views.printed import NOTHING, percent
+from softstart.views.numbers import DASH, percent
 
 BUDGET, SHAFTS_BUDGET = 20.0, 60.0  # s for optima that take a search, on one shaft and on several
 
@@ -161,7 +161,7 @@ class Report:
         """What a strategy saves of the peak of direct; a dash for direct itself."""
         direct = self.choice.direct
         if row is direct:
-            return NOTHING
+            return DASH
         saved = 1.0 - row.run.peak_torque / direct.run.peak_torque
         return percent(saved, 0 if abs(saved) >= 0.1 else 1)
 

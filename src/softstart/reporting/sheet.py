@@ -21,7 +21,7 @@ from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.views.printed import RPM, decimals_of, digits, fixed, short, unit
+from softstart.views.numbers import RPM, decimals_of, digits, fixed, short, unit
 
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting

@@ -12,9 +12,18 @@ import numpy as np
 from softstart.balancing.engine import INDICATOR_FILE
 from softstart.balancing.gas import MeasuredCycle
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, entitle, head, legend_above, new_figure
-from softstart.views.numbers import Table, column_of, number, printable, short
-from softstart.views.printed import RPM
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    drawing,
+    entitle,
+    head,
+    legend_above,
+    line_of,
+    new_figure,
+)
+from softstart.views.numbers import RPM, Table, column_of, number, printable, short
 from softstart.views.sheet import Sheet, columns_file, records_file
 
 if TYPE_CHECKING:
@@ -191,26 +200,28 @@ def torque_figure(found: Balance) -> Any:
     harmonics = found.engine.torque_harmonics(found.tuning_speed, found.load)
     mean, wave = harmonics[0].real, (harmonics[2] * np.exp(1j * np.radians(degrees))).real
     rows = [row for row in found.orders() if row["order"] <= BARS and row["torque"] > 0.0]
-    bars_of = {
-        "gas": [math.hypot(row["gas_cosine"], row["gas_sine"]) for row in rows],
-        "inertia": [math.hypot(row["inertia_cosine"], row["inertia_sine"]) for row in rows],
-        "both": [row["torque"] for row in rows],
+    parts = {
+        "gas": (gas, [math.hypot(row["gas_cosine"], row["gas_sine"]) for row in rows], 1, "//"),
+        "inertia": (
+            inertia,
+            [math.hypot(row["inertia_cosine"], row["inertia_sine"]) for row in rows],
+            2,
+            "..",
+        ),
+        "both": (gas + inertia, [row["torque"] for row in rows], 0, ""),
     }
-    looks = {"gas": (COLOURS[1], "//"), "inertia": (COLOURS[2], ".."), "both": (COLOURS[0], "")}
     with drawing():
         figure, (torque, bars) = new_figure(2, 1, (8.0, 6.8))
-        torque.plot(degrees, gas, color=looks["gas"][0], ls=DASHES[1], lw=1.1, label="gas")
-        torque.plot(degrees, inertia, color=looks["inertia"][0], ls=DASHES[2], lw=1.1, label="inertia")
-        torque.plot(degrees, gas + inertia, color=looks["both"][0], label="both")
+        for index, (name, (values, heights, colour, hatch)) in enumerate(parts.items()):
+            torque.plot(degrees, values, color=COLOURS[colour], ls=DASHES[colour], label=name)
+            drawn = bars.bar(np.arange(len(rows)) + 0.27 * (index - 1), heights, 0.25, label=name,
+                             color=COLOURS[colour], hatch=hatch, edgecolor="white")  # fmt: skip
         torque.plot(degrees, mean + wave, color="black", ls=DASHES[3], lw=1.8, label="mean and first order")
         torque.set_xticks(np.arange(0.0, 721.0, 90.0))
         torque.set_xlim(0.0, 720.0)
         head(torque, f"mean {mean:.1f} N m", "torque on the crank, N m", "crank angle, deg")
         legend_above(torque, 4)
-        for index, (name, (colour, hatch)) in enumerate(looks.items()):
-            places, look = np.arange(len(rows)) + 0.27 * (index - 1), {"hatch": hatch, "edgecolor": "white"}
-            drawn = bars.bar(places, bars_of[name], 0.25, color=colour, label=name, **look)
-        bars.bar_label(drawn, [f"{height:.0f}" for height in bars_of["both"]], fontsize=8, padding=1)
+        bars.bar_label(drawn, fmt="%.0f", fontsize=8, padding=1)
         bars.set_xticks(range(len(rows)), [f"{row['order']:g}" for row in rows])
         head(bars, "", "amplitude, N m", "order of the crank speed")
         bars.grid(False, axis="x")
@@ -222,36 +233,31 @@ def torque_figure(found: Balance) -> Any:
 def residual_figure(found: Balance) -> Any:
     """First-order moment left, the arm that each design needs, forces and couples, over the speed."""
     of: Sequence[Any] = found.residuals
-    designed = [one for one in of if one.height is not None]
-    looks = {one.name: {"color": COLOURS[i % 8], "ls": DASHES[i % 8]} for i, one in enumerate(of)}
-    heights = [(one, "", 1e3 * np.abs(one.height)) for one in designed if not one.name.endswith("-e")]
-    sideways = [one for one in designed if one.name == "variable-h-e"]
-    heights += [(one, "sideways |e(n)|", 1e3 * np.abs(one.offset)) for one in sideways]
-    forces = [(one, one.name, 1e-3 * one.all_forces) for one in of if one.name in ("none", "own-shafts")]
-    forces += [(one, "any designed shafts", 1e-3 * one.all_forces) for one in designed[:1]]
-    couples = [(one, "", one.couple) for one in of] if any(np.any(one.couple > 0.0) for one in of) else []
+    designed = [(i, one) for i, one in enumerate(of) if one.height is not None and one.name[-2:] != "-e"]
     shown = {
-        "moment of first order\non the housing, N m": [(one, "", one.first_order) for one in of],
-        "height |h| of the shafts\nfrom the crank, mm": heights,
-        "largest force\non the housing, kN": forces,
-        "couple of first order\non the housing, N m": couples,
+        "moment of first order\non the housing, N m": [(i, one.first_order) for i, one in enumerate(of)],
+        "height |h| of the shafts\nfrom the crank, mm": [
+            (i, 1e3 * np.abs(one.height)) for i, one in designed
+        ],
+        "largest force\non the housing, kN": [(i, 1e-3 * one.all_forces) for i, one in enumerate(of)],
+        "couple of first order\non the housing, N m": [
+            (i, one.couple) for i, one in enumerate(of) if any(np.any(each.couple > 0.0) for each in of)
+        ],
     }
     shown = {up: curves for up, curves in shown.items() if curves}
     with drawing():
         figure, panels = new_figure(len(shown), 1, (8.0, 3.1 * len(shown)), sharex=True)
         for axes, (up, curves) in zip(panels, shown.items(), strict=True):
-            for one, label, values in curves:
-                named = one.name if axes is panels[0] else label
-                axes.plot(found.speeds * RPM, values, label=named, clip_on=False, **looks[one.name])
+            for i, values in curves:
+                line = line_of(i, dashed=True)
+                axes.plot(found.speeds * RPM, values, label=of[i].name, clip_on=False, **line)
             axes.set_ylabel(up)
             axes.axvline(found.tuning_speed * RPM, color=GREY, lw=0.9, ls=":")
-            if curves is heights:
+            if up.startswith("height"):
                 axes.set_yscale("log")
                 axes.yaxis.set_major_formatter(lambda value, place: f"{value:g}")
             else:
                 axes.set_ylim(bottom=0.0)
-            if axes is not panels[0] and any(label for _, label, _ in curves):
-                legend_above(axes, 3)
         panels[-1].set_xlabel("crank speed, rpm     (dotted: tuning speed)")
         panels[-1].set_xlim(*(found.speeds[[0, -1]] * RPM))
         _entitle(figure, found, f"what is left, load {found.load:g}")

@@ -18,7 +18,6 @@ from softstart.views.sheet import Sheet, records_file, rows_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.chain.elements import Shaft
     from softstart.chain.model import Chain
     from softstart.chain.two_masses import TwoMassError, Verification
     from softstart.drive import Drive
@@ -28,7 +27,6 @@ MOST_MODES = 12
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
 TALLEST, DISC = 150.0, 16.0  # px, of the discs of the scheme: the tallest, and their thickness
 WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; letters of a mass in it
-LINE: dict[str, Any] = {"color": "black", "lw": 1.2}
 
 
 # sheets ----------------------------------------------------------------------------------------------------
@@ -92,10 +90,11 @@ def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification]
 def enough(found: TwoMassError) -> str:
     """Whether two masses are enough, and for what they are not, in a few sentences."""
     limit, worst, pair = f"(limit {100.0 * found.LIMIT:g} %)", found.worst, reordered(found.verified)
+    torques = f"{found.TORQUES} torques over time"
     if found.enough:
         return (
             f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} and under "
-            f"{found.TORQUES} torques over time is off by {_percent(found.error)} at most {limit}."
+            f"{torques} is off by {_percent(found.error)} at most {limit}."
         )
     said = [f"{name} does not start the chain" for name in found.failed]
     if worst is not None and abs(worst.error) > found.LIMIT:
@@ -103,7 +102,7 @@ def enough(found: TwoMassError) -> str:
             f"{worst.name} has K_dyn {worst.chain_k_dyn:.3g} on the chain and {worst.drive.k_dyn:.3g} on them"
         )
     if found.of_torques > found.LIMIT:
-        said.append(f"of {found.TORQUES} torques over time the worst is {_percent(found.of_torques)} off")
+        said.append(f"of {torques} the worst is {_percent(found.of_torques)} off")
     order = pair and (
         f" On the chain {pair[0].name} is gentler than {pair[1].name} (K_dyn {pair[0].chain_k_dyn:.3g} and "
         f"{pair[1].chain_k_dyn:.3g}), on two masses it is the other way round ({pair[0].drive.k_dyn:.3g} and "
@@ -243,29 +242,33 @@ def _scheme(axes: Axes, chain: Chain) -> list[float]:
     grounded = np.where(np.isinf(arrays.J), arrays.moving_J.max(), arrays.moving_J)
     tall = TALLEST * (grounded / grounded.max()) ** 0.25
     springs = 44.0 + 420.0 / arrays.c / (1.0 / arrays.c).sum()
-    openings = 3.0 + 90.0 * arrays.gap / max(arrays.gap.sum(), 1e-300)
-    middles = [0.0]
+    openings = np.where(arrays.gap > 0.0, 11.0 + 90.0 * arrays.gap / max(arrays.gap.sum(), 1e-300), 0.0)
+    middles: list[float] = np.cumsum([0.0, *(springs + openings + DISC)]).tolist()
     for k, mass in enumerate(chain.masses):
-        x, name = (
-            middles[k],
-            mass.name if len(mass.name) <= LONGEST_NAME else f"{mass.name[:LONGEST_NAME]}...",
-        )
+        x = middles[k]
+        name = mass.name if len(mass.name) <= LONGEST_NAME else f"{mass.name[:LONGEST_NAME]}..."
         axes.bar(x, tall[k], DISC, bottom=-0.5 * tall[k], color="#B9C6D3", edgecolor="black")
         axes.text(x, 0.5 * tall[k] + 6.0, name, rotation=35, rotation_mode="anchor", parse_math=False)
         below = [short_of(arrays.J[k])]
         below += ["motor"] if k == arrays.motor and chain.motor is not None else []
         below += [f"Mc {short_of(arrays.Mc[k])} N m"] if arrays.Mc[k] else []
         axes.text(x, -0.5 * TALLEST - 6.0, "\n".join(below), ha="center", va="top")
-        if k < len(chain.shafts):
-            shaft, gap = chain.shafts[k], bool(arrays.gap[k])
-            says = ["rigid" if arrays.rigid[k] else short_of(arrays.c[k])]
-            says += [f"gap {short_of(arrays.gap[k])}"] if gap else []
-            says += [f"{short_of(shaft.ratio)} : 1"] if shaft.ratio != 1.0 else []
-            says += [f"efficiency {shaft.efficiency:.3g}"] if shaft.efficiency < 1.0 else []
-            start = x + 0.5 * DISC
-            end = _shaft(axes, start, springs[k], openings[k] if gap else 0.0, shaft, bool(arrays.rigid[k]))
-            axes.text(0.5 * (start + end), -18.0, "\n".join(says), ha="center", va="top", fontsize=7.5)
-            middles.append(end + 0.5 * DISC)
+    for k, shaft in enumerate(chain.shafts):
+        says = ["rigid" if arrays.rigid[k] else short_of(arrays.c[k])]
+        says += [f"gap {short_of(arrays.gap[k])}"] if arrays.gap[k] else []
+        says += [f"{short_of(shaft.ratio)} : 1"] if shaft.ratio != 1.0 else []
+        says += [f"efficiency {shaft.efficiency:.3g}"] if shaft.efficiency < 1.0 else []
+        start, end = middles[k] + 0.5 * DISC, middles[k + 1] - 0.5 * DISC
+        axes.text(0.5 * (start + end), -18.0, "\n".join(says), ha="center", va="top", fontsize=7.5)
+        coiled = start + springs[k]
+        at = np.linspace(start + 6.0, coiled - 6.0, 4 * max(3, round(springs[k] / 14.0)) + 1)[1::2]
+        y = 0.0 * at if arrays.rigid[k] else np.resize([7.0, -7.0], at.size)
+        axes.plot([start, start + 6.0, *at, coiled - 6.0, coiled], [0.0, 0.0, *y, 0.0, 0.0], color="black",
+                  lw=4.0 if arrays.rigid[k] else 1.2)  # fmt: skip
+        if arrays.gap[k]:  # a stop behind the spring, another one before the next mass
+            axes.plot([coiled, coiled], [-10.0, 14.0], color=COLOURS[1], lw=3.0)
+            axes.plot([end - 8.0, end - 8.0], [-10.0, 14.0], color=COLOURS[1], lw=3.0)
+            axes.plot([end - 8.0, end], [0.0, 0.0], color="black", lw=1.2)
     axes.set_ylim(-0.5 * TALLEST - 55.0, 0.5 * TALLEST + 75.0)
     axes.set_xlim(-50.0, middles[-1] + 140.0)
     axes.grid(False)
@@ -273,35 +276,6 @@ def _scheme(axes: Axes, chain: Chain) -> list[float]:
     axes.tick_params("x", length=0, labelbottom=False)
     axes.spines[:].set_visible(False)
     return middles
-
-
-def _shaft(axes: Axes, x: float, length: float, opening: float, shaft: Shaft, rigid: bool) -> float:
-    """Draw spring, gap and gear from x on; where they end."""
-
-    def gear(x: float) -> float:
-        if shaft.ratio == 1.0 and shaft.efficiency == 1.0:
-            return x
-        first = 20.0 / (1.0 + min(max(shaft.ratio, 0.25), 4.0))  # wheels in mesh, seen from the side
-        axes.plot([x, x + 27.0], [0.0, 0.0], **LINE)
-        axes.vlines([x + 10.0, x + 17.0], [-first, first - 20.0], [first, 20.0 - first], COLOURS[0], lw=5)
-        return x + 27.0
-
-    x = gear(x) if shaft.side == "after" else x
-    end = x + length
-    coil: Any = [] if rigid else np.linspace(x + 6.0, end - 6.0, 4 * max(3, round(length / 14.0)) + 1)[1::2]
-    teeth = np.resize([7.0, -7.0], len(coil))
-    axes.plot(
-        [x, x + 6.0, *coil, end - 6.0, end],
-        [0.0, 0.0, *teeth, 0.0, 0.0],
-        **LINE | {"lw": 4.0 if rigid else 1.2},
-    )
-    if opening:  # a claw of the shaft behind between two stops of the shaft before
-        right, claw, x = end + opening + 5.0, end + 0.5 * (opening + 5.0), end + opening + 11.0
-        axes.plot([end, end, right, right], [-5.0, 14.0, 14.0, -5.0], color=COLOURS[1], lw=1.5)
-        axes.plot([claw, claw, x, x], [0.0, -12.0, -12.0, 0.0], **LINE)
-        axes.plot([claw, claw], [-5.0, 10.0], **LINE | {"lw": 4.0})
-        end = x
-    return gear(end) if shaft.side == "before" else end
 
 
 def short_of(value: float) -> str:

@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.views.drawing import COLOURS, DASHES, GREY, MARKERS, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, Table, column_of, number, printable, short
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    MARKERS,
+    drawing,
+    entitle,
+    head,
+    line_of,
+    new_figure,
+)
+from softstart.views.numbers import NOTHING, Table, column_of, number, printable, short, with_unit
 from softstart.views.sheet import Sheet, columns_file, records_file, rows_file
 
 if TYPE_CHECKING:
@@ -44,12 +54,8 @@ def _lines(clutch: Clutch) -> list[str]:
 
 def engagement_sheet(run: Engagement) -> Sheet:
     """Figures, traces, phases and events of an engagement."""
-
-    def with_unit(value: float, unit: str) -> str:
-        return NOTHING if math.isnan(value) else f"{short(value)} {unit}"
-
     peak = f"{short(run.peak_torque)} N m at {short(run.peak_time)} s, {short(run.peak_ratio)} times the mean"
-    heat, energy, first = run.lining_heat, run.energy, run.events[:MOST_EVENTS]
+    energy, values = run.energy, run.at(run.t)
     facts = [
         ("peak shaft torque", f"{peak} while the clutch slips"),
         ("peak up to the lock-up", f"{short(run.slip_peak_torque)} N m at {short(run.slip_peak_time)} s"),
@@ -57,32 +63,27 @@ def engagement_sheet(run: Engagement) -> Sheet:
         ("slip time", with_unit(run.slip_time, "s")),
         ("friction work", f"{short(run.friction_work)} J, {short(run.work_while_engaging)} while engaging"),
         ("work up to the lock-up", f"{short(run.slip_work)} J"),
-        *([] if math.isnan(heat) else [("heat of the linings", f"{short(heat)} J/m2")]),
+        ("heat of the linings", with_unit(run.lining_heat, "J/m2")),
         ("work of the drive", f"{short(energy.drive)} J, balance closed to {energy.residual:.0e}"),
     ]
-    again = sum(phase.kind == "slip" for phase in run.phases) - 1
-    work = f"{short(run.friction_work - run.slip_work)} J"
-    times = f"{again} time{'s' * (again > 1)}"
-    slips = (
-        f" It slips again after the lock-up, {times}, with {work}."
-        if again > 0 and not math.isnan(run.slip_time)
-        else ""
-    )
-    more = len(run.events) - len(first)
-    listed = ", ".join(f"{event.name} at {short(event.t)} s" for event in first)
-    values = run.at(run.t)
+    again, slips = sum(phase.kind == "slip" for phase in run.phases) - 1, ""
+    if again > 0 and not math.isnan(run.slip_time):
+        work = f"{short(run.friction_work - run.slip_work)} J"
+        slips = f" It slips again after the lock-up, {again} time{'s' * (again > 1)}, with {work}."
     traces = {f"{name} [{unit}]": values[name].tolist() for name, unit in TRACES.items()}
+    events = [(event.t, event.name) for event in run.events]
+    cells = {"time s": column_of([time for time, _ in events], 6), "event": [name for _, name in events]}
     return Sheet(
         title=f"{run.clutch.name}: {run.law.label}",
         lines=_lines(run.clutch),
-        facts=facts,
+        facts=[(name, text) for name, text in facts if text != NOTHING or name != "heat of the linings"],
+        tables=[Table.of("Events", cells, ("event",), most=MOST_EVENTS)],
         found=[STATUS[run.status] + slips],
-        notes=[f"Events: {listed}{f', and {more} more' if more else ''}."],
         figures={"engagement": run.plot},
         files={
             "clutch.toml": run.clutch.to_toml(),
             "traces.csv": columns_file({"t [s]": run.t.tolist(), **traces}),
-            "events.csv": rows_file(("time [s]", "event"), [(event.t, event.name) for event in run.events]),
+            "events.csv": rows_file(("time [s]", "event"), events),
             "phases.csv": rows_file(PHASES, [list(asdict(phase).values()) for phase in run.phases]),
         },
     )
@@ -93,18 +94,22 @@ def engagement_figure(
 ) -> Any:
     """Friction and shaft torque and speeds of engagements; `unit` is (size in N m, name)."""
     size, name = unit
-    names, clutch = labels or [run.law.label for run in runs], runs[0].clutch
+    clutch = runs[0].clutch
     with drawing():
         figure, (friction, torque, speed) = new_figure(3, 1, (8.5, 8.0), sharex=True)
-        for run, label, colour, dash in zip(runs, names, COLOURS, DASHES, strict=False):
-            style: dict[str, Any] = {"color": colour, "ls": dash}
-            traces = run.at(run.t)
-            friction.plot(*_law_points(run, size), **style, label=label)
-            torque.plot(run.t, traces["T"] / size, **style)
-            torque.plot([run.peak_time], [run.peak_torque / size], "o", ms=4, color=colour)
-            speed.plot(run.t, traces["wM"], **style)
-            speed.plot(run.t, traces["wc"], color=colour, ls=":", lw=1.0)
-            speed.axvline(run.slip_time, color=colour, lw=0.7, ls=":")
+        for index, run in enumerate(runs):
+            line = line_of(index, dashed=True)
+            traces, label = run.at(run.t), labels[index] if labels else run.law.label
+            edges = [*(one for one in run.law.starts if one < run.end_time), run.end_time]
+            spans = [np.linspace(start, end, 41) for start, end in pairwise(edges)]  # a step is upright
+            pieces = zip(run.law.pieces, spans, strict=False)
+            law = [piece.torque(t) / size for piece, span in pieces for t in span]
+            friction.plot(np.concatenate(spans), law, **line, label=label)
+            torque.plot(run.t, traces["T"] / size, **line)
+            torque.plot([run.peak_time], [run.peak_torque / size], "o", ms=4, color=line["color"])
+            speed.plot(run.t, traces["wM"], **line)
+            speed.plot(run.t, traces["wc"], color=line["color"], ls=":", lw=1.0)
+            speed.axvline(run.slip_time, color=line["color"], lw=0.7, ls=":")
         torque.axhline(clutch.mean_torque / size, color=GREY, lw=0.8, ls=":")
         speed.axhline(clutch.drive_speed, color=GREY, lw=0.8, ls=":")
         friction.set_ylabel(f"friction torque, {name}")
@@ -115,14 +120,6 @@ def engagement_figure(
         friction.legend(loc="lower right", handlelength=3.2)
         entitle(figure, title)
     return figure
-
-
-def _law_points(run: Engagement, size: float) -> tuple[Any, Any]:
-    """The law over the run piece by piece, so that a step is upright."""
-    edges = [*(one for one in run.law.starts if one < run.end_time), run.end_time]
-    spans = [np.linspace(start, end, 41) for start, end in pairwise(edges)]
-    values = [[one.torque(t) / size for t in span] for one, span in zip(run.law.pieces, spans, strict=False)]
-    return np.concatenate(spans), np.concatenate(values)
 
 
 # optimal laws ----------------------------------------------------------------------------------------------

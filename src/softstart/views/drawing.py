@@ -6,30 +6,19 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softstart.input.files import write_whole
-from softstart.late import late
 
 if TYPE_CHECKING:
-    import matplotlib as mpl
-    import matplotlib.figure as mpl_figure
-    from matplotlib import colors, patheffects, ticker
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from scipy import ndimage
 
     from softstart.start.run import Run
-else:
-    mpl, mpl_figure = late("matplotlib"), late("matplotlib.figure")
-    colors, ticker = late("matplotlib.colors"), late("matplotlib.ticker")
-    patheffects, ndimage = late("matplotlib.patheffects"), late("scipy.ndimage")
 
 # Okabe-Ito: told apart by colour-blind readers and in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
@@ -44,14 +33,7 @@ FINEST_CONTOUR = 50  # points along each side
 
 PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
-Box = tuple[float, float, float, float]  # left, bottom, right, top in pixels
-Pixels = NDArray[np.float64]  # x, y
-Named = tuple[str, float, float, Pixels]
-
 LETTERS = 11.0  # of a title, in an inch
-LABEL_SIZE = 8.0  # of the letters, points
-FAR = 14.0  # points between a label and its point from which on a thin line joins them
-SAME = 4.0  # pixels between points that are one to the eye
 
 STYLE: dict[str, Any] = {
     "figure.figsize": (8.0, 5.0),
@@ -73,6 +55,8 @@ STYLE: dict[str, Any] = {
 @contextmanager
 def drawing() -> Iterator[None]:
     """Softstart's look, without touching the caller's settings or needing a screen."""
+    import matplotlib as mpl
+
     settings: Any = STYLE
     with mpl.rc_context(settings), warnings.catch_warnings():
         # a drive may be named in any script: what the font lacks is drawn as a box
@@ -84,11 +68,13 @@ def new_figure(
     rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None, **options: Any
 ) -> Any:
     """A Figure outside pyplot (nothing to close, no window) and its axes."""
-    figure = mpl_figure.Figure(figsize=size)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size)
     return figure, figure.subplots(rows, columns, **options)
 
 
-def save_figure(figure: mpl_figure.Figure, folder: Path, stem: str) -> list[Path]:
+def save_figure(figure: Figure, folder: Path, stem: str) -> list[Path]:
     """Write stem.svg and stem.png into the folder, each whole or not at all."""
     written = []
     for ending, options in zip(PICTURE_ENDINGS, ({"metadata": {"Date": None}}, {"dpi": 160}), strict=True):
@@ -119,8 +105,30 @@ def legend_above(axes: Axes, columns: int, **options: Any) -> None:
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, **options)
 
 
+def legend_beside(axes: Axes, columns: int = 1, **options: Any) -> None:
+    """A legend at the right of a panel, for names that have no room elsewhere."""
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, **options)
+
+
+def mark_points(axes: Axes, points: Sequence[tuple[str, float, float]], filled: Sequence[int] = ()) -> None:
+    """A mark for each point (name, x, y), named in the legend beside the panel; some are filled."""
+    for index, (name, x, y) in enumerate(points):
+        colour = COLOURS[(index + 1) % len(COLOURS)]
+        axes.plot([x], [y], MARKERS[index % len(MARKERS)], ms=8, mfc=colour if index in filled else "none",
+                  mew=1.8, color=colour, label=name, clip_on=False, ls="none", zorder=4)  # fmt: skip
+    legend_beside(axes, fontsize=8.5)
+
+
+def line_of(index: int, dashed: bool = False) -> dict[str, Any]:
+    """Colour and dashes of one of many lines: dashes from the ninth line on, or of each line other ones."""
+    rounds = index // len(COLOURS) + (index if dashed else 0)
+    return {"color": COLOURS[index % len(COLOURS)], "ls": DASHES[rounds % len(DASHES)]}
+
+
 def plain_ticks(axis: Any, locator: Any) -> None:
     """Numbers as they are, not as powers, on a logarithmic axis."""
+    from matplotlib import ticker
+
     axis.set_major_locator(locator)
     axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_locator(ticker.NullLocator())
@@ -158,6 +166,8 @@ def panels(
 
 def colour_scale(*values: Any) -> Any:
     """Colours from the least to the largest of all finite values, logarithmic beyond a factor of 10."""
+    from matplotlib import colors
+
     finite = np.concatenate([one[np.isfinite(one)] for one in values])
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     if high - low <= 1e-9 * abs(low):
@@ -200,25 +210,22 @@ def heat_map(
 
 
 def _contours(axes: Axes, x: Any, y: Any, values: Any, margins: bool) -> None:
-    """Contour lines, smooth where a fine grid ripples, and a mark at the worst value with its number."""
+    """Contour lines, and a mark at the worst value with its number."""
     finite = np.isfinite(values)
     if min(values.shape) > 2 and finite.all() and float(np.ptp(values)) > 0.0:
-        i, j = (-(-size // FINEST_CONTOUR) for size in values.shape)
-        smooth = ndimage.uniform_filter(values, (i, j))[::i, ::j]
-        levels: Any = [0.0] if margins else 6
-        lines = axes.contour(x[::j], y[::i], smooth, levels=levels, colors="white", linewidths=0.9)
-        around: list[Any] = [patheffects.withStroke(linewidth=2.0, foreground="#333333")]
-        for artist in (lines, *axes.clabel(lines, fontsize=8, fmt="%.3g")):
-            artist.set_path_effects(around)
+        i, j = (-(-size // FINEST_CONTOUR) for size in values.shape)  # a fine grid ripples
+        lines = axes.contour(
+            x[::j], y[::i], values[::i, ::j], [0.0] if margins else 6, colors="white", linewidths=0.9
+        )
+        axes.clabel(lines, fontsize=8, fmt="%.3g")
     if finite.any():
         worst = int(np.nanargmin(values) if margins else np.nanargmax(values))
         i, j = np.unravel_index(worst, values.shape)
-        right, high = j > len(x) / 2, i > len(y) / 2
         axes.plot([x[j]], [y[i]], "X", ms=8, color=COLOURS[1], mec="white", clip_on=False)
-        axes.annotate(
-            f"{values[i, j]:.3g}", (x[j], y[i]), xytext=(-7 if right else 7, -4), color="white", fontsize=8.5,
-            textcoords="offset points", ha="right" if right else "left", va="top" if high else "bottom",
-            bbox={"fc": "#333333", "ec": "none", "pad": 1.5}, zorder=6,
+        axes.text(
+            x[j], y[i], f" {values[i, j]:.3g} ", color="white", fontsize=8.5, zorder=6,
+            ha="right" if j > len(x) / 2 else "left", va="top" if i > len(y) / 2 else "bottom",
+            bbox={"fc": "#333333", "ec": "none", "pad": 1.5},
         )  # fmt: skip
 
 
@@ -233,135 +240,6 @@ def fit_axis(axes: Axes, name: str, values: Any) -> None:
 
 def decade_ticks(axis: Any) -> None:
     """Numbers as they are, at 1, 2 and 5 of each decade."""
+    from matplotlib import ticker
+
     plain_ticks(axis, ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-
-
-# names beside the points of a figure, placed so that they cover nothing ------------------------------------
-
-
-def name_points(figure: Figure, axes: Axes, named: Sequence[tuple[str, float, float]]) -> None:
-    """A label beside each point (text, x, y), clear of all points, lines of the axes, legend and labels.
-
-    Points in one place share a label, of one line each. The layout of the figure is settled and fixed by
-    this: call it last.
-    """
-    with drawing():
-        figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    points = _together([(text, x, y, axes.transData.transform((x, y))) for text, x, y in named])
-    spots = [spot for *_, spot in points]
-    taken = [_around(spot[0], spot[1], 6.0 * _scale(axes)) for spot in spots]
-    for line in axes.get_lines():
-        if line.get_transform() == axes.transData:
-            taken += [_around(x, y, 2.0) for x, y in _along(axes.transData.transform(line.get_xydata()))]
-    legend = axes.get_legend()
-    if legend is not None:
-        taken.append(_box(legend))
-    frame, scale = _box(axes), _scale(axes)
-    for text, x, y, spot in sorted(points, key=lambda one: -one[3][1]):
-        label = axes.annotate(text, (x, y), (0, 0), textcoords="offset points", fontsize=LABEL_SIZE)
-        width, height = _size(label)
-        label.remove()
-        others = [other for other in spots if other is not spot]
-        dx, dy = _free_corner(spot, width, height, taken, others, frame, scale)
-        taken.append((spot[0] + dx, spot[1] + dy, spot[0] + dx + width, spot[1] + dy + height))
-        axes.annotate(
-            text, (x, y), (dx / scale, dy / scale), textcoords="offset points", fontsize=LABEL_SIZE,
-            arrowprops=_leader(dx, dy, width, height, scale), zorder=5,
-            bbox={"facecolor": "white", "alpha": 0.75, "lw": 0, "pad": 0.5},
-        )  # fmt: skip
-
-
-def _together(points: Sequence[Named]) -> list[Named]:
-    """Points that cover each other made one, their texts below each other."""
-    made: list[Named] = []
-    for text, x, y, spot in points:
-        for index, (before, x0, y0, other) in enumerate(made):
-            if float(np.hypot(*(spot - other))) < SAME:
-                made[index] = (f"{before}\n{text}", x0, y0, other)
-                break
-        else:
-            made.append((text, x, y, spot))
-    return made
-
-
-def _leader(dx: float, dy: float, width: float, height: float, scale: float) -> dict[str, Any] | None:
-    """A thin line from the label to its point, if the two are far apart."""
-    across = max(dx, -dx - width, 0.0)
-    upward = max(dy, -dy - height, 0.0)
-    if math.hypot(across, upward) < FAR * scale:
-        return None
-    return {"arrowstyle": "-", "lw": 0.5, "color": "#999999", "shrinkA": 1.0, "shrinkB": 4.0}
-
-
-def _free_corner(
-    spot: Pixels,
-    width: float,
-    height: float,
-    taken: Sequence[Box],
-    others: Sequence[Pixels],
-    frame: Box,
-    scale: float,
-) -> tuple[float, float]:
-    """The nearest lower left corner, relative to the point, at which the label covers least."""
-    best, least = (0.0, 0.0), math.inf
-    for points in (9.0, 14.0, 20.0, 28.0, 38.0, 50.0, 66.0, 84.0, 110.0):
-        away = points * scale
-        for turn in np.arange(0.0, 360.0, 22.5):
-            # the middle of the label on an ellipse around the point that keeps its edge `away`
-            c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-            dx = c * (away + 0.5 * width) - 0.5 * width
-            dy = s * (away + 0.5 * height) - 0.5 * height
-            box = (spot[0] + dx, spot[1] + dy, spot[0] + dx + width, spot[1] + dy + height)
-            covered = 5.0 * sum(shared(box, other) for other in taken) + 10.0 * (
-                width * height - shared(box, frame)
-            )
-            if any(_distance(box, other) < 1.5 * _distance(box, spot) for other in others):
-                covered += 0.3 * width * height  # it would seem to belong to that one
-            if covered < least - 1e-6:
-                best, least = (dx, dy), covered
-        if least < 1e-6:
-            break
-    return best
-
-
-def shared(a: Box, b: Box) -> float:
-    """Area that two rectangles share.
-
-    >>> shared((0, 0, 2, 2), (1, 1, 3, 3)), shared((0, 0, 1, 1), (2, 0, 3, 1))
-    (1, 0.0)
-    """
-    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-    return wide * high if wide > 0.0 and high > 0.0 else 0.0
-
-
-def _distance(box: Box, spot: Pixels) -> float:
-    """From a rectangle to a point outside it, 0 inside."""
-    across = max(box[0] - spot[0], spot[0] - box[2], 0.0)
-    upward = max(box[1] - spot[1], spot[1] - box[3], 0.0)
-    return math.hypot(across, upward)
-
-
-def _scale(axes: Axes) -> float:
-    """Pixels in a point."""
-    return float(axes.get_figure(root=True).dpi) / 72.0  # type: ignore[union-attr]
-
-
-def _box(artist: Any) -> Box:
-    left, bottom, right, top = artist.get_window_extent().extents
-    return float(left), float(bottom), float(right), float(top)
-
-
-def _size(label: Any) -> tuple[float, float]:
-    left, bottom, right, top = _box(label)
-    return right - left, top - bottom
-
-
-def _around(x: float, y: float, half: float) -> Box:
-    return x - half, y - half, x + half, y + half
-
-
-def _along(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points along a line in pixels, a few pixels apart."""
-    parts = [np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / 4.0)) for a, b in pairwise(corners)]
-    return np.concatenate(parts) if parts else corners

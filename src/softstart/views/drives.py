@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from softstart.drive import INFORMATIVE_TABLES
-from softstart.views.numbers import printable, short
+from softstart.views.numbers import RPM, printable, short
 
+MOST = 6  # differences that are told
 POSITIONS = {
     "driving-flank": "on the driving flank",
     "mid-gap": "in the middle of the gap",
@@ -16,6 +17,12 @@ POSITIONS = {
     "hanging": "with the load hanging in the wound-up shaft",
     "unknown": "at an unknown position in the gap: the worst of both flanks and the middle counts",
 }
+LIMITS_OF_MOTOR = (
+    ("torque lag", "torque_lag", "s"),
+    ("torque rate", "torque_rate", "N m/s"),
+    ("computing delay", "computing_delay", "s"),
+    ("noise of the measured torque", "torque_noise", "N m"),
+)
 
 
 def drive_lines(machine: Any) -> list[str]:
@@ -44,19 +51,21 @@ def drive_lines(machine: Any) -> list[str]:
     return [
         printable(machine.name),
         *parts,
-        *([] if math.isnan(two.speed) else [f"  start  to {short(two.speed)} rad/s ({_rpm(two.speed)} rpm)"]),
+        *(
+            []
+            if math.isnan(two.speed)
+            else [f"  start  to {short(two.speed)} rad/s ({two.speed * RPM:.4g} rpm)"]
+        ),
         *(["  also   " + ", ".join(also)] if also else []),
         *([f"  assumed: {printable(machine.assumed)}"] if machine.assumed else []),
     ]
 
 
-def _rpm(speed: float) -> str:
-    return f"{speed * 30.0 / math.pi:.4g}"
-
-
 def _also(machine: Any) -> Iterator[str]:
     """What else decides the start, where it is not as by default."""
     motor, where = machine.motor, next(iter(machine.positions)) if len(machine.positions) == 1 else "unknown"
+    friction, b1, b2 = map(float, machine.frictions)
+    w1, w2 = float(machine.initial_motor_speed), float(machine.initial_load_speed)
     if where not in ("mid-gap", ""):
         yield f"starts {POSITIONS[where]}{', of all gaps alike' if len(machine.gaps) > 1 else ''}"
     elif where == "" and machine.theta0:
@@ -65,23 +74,16 @@ def _also(machine: Any) -> Iterator[str]:
         proving = math.isinf(machine.release_time)
         until = "its torque has reached the shaft torque" if proving else f"{short(machine.release_time)} s"
         yield f"the brake holds the motor until {until}"
-    friction, b1, b2 = map(float, machine.frictions)
     if friction:
         yield f"friction of the motor {short(friction)} N m"
     if b1 or b2:
         yield f"viscous friction b1 = {short(b1)}, b2 = {short(b2)} N m s/rad"
-    if motor is not None:
-        if motor.torque_lag:
-            yield f"torque lag {short(float(motor.torque_lag))} s"
-        if math.isfinite(float(motor.torque_rate)):
-            yield f"torque rate {short(float(motor.torque_rate))} N m/s"
-        if motor.computing_delay:
-            yield f"computing delay {short(float(motor.computing_delay))} s"
-        if motor.torque_noise:
-            yield f"noise of the measured torque {short(float(motor.torque_noise))} N m"
-    w1, w2 = machine.initial_motor_speed, machine.initial_load_speed
+    for words, name, unit in LIMITS_OF_MOTOR if motor is not None else ():
+        value = float(getattr(motor, name))
+        if value and math.isfinite(value):
+            yield f"{words} {short(value)} {unit}"
     if w1 or w2:
-        yield f"initial speeds w1 = {short(float(w1))}, w2 = {short(float(w2))} rad/s"
+        yield f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s"
 
 
 def controllers_set_up(machine: Any, fitted_to: Any) -> str:
@@ -92,16 +94,17 @@ def controllers_set_up(machine: Any, fitted_to: Any) -> str:
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
     'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
-    found = []
-    here = {} if machine is None else machine.by_path()
-    there = fitted_to.by_path()
-    for path, (parameter, value) in here.items() if here.keys() == there.keys() else ():
-        informative = parameter.name in ("name", "source", "assumed", "units")
-        if not informative and parameter.table not in INFORMATIVE_TABLES and there[path][1] != value:
-            found.append(f"{path} {_set(there[path][1])} there, {_set(value)} here")
-    most = 6
-    more = f", and {len(found) - most} more" if len(found) > most else ""
-    differs = ": " + "; ".join(found[:most]) + more if found else ""
+    here, there = {} if machine is None else machine.by_path(), fitted_to.by_path()
+    found = [
+        f"{path} {_set(there[path][1])} there, {_set(value)} here"
+        for path, (parameter, value) in here.items()
+        if here.keys() == there.keys()
+        and there[path][1] != value
+        and parameter.name not in ("name", "source", "assumed", "units")
+        and parameter.table not in INFORMATIVE_TABLES
+    ]
+    more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
+    differs = ": " + "; ".join(found[:MOST]) + more if found else ""
     return f'strategies are set up for "{printable(fitted_to.name)}"{differs}'
 
 

@@ -10,16 +10,7 @@ import numpy as np
 
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
-from softstart.views.drawing import (
-    COLOURS,
-    DASHES,
-    GREY,
-    MARKERS,
-    drawing,
-    entitle,
-    head,
-    new_figure,
-)  # fmt: skip
+from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
 from softstart.views.markdown import file_stem
 from softstart.views.numbers import Table, column_of, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
@@ -49,58 +40,50 @@ def counted(value: float) -> str:
     return f"{value:.3g}" if 1e6 <= value < math.inf else factor(value)
 
 
-def fatigue_table(found: Fatigue, rows: Sequence[Life], title: str = "") -> Table:
-    """The strategies and what they do to one shaft."""
+def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> list[Table]:
+    """The strategies with all figures of a single shaft, or with a table a figure of several shafts."""
+    shafts, worn, limits = found.drive.shaft_names, not math.isnan(found.worn_gap), found.drive.limits
+    starts, years = bool(found.curve.points), limits.starts_per_hour is not None
+    worn_years = any(not math.isnan(row.worn_hours) for row in rows)
+    estimated = bool(found.estimate)
+    limited, several = any(not math.isnan(row.utilisation) for row in rows), len(shafts) > 1
+    figures: list[tuple[bool, str, str, Callable[[Life], str]]] = [
+        (True, "life over\ndirect", "Life over that under direct", lambda row: factor(row.relative)),
+        (estimated, "half\ndamping", "Life with half the damping",
+         lambda row: factor(row.relative_range[0])),
+        (estimated, "twice\ndamping", "Life with twice the damping",
+         lambda row: factor(row.relative_range[1])),
+        (starts and not several, "starts to\nfailure", "", lambda row: counted(row.starts)),
+        (starts and years and not several, "years", "", lambda row: counted(row.years)),
+        (worn, "life over\ndirect, worn", "Life over that under direct, worn",
+         lambda row: factor(row.worn_relative)),
+        (worn and worn_years and not several, "years,\nworn", "", lambda row: counted(row.worn_years)),
+        (limited and several, "", "Largest torque, % of the permissible one",
+         lambda row: number(100.0 * row.utilisation, 1)),
+    ]  # fmt: skip
+    figures = [one for one in figures if one[0]]
+    if several:
+        torque = "Damage-equivalent torque at the motor shaft, N m"
+        figures.insert(1, (True, "", torque, lambda row: number(row.equivalent_torque, 1)))
+        names = {"strategy": [row.run.controller_name for row in rows[:: len(shafts)]]}
+        return [
+            Table.of(
+                heading,
+                names | {name: list(map(cell, rows[k :: len(shafts)])) for k, name in enumerate(shafts)},
+                ("strategy",),
+            )
+            for _, _, heading, cell in figures
+        ]
     cells = {
         "strategy": [row.run.controller_name for row in rows],
         "K_dyn": [number(row.run.k_dyn, 3) for row in rows],
         "start\ntime s": column_of([row.run.start_time for row in rows]),
         "equivalent\ntorque N m": column_of([row.equivalent_torque for row in rows]),
-        "life over\ndirect": [factor(row.relative) for row in rows],
+        **{heading: list(map(cell, rows)) for _, heading, _, cell in figures},
+        "impacts": [str(row.impacts) for row in rows],
+        "their\nenergy J": column_of([row.impact_energy for row in rows], 3),
     }
-    if found.estimate:
-        cells["half\ndamping"] = [factor(row.relative_range[0]) for row in rows]
-        cells["twice\ndamping"] = [factor(row.relative_range[1]) for row in rows]
-    if found.curve.points:
-        cells["starts to\nfailure"] = [counted(row.starts) for row in rows]
-        if found.drive.limits.starts_per_hour is not None:
-            cells["years"] = [counted(row.years) for row in rows]
-    if not math.isnan(found.worn_gap):
-        cells["life over\ndirect, worn"] = [factor(row.worn_relative) for row in rows]
-        if any(not math.isnan(row.worn_hours) for row in rows):
-            cells["years,\nworn"] = [counted(row.worn_years) for row in rows]
-    cells["impacts"] = [str(row.impacts) for row in rows]
-    cells["their\nenergy J"] = column_of([row.impact_energy for row in rows], 3)
-    return Table.of(title, cells, ("strategy",))
-
-
-def fatigue_tables(found: Fatigue, rows: Sequence[Life]) -> list[Table]:
-    """The strategies, with all figures of a single shaft, or with a table a figure of several."""
-    shafts = found.drive.shaft_names
-    if len(shafts) == 1:
-        return [fatigue_table(found, rows)]
-    names = [row.run.controller_name for row in rows[:: len(shafts)]]
-
-    def table(title: str, cell: Callable[[Life], str]) -> Table:
-        columns = {name: [cell(row) for row in rows[k :: len(shafts)]] for k, name in enumerate(shafts)}
-        return Table.of(title, {"strategy": names, **columns}, ("strategy",))
-
-    tables = [
-        table("Life over that under direct", lambda one: factor(one.relative)),
-        table(
-            "Damage-equivalent torque at the motor shaft, N m", lambda one: number(one.equivalent_torque, 1)
-        ),
-    ]
-    if found.estimate:
-        tables.append(table("Life with half the damping", lambda one: factor(one.relative_range[0])))
-        tables.append(table("Life with twice the damping", lambda one: factor(one.relative_range[1])))
-    if not math.isnan(found.worn_gap):
-        tables.append(table("Life over that under direct, worn", lambda one: factor(one.worn_relative)))
-    if any(not math.isnan(life.utilisation) for life in rows):
-        tables.append(
-            table("Largest torque, % of the permissible one", lambda one: number(100.0 * one.utilisation, 1))
-        )
-    return tables
+    return [Table.of(title, cells, ("strategy",))]
 
 
 def conclusion(found: Fatigue) -> str:
@@ -124,64 +107,49 @@ def conclusion(found: Fatigue) -> str:
 
 def notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
-    drive, limits = found.drive, found.drive.limits
-    if found.curve.slope is None:
-        curve = f"The S-N curve has the {len(found.curve.points)} points of limits.fatigue."
-    elif found.slope_given:
-        curve = f"Slope of the S-N curve: m = {short(found.curve.slope)}."
-    else:
-        curve = (
-            f"Slope of the S-N curve: m = {short(found.curve.slope)}, that of pitting of "
-            "case-hardened gears (ISO 6336-2), as neither --slope nor limits.fatigue is given."
+    drive, limits, curve = found.drive, found.drive.limits, found.curve
+    worn, several = not math.isnan(found.worn_gap), len(drive.shaft_names) > 1
+    slope = "" if curve.slope is None else f"Slope of the S-N curve: m = {short(curve.slope)}"
+    if not slope:
+        slope = f"The S-N curve has the {len(curve.points)} points of limits.fatigue"
+    elif not found.slope_given:
+        slope += (
+            ", that of pitting of case-hardened gears (ISO 6336-2), as neither --slope nor limits.fatigue is "
+            "given"
         )
-    text = [f"{EQUIVALENT} {curve}"]
     ratio = f"{100.0 * drive.damping_ratio:.2g} %"
+    damping = f"Damping ratio of the {'first natural vibration' if several else 'shaft'}: {ratio}."
     if found.estimate:
         parts = " and ".join(f"{count} {name}" for name, count in found.estimate.items())
-        text.append(
+        damping = (
             f"The damping is ESTIMATED: a ratio of {ratio} from {parts} (1 % a pair of gears, 0.5 % a "
             "coupling, at most 6 %). Shown beside: the life with half and with twice of it."
         )
-    else:
-        of = "shaft" if len(drive.shaft_names) == 1 else "first natural vibration"
-        text.append(f"Damping ratio of the {of}: {ratio}.")
-    if not math.isnan(found.worn_gap):
-        error = max(row.wear_error for row in found.rows)
-        values = {
-            "new": short(float(drive.gaps.sum())),
-            "worn": short(found.worn_gap),
-            "error": f"{float(f'{100.0 * error:.1g}'):g}",
-        }
+    text = [f"{EQUIVALENT} {slope}.", damping]
+    if worn:
+        over = f"{limits.life / 3600.0 / HOURS_PER_YEAR:.3g} years" if limits.life else "the life"
+        error = float(f"{100.0 * max(row.wear_error for row in found.rows):.1g}")
         text.append(
-            (
-                "Worn: the gap grows in proportion to time from {new} to {worn} rad over the life, and "
-                "Miner's rule adds the damage; error of the sum at most {error} %."
-            ).format(**values)
-            if limits.life is None
-            else (
-                "Worn: the gap grows in proportion to time from {new} to {worn} rad over {years:.3g} "
-                "years, and Miner's rule adds the damage; error of the sum at most {error} %."
-            ).format(years=limits.life / 3600.0 / HOURS_PER_YEAR, **values)
+            f"Worn: the gap grows in proportion to time from {short(float(drive.gaps.sum()))} to "
+            f"{short(found.worn_gap)} rad over {over}, and Miner's rule adds the damage; error of the sum at "
+            f"most {error:g} %."
         )
-    if limits.starts_per_hour is not None and found.curve.points:
+    if limits.starts_per_hour is not None and curve.points:
         text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
-    if limits.starts is not None and limits.starts_per_hour is not None and found.curve.points:
-        asked, worn = limits.starts / limits.starts_per_hour, not math.isnan(found.worn_gap)
-        names: dict[bool, list[str]] = {True: [], False: []}
-        for rows in found.by_run:
-            hours = min(row.worn_hours if worn else row.hours for row in rows)
-            names[hours >= asked].append(rows[0].run.controller_name)
-        kept = (
-            f"The life asked for, {limits.starts:.3g} starts, is reached by: "
-            f"{', '.join(names[True]) or 'none'}"
+        if limits.starts is not None:
+            asked = limits.starts / limits.starts_per_hour
+            names: dict[bool, list[str]] = {True: [], False: []}
+            for rows in found.by_run:
+                hours = min(row.worn_hours if worn else row.hours for row in rows)
+                names[hours >= asked].append(rows[0].run.controller_name)
+            kept = f"{limits.starts:.3g} starts, is reached by: {', '.join(names[True]) or 'none'}"
+            missed = f"; not by: {', '.join(names[False])}" if names[False] else ""
+            text.append(f"The life asked for, {kept}{missed}.")
+    if len(drive.positions) > 1:
+        worst = (
+            f"{rows[0].run.controller_name} {'/'.join(sorted({row.run.position for row in rows}))}"
+            for rows in found.by_run
         )
-        text.append(f"{kept}; not by: {', '.join(names[False])}." if names[False] else f"{kept}.")
-    worst = [
-        f"{rows[0].run.controller_name} {'/'.join(sorted({row.run.position for row in rows}))}"
-        for rows in found.by_run
-        if len(drive.positions) > 1
-    ]
-    if worst:
         text.append(f"The start position is unknown: most damage is done from {', '.join(worst)}.")
     return text
 
@@ -192,31 +160,19 @@ def fatigue_figure(found: Fatigue) -> Any:
     names = [rows[0].run.controller_name for rows in runs]
     with drawing():
         figure, (left, right) = new_figure(1, 2, (9.0, 1.9 + 0.28 * max(6, len(runs))))
-        for index, rows in enumerate(runs):
+        for index, (rows, name) in enumerate(zip(runs, names, strict=True)):
+            line = line_of(index, dashed=True)
             spectrum = max(rows, key=lambda row: row.equivalent_torque).spectrum
             counts = np.concatenate([[0.5], np.cumsum(spectrum[:, 2])])
             ranges = np.concatenate([spectrum[:1, 0], spectrum[:, 0]])
-            left.step(
-                counts,
-                ranges,
-                where="pre",
-                color=COLOURS[index % 8],
-                ls=DASHES[index % 8],
-                label=names[index],
-            )
+            left.step(counts, ranges, where="pre", label=name, **line)
             lives = [row.relative for row in rows if math.isfinite(row.relative)]
-            right.plot(
-                lives, [index] * len(lives), MARKERS[index % len(MARKERS)], color=COLOURS[index % 8], ms=8
-            )
+            marker = MARKERS[index % len(MARKERS)]
+            right.plot(lives, [index] * len(lives), marker, color=line["color"], ms=8)
         left.set_xscale("log")
         left.set_ylim(bottom=0.0)
         left.legend(fontsize=8)
-        head(
-            left,
-            "cycles of one start",
-            "range of the shaft torque, N m",
-            "cycles of at least this range",
-        )
+        head(left, "cycles of one start", "range of the shaft torque, N m", "cycles of at least this range")
         right.axvline(1.0, color=GREY, lw=0.8, ls=":")
         right.set_xscale("log")
         right.set_yticks(range(len(runs)), names)

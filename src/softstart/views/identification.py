@@ -14,19 +14,15 @@ from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
-from softstart.late import late
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Column, Table, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
-    from softstart.identification import planning
     from softstart.identification.planning import Experiment, Plan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
     from softstart.start.recommendation import Row
-else:
-    planning = late("softstart.identification.planning")
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
 FIGURES = {"peak shaft torque, N m": "peak", "load moves, rad": "travel", "lasts, s": "end"}
@@ -102,10 +98,7 @@ def identification_sheet(
     return Sheet(
         f"{found.drive.name}: identified from its logs",
         _lines(found),
-        tables=[
-            estimates_table(found),
-            Table.of_rows(title, ("strategy",), ("K_dyn", "from", "to"), rows),
-        ],
+        tables=[estimates_table(found), Table.of_rows(title, ("strategy",), ("K_dyn", "from", "to"), rows)],
         notes=found.notes,
         figures={"logs": found.plot} if found.logs else {},
         files=files,
@@ -183,7 +176,9 @@ def plan_sheet(plan: Plan) -> Sheet:
 
 def _write_log(plan: Plan, one: Experiment, path: Path) -> None:
     """A simulated log of an experiment."""
-    log = planning.made_up_log(plan.drive, one, log_period=plan.log_period, ripple=plan.ripple)
+    from softstart.identification.planning import made_up_log
+
+    log = made_up_log(plan.drive, one, log_period=plan.log_period, ripple=plan.ripple)
     log.to_csv(path, SIMULATED)
 
 

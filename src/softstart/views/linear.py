@@ -11,7 +11,7 @@ import numpy as np
 from softstart.linear.limit_cycles import Outside, frequency_grid
 from softstart.linear.sampled_plant import sizes_of
 from softstart.linear.systems import at_points, frequencies, poles
-from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, entitle, head, new_figure
+from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, column_of, number
 from softstart.views.sheet import Sheet, rows_file
 from softstart.views.starts import machine_lines
@@ -75,35 +75,37 @@ def margin_rows(view: LinearView, m: Margins) -> list[tuple[str, str]]:
 def tables(view: LinearView) -> list[Table]:
     """Modes of the closed loop, where a pair counts once, other drives, and limit cycles."""
     modes = [mode for mode in view.modes if mode.value.imag >= 0.0][:SHOWN_MODES]
+    found, others = [one.cycle for one in view.cycles], view.variations
 
     def each(read: str, scale: float, decimals: int) -> list[str]:
-        values = [getattr(one.margins, read) for one in view.variations]
+        values = (getattr(one.margins, read) for one in others)
         return ["any" if math.isinf(value) else number(scale * value, decimals) for value in values]
 
-    found = [one.cycle for one in view.cycles]
-    beyond = {True: " (the demand is beyond the motor's limits)", False: ""}
-    pairs = [f" +- {mode.value.imag:.5f}j" if mode.value.imag > 0.0 else "" for mode in modes]
+    def pole(z: complex) -> str:
+        return f"{z.real:.5f}" + (f" +- {z.imag:.5f}j" if z.imag > 0.0 else "")
+
     of_modes = {
         "rad/s": column_of([mode.frequency for mode in modes]),
         "damping\nratio": [number(mode.damping_ratio, 4) for mode in modes],
-        "pole z": [f"{mode.value.real:.5f}{pair}" for mode, pair in zip(modes, pairs, strict=True)],
+        "pole z": [pole(mode.value) for mode in modes],
     }
     of_drives = {
-        "drive": [one.name for one in view.variations],
-        "stable": ["yes" if one.stable else "no" for one in view.variations],
+        "drive": [one.name for one in others],
+        "stable": ["yes" if one.stable else "no" for one in others],
         "gain\nmargin": each("gain_margin", 1.0, 2),
         "phase\nmargin deg": each("phase_margin", 180.0 / math.pi, 1),
         "delay\nmargin ms": each("delay_margin", 1e3, 2),
         "modulus\nmargin": each("modulus_margin", 1.0, 3),
-        "least\ndamping": [number(one.least_damping, 3) for one in view.variations],
+        "least\ndamping": [number(one.least_damping, 3) for one in others],
     }
+    beyond = " (the demand is beyond the motor's limits)"
     of_cycles = {
         "rad/s": column_of([one.frequency for one in found]),
         "amplitude\nrad": [number(one.amplitude, 4) for one in found],
         "bias\nrad": [number(one.bias, 4) for one in found],
         "demand\n+- N m": [number(one.demand_amplitude, 1) for one in found],
         "predicted": ["stable" if one.stable else "unstable" for one in found],
-        "on the exact plant": [one.verdict.sentence + beyond[one.beyond_limits] for one in view.cycles],
+        "on the exact plant": [one.verdict.sentence + beyond * one.beyond_limits for one in view.cycles],
     }
     cycles = "Limit cycles predicted by the describing function of the gap"
     return [
@@ -115,15 +117,16 @@ def tables(view: LinearView) -> list[Table]:
 
 def notes(view: LinearView) -> list[str]:
     """The mean torque of the limit cycles, then the notes of the view."""
-    sentence = (
-        "The loop is that of the whole chain with all gaps closed; limit cycles through several gaps are not "
-        "predicted: simulate shows them."
-        if view.outside is None
-        else f"The mean shaft torque of the limit cycles is {view.cycles[0].cycle.mean_torque:.4g} N m."
-        if view.cycles
-        else "No limit cycle through the gap is predicted by the describing function."
-    )
-    return [sentence, *view.notes]
+    found = "No limit cycle through the gap is predicted by the describing function."
+    if view.outside is None:
+        found = (
+            "The loop is that of the whole chain with all gaps closed; limit cycles through several gaps are "
+            "not predicted: simulate shows them."
+        )
+    elif view.cycles:
+        mean = view.cycles[0].cycle.mean_torque
+        found = f"The mean shaft torque of the limit cycles is {mean:.4g} N m."
+    return [found, *view.notes]
 
 
 def linear_sheet(view: LinearView) -> Sheet:
@@ -168,17 +171,16 @@ def response(view: LinearView, m: Margins) -> tuple[tuple[str, ...], list[list[f
 def linear_figure(view: LinearView) -> Any:
     """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
     assert view.margins is not None
-    Omega = sizes_of(view.drive).Omega
-    w = _frequencies_of(view)
+    Omega, w = sizes_of(view.drive).Omega, _frequencies_of(view)
     w = w[w >= Omega * 10.0**-DECADES]
     L = _loop(view, w)
     with drawing():
-        figure, panels = new_figure(2, 2, (10.5, 7.4))
-        (size, plane), (phase, gap) = panels
+        figure, ((size, plane), (phase, gap)) = new_figure(2, 2, (10.5, 7.4))
         _magnitude(size, w, L, view.margins)
         _phase(phase, w, L, view.margins)
         for axes in (size, phase):
             axes.axvline(Omega, color=GREY, lw=0.9, ls=":", label="elastic frequency")
+            axes.set(xlim=(w[0], w[-1]), xlabel="frequency, rad/s")
         size.legend(loc="upper left")
         _nyquist(plane, L, view.margins)
         if view.outside is not None:
@@ -190,40 +192,39 @@ def linear_figure(view: LinearView) -> Any:
 
 
 def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+    """|L|, its distance from 1 where the phase is -180 degrees."""
     axes.loglog(w, np.abs(L), color=COLOURS[0])
     axes.axhline(1.0, color=GREY, lw=0.8)
-    for index, one in enumerate(one for one in m.phase_crossovers if one.margin < MARKED):
-        axes.plot([one.frequency] * 2, [1.0 / one.margin, 1.0], color=COLOURS[1], lw=1.8,
-                  label="to -1 at -180 degrees" if index == 0 else None)  # fmt: skip
-        axes.plot([one.frequency], [1.0 / one.margin], "o", ms=4.5, color=COLOURS[1])
+    label = "to -1 at -180 degrees"
+    for one in (one for one in m.phase_crossovers if one.margin < MARKED):
+        axes.plot([one.frequency] * 2, [1.0, 1.0 / one.margin], "o-", ms=4.5, color=COLOURS[1], label=label)
+        label = f"_{label}"
     top = float(np.quantile(np.abs(L), 0.98))
-    ends = max(DEEPEST, 0.5 * float(np.abs(L).min())), min(max(10.0, 3.0 * top), HIGHEST)
-    axes.set(xlim=(w[0], w[-1]), ylim=ends)
-    head(axes, f"gain margin {_margins(m)['gain margin']}", "|L|", "frequency, rad/s")
+    axes.set_ylim(max(DEEPEST, 0.5 * float(np.abs(L).min())), min(max(10.0, 3.0 * top), HIGHEST))
+    head(axes, f"gain margin {_margins(m)['gain margin']}", "|L|")
 
 
 def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+    """The phase of L, its distance from 180 degrees where |L| is 1."""
     degrees = np.degrees(np.angle(L))
     jumps = np.abs(np.diff(degrees, prepend=degrees[0])) > 170.0
     axes.semilogx(w, np.where(jumps, math.nan, degrees), color=COLOURS[0])
     for one in m.gain_crossovers:
         at = math.degrees(one.margin)
         bound = -180.0 if at > 0.0 else 180.0
-        axes.plot([one.frequency] * 2, [bound, bound + at], color=COLOURS[2], lw=1.8)
-        axes.plot([one.frequency], [bound + at], "o", ms=4.5, color=COLOURS[2])
-        axes.annotate(f"{abs(at):.0f}", (one.frequency, bound + 0.5 * at), xytext=(5, 0),
-                      textcoords="offset points", va="center", color=COLOURS[2])  # fmt: skip
-    axes.set(xlim=(w[0], w[-1]), ylim=(-190.0, 190.0), yticks=range(-180, 181, 60))
+        axes.plot([one.frequency] * 2, [bound, bound + at], "o-", ms=4.5, color=COLOURS[2])
+        axes.text(1.05 * one.frequency, bound + 0.5 * at, f"{abs(at):.0f}", va="center", color=COLOURS[2])
+    axes.set(ylim=(-190.0, 190.0), yticks=range(-180, 181, 60))
     title = ", ".join(f"{name} {text}" for name, text in list(_margins(m).items())[1:])
-    head(axes, title, "phase of L, degrees", "frequency, rad/s")
+    head(axes, title, "phase of L, degrees")
 
 
 def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
-    turn = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 200))
+    """L near -1, and how near it comes."""
+    turn, least = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 200)), m.modulus_margin
+    near = least * turn - 1.0
     axes.plot(turn.real, turn.imag, color=GREY, lw=0.8, ls=":", label="|L| = 1")
-    near = -1.0 + m.modulus_margin * turn
-    axes.plot(near.real, near.imag, color=COLOURS[1], lw=1.0, ls=DASHES[1],
-              label=f"nearest to -1: {m.modulus_margin:.3g}")  # fmt: skip
+    axes.plot(near.real, near.imag, color=COLOURS[1], lw=1.0, ls="--", label=f"nearest to -1: {least:.3g}")
     axes.plot(L.real, L.imag, color=COLOURS[0], label="L")
     axes.plot(L.real, -L.imag, color=COLOURS[0], lw=0.7, alpha=0.6)
     axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])

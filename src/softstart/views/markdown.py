@@ -6,10 +6,9 @@ Everything is made ready beside the folder and then put in place, or nothing is.
 from __future__ import annotations
 
 import csv
-import math
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -52,16 +51,6 @@ def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[obje
     write_whole(path, write)
 
 
-def write_columns(path: Path, columns: Mapping[str, Sequence[object]]) -> None:
-    """Columns by their headings as CSV; NaN as an empty cell."""
-    rows = zip(*columns.values(), strict=True)
-    write_table(path, list(columns), [[None if _is_nan(cell) else cell for cell in row] for row in rows])
-
-
-def _is_nan(cell: object) -> bool:
-    return isinstance(cell, float) and math.isnan(cell)
-
-
 def write_text(path: Path, text: str) -> None:
     """A text file."""
     write_whole(path, lambda stream: stream.write(text))
@@ -76,11 +65,8 @@ def file_stem(name: str, taken: Sequence[str] = ()) -> str:
     stem = (
         "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in name).split()).strip(".") or "start"
     )
-    number, free = 1, stem
-    while free in taken:
-        number += 1
-        free = f"{stem}-{number}"
-    return free
+    free = (stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 2)))
+    return next(one for one in free if one not in taken)
 
 
 def _refused(asked: str, reason: str) -> InputError:

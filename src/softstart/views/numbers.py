@@ -1,12 +1,26 @@
-"""Numbers and text as people and programs read them: decimals, dashes, JSON. Imports nothing heavy."""
+"""Numbers and text as people and programs read them: decimals, units, dashes, JSON. Imports nothing heavy.
+
+A terminal and files have ASCII alone; `printed`, `fixed`, `digits` and `percent` are for report and page.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-NOTHING = "-"
+from softstart.quantities import Units
+
+NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
+RPM = 30.0 / math.pi  # of one rad/s
+UNITS = {"kg*m^2": "kg m\N{SUPERSCRIPT TWO}", "1": ""}  # as report and page print them
+UNIT_BEHIND = r"(?<!,) (?=(N m|N m s|kg m2|rad|rad/s|s|ms|Hz|J|%|deg|mm|N|kN)$)"  # a heading
+AT_OUTPUT = {  # exponent of the gear ratio that brings a value from the motor shaft to the output shaft
+    **dict.fromkeys(("N*m", "N*m/s"), 1),
+    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), 2),
+    **dict.fromkeys(("rad", "rad/s"), -1),
+}
 
 
 class Column(NamedTuple):
@@ -14,6 +28,15 @@ class Column(NamedTuple):
 
     heading: str
     number: bool = True
+
+    @property
+    def in_a_line(self) -> str:
+        r"""The heading without line breaks, and with a comma before its unit.
+
+        >>> Column("peak\nN m").in_a_line, Column("start\ntime s").in_a_line, Column("K_dyn").in_a_line
+        ('peak, N m', 'start time, s', 'K_dyn')
+        """
+        return re.sub(UNIT_BEHIND, ", ", self.heading.replace("\n", " "))
 
     def width(self, cells: Sequence[str]) -> int:
         """Letters that the column needs."""
@@ -93,18 +116,22 @@ def _cell(value: float | None, decimals: int, noise: float) -> str:
     return number(value, max(decimals, 2 - own)) if own >= -4 else f"{value:.2e}"
 
 
-def first_of(count: int, shown: int) -> str:
-    """What the title of a table says where it shows only the first rows; else nothing."""
-    return f" (the first {shown} of {count}; --json and --out give all)" if count > shown else ""
-
-
 def short(value: float) -> str:
     """One number for a line of text, at most six digits.
 
-    >>> short(368.465), short(0.175), short(92.15338450)
-    ('368.465', '0.175', '92.1534')
+    >>> short(368.465), short(0.175), short(92.15338450), short(math.nan)
+    ('368.465', '0.175', '92.1534', '-')
     """
-    return f"{value:.6g}"
+    return NOTHING if math.isnan(value) else f"{value:.6g}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number and its unit; a dash for a missing value.
+
+    >>> with_unit(0.1751, "s"), with_unit(math.nan, "s")
+    ('0.1751 s', '-')
+    """
+    return NOTHING if math.isnan(value) else f"{short(value)} {unit}"
 
 
 def label(name: str, unit: str = "", between: str = ", ") -> str:
@@ -115,6 +142,85 @@ def label(name: str, unit: str = "", between: str = ", ") -> str:
     """
     words = name.removeprefix("controller_").replace("_", " ").replace("k dyn", "K_dyn")
     return words if unit in ("", "1") else f"{words}{between}{unit.replace('*', ' ').replace('^', '')}"
+
+
+def printed(text: str) -> str:
+    """One of these numbers as report and page print it: a true minus sign, an en dash for a missing value."""
+    return DASH if text == NOTHING else text.replace("-", "\N{MINUS SIGN}").replace("inf", "infinite")
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """A number with so many decimals, for report and page.
+
+    >>> fixed(0.98123, 3), fixed(float("nan"), 3), fixed(-1.5, 1)
+    ('0.981', '\N{EN DASH}', '\N{MINUS SIGN}1.5')
+    """
+    return printed(number(value, decimals))
+
+
+def digits(value: float | None, count: int = 4) -> str:
+    """A number with so many significant digits, without an exponent where that can be read.
+
+    >>> digits(0.0165988), digits(164.81), digits(2.6e-5), digits(368.465, 6)
+    ('0.01660', '164.8', '2.600e\N{MINUS SIGN}05', '368.465')
+    """
+    return printed(column_of([value], count)[0])
+
+
+def percent(share: float, decimals: int = 1) -> str:
+    """A share in per cent.
+
+    >>> percent(0.0772)
+    '7.7\N{NO-BREAK SPACE}%'
+    """
+    return f"{fixed(100.0 * share, decimals)}\N{NO-BREAK SPACE}%"
+
+
+def unit(written: str) -> str:
+    """A unit as report and page print it.
+
+    >>> unit("N*m"), unit("rad/s")
+    ('N m', 'rad/s')
+    """
+    return UNITS.get(written, written.replace("*", " "))
+
+
+def units_of(machine: Any) -> Units:
+    """The units in which angles and speeds of a machine are seen: those that it names, else as it has them.
+
+    >>> from softstart import Drive
+    >>> units_of(Drive.load("hoist-15kw")), units_of(Drive.load("servo-axis-small")).angle
+    (Units(angle='deg', speed='rpm', diameter=0.0), ...)
+    """
+    speeds = [] if machine.target_speed is None else [float(machine.target_speed)]
+    return Units.read(machine.units, machine.own_gaps, speeds)
+
+
+def at_output(machine: Any, value: float, unit: str = "N*m") -> str:
+    """A value of the motor shaft at the output shaft of the gear, without losses; "" where it has none there.
+
+    Torque times i, inertia, stiffness and damping times i^2, angle and speed divided by i; the `unit` is that
+    of the parameter, the value may be in another one of its kind.
+
+    >>> from softstart import Drive
+    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0)
+    >>> at_output(crane, 169.7), at_output(crane, 0.20083, "kg*m^2")
+    ('6449', '290.0')
+    """
+    ratio, power = machine.gear_ratio, AT_OUTPUT.get(unit)
+    return "" if ratio is None or power is None else digits(float(ratio) ** power * value)
+
+
+def decimals_of(step: float) -> int:
+    """Decimals that show every multiple of a step.
+
+    >>> decimals_of(0.5), decimals_of(0.01), decimals_of(1.0), decimals_of(0.125)
+    (1, 2, 0, 3)
+    """
+    for count in range(9):
+        if abs(step * 10**count - round(step * 10**count)) < 1e-9 * max(1.0, step * 10**count):
+            return count
+    return 9
 
 
 def printable(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import math
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,17 +14,9 @@ from typing import Any
 from softstart import __version__
 from softstart.views.drawing import drawing, save_figure
 from softstart.views.drives import controllers_set_up
-from softstart.views.markdown import markdown, write_columns, write_table, write_text
+from softstart.views.markdown import markdown, write_table, write_text
 from softstart.views.numbers import Column, Table
-from softstart.views.terminal import (
-    console,
-    print_commands,
-    print_conclusion,
-    print_figures,
-    print_lines,
-    print_tables,
-    sentence,
-)
+from softstart.views.terminal import console, print_lines, print_table, sentence
 
 FITTED_TO = "fitted-to.toml"
 
@@ -92,11 +85,20 @@ def show(sheet: Sheet) -> None:
     if sheet.status:
         sentence(to, sheet.status, "bold")
     if sheet.facts:
-        print_figures(to, sheet.facts)
-    print_tables(to, sheet.tables)
-    print_conclusion(to, sheet.found, sheet.notes)
+        print_table(to, Table.of_texts(("", ""), sheet.facts), headings=False)
+    for table in (one for one in sheet.tables if one.rows):
+        to.print()
+        print_table(to, table)
+    if sheet.found or sheet.notes:
+        to.print()
+    for style, texts in (("bold", sheet.found), ("dim", sheet.notes)):
+        for text in texts:
+            sentence(to, text, style)
     if sheet.commands:
-        print_commands(to, sheet.commands)
+        wide = max(len(command) for command, _ in sheet.commands)
+        to.print("\nNext:")
+        for command, gives in sheet.commands:
+            to.print(f"  {command:{wide}}   {gives}", soft_wrap=True)
 
 
 # folder ----------------------------------------------------------------------------------------------------
@@ -109,7 +111,11 @@ def rows_file(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Write
 
 def columns_file(columns: Mapping[str, Sequence[object]]) -> Writer:
     """A CSV file of columns by their headings; NaN as an empty cell."""
-    return lambda path: write_columns(path, columns)
+    rows = [
+        [None if isinstance(cell, float) and math.isnan(cell) else cell for cell in row]
+        for row in zip(*columns.values(), strict=True)
+    ]
+    return rows_file(list(columns), rows)
 
 
 def records_file(records: Sequence[Mapping[str, object]]) -> Writer:
@@ -134,7 +140,11 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
         "\n".join(f"- {markdown(line.strip())}" for line in sheet.lines[1:]),
         markdown(sheet.status),
         *map(markdown, sheet.found),
-        facts_table(sheet.facts) if sheet.facts else "",
+        *(
+            table_parts(Table("", [Column("figure", False), Column("value")], sheet.facts))
+            if sheet.facts
+            else ()
+        ),
         *(f"![{stem}]({stem}.svg)" for stem in sheet.figures if f"({stem}.svg)" not in behind),
         *(part for one in sheet.tables if one.rows for part in table_parts(one)),
         *map(markdown, sheet.notes),
@@ -151,15 +161,10 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
 
 def table_parts(table: Table) -> list[str]:
     """A table and its title in Markdown; numbers are set to the right."""
-    headings = [column.heading for column in table.columns]
+    headings = [column.in_a_line for column in table.columns]
     rule = ["---:" if column.number else "---" for column in table.columns]
     rows = "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
     return [f"## {markdown(table.title)}", rows] if table.title else [rows]
-
-
-def facts_table(facts: Sequence[Sequence[str]]) -> str:
-    """Figures in Markdown, each a name and its value."""
-    return table_parts(Table("", [Column("figure", False), Column("value")], facts))[0]
 
 
 def _machine(sheet: Sheet, folder: Path) -> tuple[str, list[str]]:

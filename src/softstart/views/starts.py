@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
@@ -16,30 +17,29 @@ from softstart.views.drawing import (
     COLOURS,
     DASHES,
     GREY,
-    MARKERS,
     SHAFTS,
     drawing,
     entitle,
     head,
     legend_above,
+    legend_beside,
+    line_of,
+    mark_points,
     new_figure,
     shade_open_gap,
 )
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import Table, column_of, number, short
-from softstart.views.printed import units_of
+from softstart.views.numbers import Table, column_of, label, number, short, units_of, with_unit
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.start.run import Run
-
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
 OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
-FEW = 8  # masses
+FEW = 8  # masses or shafts with a name each in a figure
 SHOWN = 24  # stages and events on a terminal
 SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
@@ -59,12 +59,8 @@ def machine_lines(machine: Any, fitted_to: Drive | None = None) -> list[str]:
 
 def figure_rows(run: Run) -> list[list[str]]:
     """The figures of the start, as words and numbers."""
-
-    def with_unit(value: float, unit: str) -> str:
-        return f"{short(value)} {unit}" if not math.isnan(value) else "-"
-
     first, second = run.stage_durations
-    names = run.drive.shaft_names
+    names, clipped = run.drive.shaft_names, clipped_torque(run)
     where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)}{where}"],
@@ -79,7 +75,7 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}"],
         ["contacts", str(run.contacts)],
         ["end of the run", with_unit(run.end_time, "s")],
-        *([["torque cut off", clipped]] if (clipped := clipped_torque(run)) else []),
+        *([["torque cut off", clipped]] if clipped else []),
         *([] if math.isnan(run.release_time) else [["brake released", with_unit(run.release_time, "s")]]),
         *(
             [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
@@ -93,13 +89,12 @@ def position_notes(runs: Sequence[Run]) -> list[str]:
     worst = [f"{run.controller_name} {run.position}" for run in runs if run.positions]
     if not worst:
         return []
-    drive = runs[0].drive
     text = (
         "The start position is unknown: each figure is the worst of both flanks and mid-gap. K_dyn is "
         f"largest from: {', '.join(worst)}."
     )
     known = "Friction holds the load anywhere; give start.position if it is always the same."
-    return [text if drive.position_given else f"{text} {known}"]
+    return [text if runs[0].drive.position_given else f"{text} {known}"]
 
 
 def clipped_torque(run: Any) -> str:
@@ -124,20 +119,33 @@ def outcome(run: Run) -> str:
     return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value
 
 
-def stage_rows(run: Run) -> list[list[object]]:
+def stage_rows(run: Run) -> list[list[Any]]:
     """The stages, full numbers."""
-    return [
-        [stage.number, SIDES[stage.side], stage.start, stage.duration, stage.peak_torque, stage.peak_time]
-        for stage in run.stages
-    ]
+    return [[s.number, SIDES[s.side], s.start, s.duration, s.peak_torque, s.peak_time] for s in run.stages]
 
 
-def event_rows(run: Run) -> list[list[object]]:
+def event_rows(run: Run) -> list[list[Any]]:
     """The events, full numbers, each with the shaft or mass on which it happened."""
     masses, shafts = run.drive.mass_names, run.drive.shaft_names
     return [
         [one.time, one.kind, (shafts if one.kind in OF_SHAFTS else masses)[one.place], one.value, one.impulse]
         for one in run.events
+    ]
+
+
+def _start_tables(run: Run) -> list[Table]:
+    """The shafts, if there are several, the stages, and the events: time, what happened, and where."""
+    several, rows = len(run.drive.shaft_names) > 1, event_rows(run)
+    stages: dict[str, Any] = dict(zip(STAGE_COLUMNS, zip(*stage_rows(run), strict=True), strict=False))
+    for name in stages.keys() - {"stage", "gap"}:
+        stages[name] = column_of(stages[name], 4 if name == "duration s" else 5)
+    stages |= {"stage": list(map(str, stages.get("stage", ())))} if stages else {}
+    events = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
+    events |= {"at": [row[2] for row in rows]} if several else {}
+    return [
+        *([shaft_table(run)] if several else []),
+        Table.of("Stages", stages, ("gap",), most=SHOWN),
+        Table.of("Events", events, ("event", "at"), most=SHOWN),
     ]
 
 
@@ -157,121 +165,109 @@ def shaft_table(run: Run) -> Table:
     return Table.of("Shafts", cells, ("shaft",))
 
 
-def run_figure(run: Run) -> Any:
-    """Torques, speeds and twists over time; of a single shaft grey where its gap is open."""
+# figures of starts over time
+
+
+def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: str, note: str = "") -> Any:
+    """Panels over the time of a start; of a single shaft grey where its gap is open."""
     single = len(run.drive.shaft_names) == 1
     with drawing():
-        figure, panels = new_figure(3, 1, (8.0, 7.5), sharex=True)
-        for axes in panels if single else ():
-            shade_open_gap(axes, run)
-        for axes, draw in zip(panels, (_torques, _speeds, _twists), strict=True):
-            draw(axes, run)
-            if not axes.get_legend_handles_labels()[0]:
+        figure, axes = new_figure(len(panels), 1, (8.0, 0.6 + 2.25 * len(panels)), sharex=True)
+        for panel, draw in zip(axes, panels, strict=True):
+            if single:
+                shade_open_gap(panel, run)
+            draw(panel, run)
+            if not panel.get_legend_handles_labels()[0]:
                 continue
             if single:
-                legend_above(axes, 3)
+                legend_above(panel, 5, columnspacing=1.2, handlelength=1.8)
             else:
-                columns = 1 + len(run.drive.mass_names) // FEW
-                axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns)
-        panels[-1].set_xlabel(f"time, s{'     (grey: gap open)' if single else ''}")
-        panels[-1].set_xlim(0.0, run.end_time)
-        entitle(figure, f"{run.drive.name}: {run.controller_name}")
+                legend_beside(panel, 1 + len(run.drive.mass_names) // FEW, fontsize=6.5)
+        notes = "; ".join(filter(None, ["grey: gap open" if single else "", note]))
+        axes[-1].set_xlabel(f"time, s     ({notes})" if notes else "time, s")
+        axes[-1].set_xlim(0.0, run.end_time)
+        entitle(figure, title)
     return figure
 
 
-def _shafts(run: Run) -> list[tuple[str, dict[str, Any]]]:
+def run_figure(run: Run) -> Any:
+    """Torques, speeds and twists over time."""
+
+    def torques(axes: Axes, run: Run) -> None:
+        axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
+        shaft_torques(axes, run)
+        head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
+
+    return over_time(run, (torques, speeds, twists), f"{run.drive.name}: {run.controller_name}")
+
+
+def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
     """Name and line of each shaft."""
     names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque T",)
-    return [
-        (name, {"color": SHAFTS[k % len(SHAFTS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]})
-        for k, name in enumerate(names)
-    ]
+    return [(name, line_of(k) | {"color": SHAFTS[k % len(SHAFTS)]}) for k, name in enumerate(names)]
 
 
-def _torques(axes: Axes, run: Run) -> None:
-    axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
-    peaks = run.recorded.shafts["peak"]
+def shaft_torques(axes: Axes, run: Run) -> None:
+    """The torque of each shaft with its peak, and where K_dyn is 1."""
     for (name, line), torque, time, peak in zip(
-        _shafts(run), run.T.reshape(run.t.size, -1).T, run.peak_times, peaks, strict=True
-    ):
+        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.peak_times, run.recorded.shafts["peak"],
+        strict=True,
+    ):  # fmt: skip
         axes.plot(run.t, torque, label=name, **line)
         axes.plot([time], [peak], "o", ms=4, color=line["color"])
     if run.k_dyn > 0.0:
         axes.axhline(run.peak_torque / run.k_dyn, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
-    head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
 
 
-def _speeds(axes: Axes, run: Run) -> None:
+def speeds(axes: Axes, run: Run) -> None:
+    """The speeds of all masses, the target speed, and the end of the start."""
     machine, units = run.drive, units_of(run.drive)
-    if len(machine.mass_names) == 2:
-        axes.plot(run.t, units.shown(run.w1, "rad/s"), color=COLOURS[1], ls=DASHES[1], label="motor w1")
-        axes.plot(run.t, units.shown(run.w2, "rad/s"), color=COLOURS[0], label="load w2")
-    else:
-        for i, name in enumerate(machine.mass_names):
-            colour, dash = COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]
-            axes.plot(run.t, units.shown(run.w[:, i], "rad/s"), color=colour, ls=dash, label=name)
+    lines = [(name, line_of(i)) for i, name in enumerate(machine.mass_names)]
+    if len(lines) == 2:
+        lines = [("motor w1", {"color": COLOURS[1], "ls": DASHES[1]}), ("load w2", {"color": COLOURS[0]})]
+    for (name, line), speed in zip(lines, run.w.T, strict=True):
+        axes.plot(run.t, units.shown(speed, "rad/s"), label=name, **line)
     if machine.target_speed is not None:
         target = float(units.shown(machine.target_speed, "rad/s"))
         axes.axhline(target, color=GREY, lw=0.8, ls=":", label="target")
-    reached = run.start_time == run.start_time
+    reached = not math.isnan(run.start_time)
     if reached:
         axes.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
     title = f"start time {run.start_time:.4f} s" if reached else run.status.value
     head(axes, title, f"speed, {units.of('rad/s')}")
 
 
-def _twists(axes: Axes, run: Run) -> None:
-    """The twist of a single shaft in rad, of several each in its gap."""
-    gaps, twists = run.drive.gaps, run.twist.T
+def twists(axes: Axes, run: Run) -> None:
+    """The twist of a single shaft as an angle, of several each in its gap."""
+    gaps, units = run.drive.gaps, units_of(run.drive)
     if len(gaps) == 1:
-        units = units_of(run.drive)
-        axes.plot(run.t, units.shown(twists[0], "rad"), color=COLOURS[2])
-        flanks, unit = float(units.shown(0.5 * gaps[0], "rad")), units.of("rad")
-        title = "twist phi1 - phi2, flanks dashed"
+        axes.plot(run.t, units.shown(run.twist[:, 0], "rad"), color=COLOURS[2])
+        flanks, title, unit = float(units.shown(0.5 * gaps[0], "rad")), "phi1 - phi2", units.of("rad")
     else:
-        for (name, line), gap, twist in zip(_shafts(run), gaps, twists, strict=True):
+        for (name, line), gap, twist in zip(shafts_of(run), gaps, run.twist.T, strict=True):
             if gap > 0.0:
                 axes.plot(run.t, 2.0 * twist / gap, label=name, **line)
-        flanks, title, unit = 1.0, "twist over half the gap, flanks dashed", "half gaps"
+        flanks, title, unit = 1.0, "over half the gap", "half gaps"
     for flank in (flanks, -flanks):
         axes.axhline(flank, color="#444444", lw=0.8, ls="--")
-    head(axes, title, unit)
-
-
-def stage_table(run: Run) -> Table:
-    """The stages."""
-    stages = run.stages
-    cells = (
-        [str(stage.number) for stage in stages],
-        [SIDES[stage.side] for stage in stages],
-        column_of([stage.start for stage in stages], 5),
-        column_of([stage.duration for stage in stages]),
-        column_of([stage.peak_torque for stage in stages], 5),
-        column_of([stage.peak_time for stage in stages], 5),
-    )
-    return Table.of("Stages", dict(zip(STAGE_COLUMNS, cells, strict=True)), ("gap",), most=SHOWN)
-
-
-def event_table(run: Run) -> Table:
-    """The events: time, what happened, and of several shafts where."""
-    rows: list[Any] = event_rows(run)
-    cells = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
-    if len(run.drive.shaft_names) > 1:
-        cells["at"] = [row[2] for row in rows]
-    return Table.of("Events", cells, ("event", "at"), most=SHOWN)
+    contacts = f"{run.contacts} contact{'' if run.contacts == 1 else 's'}"
+    head(axes, f"twist {title}, flanks dashed; {contacts}", f"twist, {unit}")
 
 
 def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
     """What is shown of a start."""
     assert run.controller is not None
-    several, stem = len(run.drive.shaft_names) > 1, file_stem(run.controller_name)
+    values, stem = parameters_of(run), file_stem(run.controller_name)
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     return Sheet(
         f"{run.drive.name}: start under {run.controller_name}",
-        [*machine_lines(run.drive, fitted_to), f"  under  {_strategy(run)}"],
+        [
+            *machine_lines(run.drive, fitted_to),
+            f"  under  {run.controller_name}{' (' + values + ')' if values else ''}",
+        ],
         run.status.value,
         figure_rows(run),
-        [*([shaft_table(run)] if several else []), stage_table(run), event_table(run)],
+        _start_tables(run),
         notes=run.drive.warnings,
         figures={f"run-{stem}": run.plot},
         files={
@@ -282,25 +278,30 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         },
         machine=run.drive,
         fitted_to=fitted_to,
-        behind=["## The strategy", _all_digits(run)],
+        behind=["## The strategy", markdown(what_it_does(run))],
     )
 
 
-def _strategy(run: Run) -> str:
-    """The strategy of a start and its parameters, in short."""
+def parameters_of(run: Run, text: Callable[[float], str] = short) -> str:
+    """The parameters with which the strategy of a start is set up, each value in its unit.
+
+    >>> from softstart import simulate
+    >>> parameters_of(simulate("crane-4amtkf", "ramp"))
+    'initial = 7.16 N m, time = 0.111803 s, full_torque = 62 N m, period = 0.001 s'
+    """
     assert run.controller is not None
-    given = run.controller.parameters.items()
-    values = ", ".join(f"{key} = {short(v) if isinstance(v, float) else v}" for key, v in given)
-    return f"{run.controller_name}{' (' + values + ')' if values else ''}"
+    units = {one.name: label("", one.metadata.get("unit", "1"), " ") for one in fields(run.controller)}
+    return ", ".join(
+        f"{key} = {text(value) if isinstance(value, float) else value}{units.get(key, '')}"
+        for key, value in run.controller.parameters.items()
+    )
 
 
-def _all_digits(run: Run) -> str:
+def what_it_does(run: Run) -> str:
     """What the strategy of a start does, and its parameters with all digits."""
     assert run.controller is not None
-    values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
-    return markdown(
-        ". ".join(filter(None, [type(run.controller).summary, f"Parameters: {values or 'none'}."]))
-    )
+    values = parameters_of(run, str) or "none"
+    return ". ".join(filter(None, [type(run.controller).summary, f"Parameters: {values}."]))
 
 
 # a comparison --------------------------------------------------------------------------------------------
@@ -327,22 +328,13 @@ GENTLE = (
     Figure("K\nlight", lambda row: row.k_dyn_light_load, 3),
     Figure("peak\nN m", lambda row: row.run.peak_torque),
 )
-
-
-def _end(name: str, index: int) -> Callable[[Row], float]:
-    return lambda row: row.intervals[name][index]
-
-
 INTERVALS = (
-    Figure("K_dyn\nfrom", _end("k_dyn", 0), 3),
-    Figure("K_dyn\nto", _end("k_dyn", 1), 3),
-    Figure("peak to\nN m", _end("peak_torque", 1)),
-    Figure("start\ntime to s", _end("start_time", 1)),
+    Figure("K_dyn\nfrom", lambda row: row.intervals["k_dyn"][0], 3),
+    Figure("K_dyn\nto", lambda row: row.intervals["k_dyn"][1], 3),
+    Figure("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
+    Figure("start\ntime to s", lambda row: row.intervals["start_time"][1]),
 )
-QUICK = (
-    Figure("settled\ns", lambda row: row.run.settled_time),
-    Figure("later\n%", share_lost, 1),
-)
+QUICK = (Figure("settled\ns", lambda row: row.run.settled_time), Figure("later\n%", share_lost, 1))
 TIMES = (
     Figure("start\ntime s", lambda row: row.run.start_time),
     Figure("start\nlater s", lambda row: row.time_lost, digits=3),
@@ -381,12 +373,11 @@ def comparison_table(
     figures = figures or (*GENTLE, *QUICK, *uncertain, *TIMES, *at_details(rows[0].run.drive))
     judged = GENTLE[0] in figures
     cells = {"strategy": [row.marked if judged else row.name for row in rows]}
-    for figure in figures:
-        values = [figure.of(row) for row in rows]
-        if figure.decimals is None:
-            cells[figure.heading] = column_of(values, figure.digits)
-        else:
-            cells[figure.heading] = [number(value, figure.decimals) for value in values]
+    for heading, of, decimals, digits in figures:
+        values = list(map(of, rows))
+        cells[heading] = (
+            column_of(values, digits) if decimals is None else [number(value, decimals) for value in values]
+        )
     if judged and any(row.against_limits for row in rows):
         cells["limits"] = [row.against_limits for row in rows]
     return Table.of(title, cells, ("strategy", "limits"), bold=bold)
@@ -426,18 +417,11 @@ def definitions(comparison: Comparison) -> list[str]:
 def remarks(comparison: Comparison) -> list[str]:
     """What the figures of these starts leave out, and which starts did not end as they should."""
     rows = comparison.rows
-    return [
-        *comparison.drive.warnings,
-        *([INTERVALS_NOTE] if rows[0].intervals else []),
-        *row_remarks(rows),
-    ]
-
-
-def row_remarks(rows: Sequence[Row]) -> list[str]:
-    """Positions, starts that failed, torque cut off, and flags."""
     cut = [(row.name, clipped_torque(row.run)) for row in rows]
     failed = [row for row in rows if math.isnan(row.run.start_time)]
     return [
+        *comparison.drive.warnings,
+        *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
         *(f"{row.name}: {row.run.status.value}" for row in failed),
         *(f"{name}, torque cut off: {clipped}." for name, clipped in cut if clipped),
@@ -453,44 +437,21 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
     """Motor torque and torque of each shaft of several starts, one panel each."""
     runs = [row.run for row in rows]
     several = len(runs[0].drive.shaft_names) > 1
-    names = ["shaft torque T"]
-    if several:  # a few names fit above the first panel; of more shafts none
-        names = list(runs[0].drive.shaft_names)
-        names = names if len(names) < 4 else [f"_{name}" for name in names]
     with drawing():
-        figure, axes = new_figure(
-            len(runs), 1, (8.0, 1.0 + 1.35 * len(runs)), sharex=True, sharey=True, squeeze=False
-        )
-        longest = max(run.end_time for run in runs)
-        for panel, row in zip(axes[:, 0], rows, strict=True):
-            run = row.run
+        size = (8.0, 1.0 + 1.35 * len(runs))
+        figure, axes = new_figure(len(runs), 1, size, sharex=True, sharey=True, squeeze=False)
+        for panel, row, run in zip(axes[:, 0], rows, runs, strict=True):
             if not several:
                 shade_open_gap(panel, run)
-            panel.plot(
-                run.t,
-                run.u,
-                color=COLOURS[1],
-                ls=DASHES[1],
-                lw=1.1,
-                label="motor" if several else "motor torque u",
-            )
-            for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
-                panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], label=name)
-            panel.set_title(
-                f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
-                loc="left",
-                fontsize=9.5,
-                pad=3,
-            )
-            panel.set_ylabel("N m")
-        named = 1 + sum(not name.startswith("_") for name in names)
-        if named > 2:  # too wide to stand beside the title of a panel
-            handles, labels = axes[0, 0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside lower right", ncols=named)
-        else:
-            legend_above(axes[0, 0], named)
+            panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
+            for (name, line), torque in zip(shafts_of(run), run.T.reshape(run.t.size, -1).T, strict=True):
+                panel.plot(run.t, torque, label=name, **line)
+            head(panel, f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s", "N m")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        if len(labels) <= FEW:
+            figure.legend(handles, labels, loc="outside lower right", ncols=4)
         axes[-1, 0].set_xlabel("time, s" if several else "time, s     (grey: gap open)")
-        axes[-1, 0].set_xlim(0.0, longest)
+        axes[-1, 0].set_xlim(0.0, max(run.end_time for run in runs))
         entitle(figure, title)
     return figure
 
@@ -499,25 +460,11 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
     """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 4.6))
-        for index, (name, time, k) in enumerate(points):
-            axes.plot(
-                [time],
-                [k],
-                MARKERS[index % len(MARKERS)],
-                ms=9,
-                mfc="none",
-                mew=2.0,
-                color=COLOURS[index % 8],
-                label=name,
-                clip_on=False,
-            )
+        mark_points(axes, points)
         axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
-        axes.set_xlabel("start time, s")
-        axes.set_ylabel("K_dyn")
         axes.set_ylim(bottom=0.0)
         axes.margins(x=0.08)
-        axes.set_title(title, loc="left")
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        head(axes, title, "K_dyn", "start time, s")
     return figure
 
 
@@ -543,7 +490,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         stems.append(stem := file_stem(run.controller_name, stems))
         figures[f"run-{stem}"] = run.plot
         files[f"trace-{stem}.csv"] = run.to_csv
-        behind.append(f"### {markdown(stem)}\n\n{_all_digits(run)}\n\n![{stem}](run-{stem}.svg)")
+        behind.append(f"### {markdown(stem)}\n\n{markdown(what_it_does(run))}\n\n![{stem}](run-{stem}.svg)")
     return Sheet(
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),
@@ -561,7 +508,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     )
 
 
-def _record(row: Row) -> dict[str, Any]:
+def _record(row: Row) -> Mapping[str, Any]:
     """The figures of a strategy under the names of JSON, each limit with a column of its own."""
     found = row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)}
     found |= {f"margin_{one['limit'].replace(' ', '_')}": one["margin"] for one in found.get("limits", ())}

@@ -14,9 +14,8 @@ from softstart.start.status import Status
 from softstart.sweeping.summary import plan_of
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
-from softstart.views.markdown import write_columns
 from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number
-from softstart.views.sheet import Sheet, Writer, records_file
+from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
@@ -107,11 +106,11 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
 def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Any:
     order = np.argsort(results[across[0]].values)
     x = results[across[0]].values[order]
+    marker: Any = {"marker": "o", "ms": 3.5} if len(x) < 30 else {}
     with draw.drawing():
         figure, axes = draw.new_figure(1, 1, (8.0, 4.8))
         for index, (title, values) in enumerate(parts):
-            axes.plot(x, values[order], color=draw.COLOURS[index % 8], ls=draw.DASHES[index % 8],
-                      label=title or None, marker="o" if len(x) < 30 else None, ms=3.5)  # fmt: skip
+            axes.plot(x, values[order], label=title or None, **draw.line_of(index, dashed=True), **marker)
         draw.fit_axis(axes, "x", x)
         if name in ("k_dyn", "margin"):
             axes.axhline(float(name == "k_dyn"), color=draw.GREY, lw=0.8, ls=":")
@@ -119,7 +118,7 @@ def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[P
             axes.set_ylim(bottom=0.0)
         draw.head(axes, results.attrs["title"], _axis(results, name), _axis(results, across[0]))
         if any(title for title, _ in parts):
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+            draw.legend_beside(axes)
     return figure
 
 
@@ -155,7 +154,7 @@ def _write_cells(results: xarray.Dataset, path: Path) -> None:
     """The same as CSV, with the units as they are written in drive files."""
     units = {str(name): _unit(results, str(name)) for name in results.variables}
     columns = cells(results).to_dict("list").items()
-    write_columns(path, {f"{n} [{units[n]}]" if units[n] not in ("", "1") else n: c for n, c in columns})
+    columns_file({f"{n} [{units[n]}]" if units[n] not in ("", "1") else n: c for n, c in columns})(path)
 
 
 def cell_table(results: xarray.Dataset) -> Table:

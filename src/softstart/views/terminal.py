@@ -8,36 +8,28 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from softstart.late import late
-from softstart.views.numbers import Column, Table, first_of, plain, printable
+from softstart.views.numbers import Column, Table, plain, printable
 
 if TYPE_CHECKING:
-    import rich.console as rich_console
-    import rich.table as rich_table
-    import rich.text as rich_text
-    from rich import box
-else:
-    box, rich_console = late("rich.box"), late("rich.console")
-    rich_table, rich_text = late("rich.table"), late("rich.text")
+    from rich.console import Console
 
 NARROWEST, IN_A_PIPE = 80, 100
 GUTTER, LONGEST_NAME, SHORTEST_TEXT = 2, 28, 12
 
 
-def console() -> rich_console.Console:
+def console() -> Console:
     """Standard output. Square brackets are text here, not markup: sources are called [G]."""
+    from rich.console import Console
 
-    class Pipe(rich_console.Console):
+    class Pipe(Console):
         """Leaves it to `main` to end quietly when the reader goes away."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
     made = Pipe(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=False)
-    if made.is_terminal or "COLUMNS" in made._environ:
-        made.width = max(NARROWEST, made.width)
-    else:
-        made.width = IN_A_PIPE
+    known = made.is_terminal or "COLUMNS" in made._environ
+    made.width = max(NARROWEST, made.width) if known else IN_A_PIPE
     return made
 
 
@@ -46,14 +38,14 @@ def print_json(data: Any) -> None:
     print(json.dumps(plain(data), indent=2, allow_nan=False))
 
 
-def print_table(to: rich_console.Console, shown: Table, *, headings: bool = True) -> None:
+def print_table(to: Console, shown: Table, *, headings: bool = True) -> None:
     """A table; bold rows stand out on a terminal. Text is wrapped, numbers are never cut.
 
     Of a table that is too wide the first columns, as far as they hold text, are printed again before those
     that have no room beside them.
     """
-    rows = shown.rows[: shown.most]
-    cut = first_of(len(shown.rows), len(rows))
+    rows, count = shown.rows[: shown.most], len(shown.rows)
+    cut = f" (the first {len(rows)} of {count}; --json and --out give all)" if count > len(rows) else ""
     for index, block in enumerate(_blocks(shown._replace(rows=rows), to.width)):
         if index:
             to.print()
@@ -64,7 +56,7 @@ def print_table(to: rich_console.Console, shown: Table, *, headings: bool = True
 def _blocks(table: Table, width: int) -> list[Table]:
     """The table in blocks of columns that fit; the text columns on the left stand in each of them."""
     columns, rows = table.columns, table.rows
-    needed = [_least(column, [row[i] for row in rows], i) + GUTTER for i, column in enumerate(columns)]
+    needed = [one + GUTTER for one in _least(table)]
     keys = next((i for i, column in enumerate(columns) if column.number), len(columns)) or 1
     blocks, used = [list(range(keys))], sum(needed[:keys])
     for i in range(keys, len(columns)):
@@ -79,16 +71,22 @@ def _blocks(table: Table, width: int) -> list[Table]:
     ]
 
 
-def _least(column: Column, cells: Sequence[str], index: int) -> int:
-    """Letters that a column needs at least: numbers all, text may be wrapped."""
-    width = column.width(cells)
-    return width if column.number else min(width, LONGEST_NAME if index == 0 else SHORTEST_TEXT)
+def _least(table: Table) -> list[int]:
+    """Characters that each column needs at least: numbers all, text may be wrapped."""
+
+    def least(index: int, column: Column) -> int:
+        width = column.width([row[index] for row in table.rows])
+        return width if column.number else min(width, SHORTEST_TEXT if index else LONGEST_NAME)
+
+    return [least(*one) for one in enumerate(table.columns)]
 
 
-def _print_block(to: rich_console.Console, shown: Table, headings: bool) -> None:
-    columns, rows = shown.columns, shown.rows
-    framed = to.is_terminal and not to.options.ascii_only
-    table = rich_table.Table(
+def _print_block(to: Console, shown: Table, headings: bool) -> None:
+    from rich import box
+    from rich.table import Table as RichTable
+
+    framed, least = to.is_terminal and not to.options.ascii_only, _least(shown)
+    table = RichTable(
         box=box.SIMPLE_HEAD if framed else None,
         pad_edge=False,
         padding=(0, 1, 0, 0) if framed else (0, GUTTER, 0, 0),
@@ -96,26 +94,22 @@ def _print_block(to: rich_console.Console, shown: Table, headings: bool) -> None
         show_header=headings,
         header_style="",
     )
-    depth = max(column.heading.count("\n") for column in columns)
-    least = [_least(column, [row[i] for row in rows], i) for i, column in enumerate(columns)]
-    for column, width in zip(columns, least, strict=True):
+    depth = max(column.heading.count("\n") for column in shown.columns)
+    for (heading, number), width in zip(shown.columns, least, strict=True):
         table.add_column(
-            "\n" * (depth - column.heading.count("\n")) + column.heading,
-            justify="right" if column.number else "left",
-            no_wrap=column.number,
+            "\n" * (depth - heading.count("\n")) + heading,
+            justify="right" if number else "left",
+            no_wrap=number,
             overflow="fold",
             min_width=width,
         )
-    for index, row in enumerate(rows):
+    for index, row in enumerate(shown.rows):
         table.add_row(*row, style="bold" if index in shown.bold else "")
     if shown.title:
-        to.print(rich_text.Text(shown.title, style="bold"))
+        to.print(shown.title, style="bold")
     needed = sum(least) + GUTTER * (len(least) - 1)
     before, to.width = to.width, max(to.width, needed)  # print(width=...) keeps to the console's own
     try:
-        if framed:
-            to.print(table, crop=False)
-            return
         with to.capture() as captured:
             to.print(table, crop=False)
     finally:
@@ -123,46 +117,15 @@ def _print_block(to: rich_console.Console, shown: Table, headings: bool) -> None
     print("\n".join(line.rstrip() for line in captured.get().rstrip().splitlines()))
 
 
-def print_tables(to: rich_console.Console, tables: Sequence[Table]) -> None:
-    """Tables with their titles, each after an empty line; empty ones are left out."""
-    for table in tables:
-        if table.rows:
-            to.print()
-            print_table(to, table)
-
-
-def sentence(to: rich_console.Console, text: str, style: str = "") -> None:
+def sentence(to: Console, text: str, style: str = "") -> None:
     """A paragraph, wrapped; further lines are indented like the first."""
     clean = printable(text)
     indent = " " * (len(clean) - len(clean.lstrip()))
     lines = wrap(clean, to.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-    to.print(rich_text.Text("\n".join(lines), style=style), soft_wrap=True)
+    to.print("\n".join(lines), style=style or None, soft_wrap=True)
 
 
-def print_lines(to: rich_console.Console, lines: Sequence[str]) -> None:
+def print_lines(to: Console, lines: Sequence[str]) -> None:
     """Paragraphs of which the first one is a title."""
     for index, line in enumerate(lines):
-        sentence(to, line, "bold" if index == 0 else "")
-
-
-def print_figures(to: rich_console.Console, rows: Sequence[Sequence[str]]) -> None:
-    """Figures, each a name and its value."""
-    print_table(to, Table.of_texts(("", ""), rows), headings=False)
-
-
-def print_conclusion(to: rich_console.Console, found: Sequence[str], notes: Sequence[str]) -> None:
-    """What came out, and below it the notes."""
-    if found or notes:
-        to.print()
-    for text in found:
-        sentence(to, text, "bold")
-    for note in notes:
-        sentence(to, note, "dim")
-
-
-def print_commands(to: rich_console.Console, commands: Sequence[tuple[str, str]]) -> None:
-    """What to type next, each command whole on a line of its own, and what it gives."""
-    wide = max(len(command) for command, _ in commands)
-    to.print("\nNext:")
-    for command, gives in commands:
-        to.print(f"  {command:{wide}}   {gives}", soft_wrap=True)
+        sentence(to, line, "" if index else "bold")

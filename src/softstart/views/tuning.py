@@ -10,20 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.late import late
+from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
-from softstart.views.numbers import Column, Table, column_of, label, short
-from softstart.views.printed import at_output
+from softstart.views.numbers import Column, Table, at_output, column_of, label, short
 from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from softstart.tuning import question as questions
     from softstart.tuning.outcome import Tuning
-else:
-    questions = late("softstart.tuning.question")
 
 PRICES = {
     "robust_over_schedule": "one set / each cell tuned",
@@ -35,14 +31,13 @@ SHOWN = 24  # cells on a terminal
 
 def figure_of(tuning: Tuning, what: str | None) -> Any:
     """Maps of what is asked for; InputError where there is nothing to draw."""
-    made = {"price": tuning.price, "metric": tuning.schedule, "gains": tuning.schedule}
-    made["robust"] = None if tuning.robust is None else tuning.robust.cells
-    what = what or next(name for name, table in made.items() if table is not None)
+    robust = None if tuning.robust is None else tuning.robust.cells
+    made = {"price": tuning.price, "metric": tuning.schedule, "gains": tuning.schedule, "robust": robust}
+    there = [name for name, table in made.items() if table is not None]
+    what = what or there[0]
     if (table := made.get(what)) is None:
-        there = [name for name, one in made.items() if one is not None]
-        raise InputError(
-            f"what = {what!r}: there is no such figure of this tuning; choose {', '.join(there)}."
-        )
+        choose = f"choose {', '.join(there)}"
+        raise InputError(f"what = {what!r}: there is no such figure of this tuning; {choose}.")
     name, metric = tuning.metric, _metric(tuning)
     if what == "gains":
         maps = {one.name: label(one.name, one.unit) for one in tuning.question.ranges}
@@ -65,7 +60,8 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
     if late is not None and late.any():
         title += " (struck out: later than allowed)"
     with drawing():
-        figure, axes = panels(len(maps), size, 3, "load inertia J2, kg m2", "gap, rad")
+        own = "" if len(tuning.drive.mass_names) == 2 else " at its own shaft"
+        figure, axes = panels(len(maps), size, 3, f"load inertia J2{own}, kg m2", "gap, rad")
         for index, (panel, name) in enumerate(zip(axes, maps, strict=True)):
             values = fields[index]
             scale = colour_scale(*(fields[:alike] if index < alike else [values]))
@@ -80,7 +76,7 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
 
 def _metric(tuning: Tuning) -> str:
     """The metric in words."""
-    return "share of the limits" if tuning.question.metric == questions.MARGIN else label(tuning.metric)
+    return "share of the limits" if tuning.question.metric == MARGIN else label(tuning.metric)
 
 
 def any_in_time(tuning: Tuning) -> bool:
@@ -167,12 +163,14 @@ def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
     name, metric, table, price = tuning.metric, _metric(tuning), tuning.schedule, tuning.price
     one, found = tuning.robust, list[str]()
+    shares = list[tuple[str, Any, Any]]()
     if table is not None:
         late, before = int((~table["in_time"]).sum()), _between(table[f"{name}_default"])
         end = f"{late} of {table['in_time'].size} cells start later than allowed" if late else "all in time"
         found.append(
             f"Gains for each cell: {metric} {_between(table[name])}, with the defaults {before}; {end}."
         )
+        shares.append(("gains for each cell", table[name], table[f"{name}_default"]))
     if one is not None:
         kind = "at most" if tuning.question.quantile == 1.0 else f"quantile {tuning.question.quantile:g}"
         end = "all in time" if one.feasible else f"{100 * one.excess:.1f} % later than allowed"
@@ -180,16 +178,14 @@ def conclusions(tuning: Tuning) -> list[str]:
             f"One set for all: {metric} {kind} {one.worst:.3f}, with the defaults of the nominal drive "
             f"{one.worst_default:.3f}; {end}; {one.agreement} of {one.restarts} searches agree."
         )
-    if tuning.question.metric == questions.MARGIN:
-        shares: list[Any] = []
-        shares += [] if table is None else [("gains for each cell", table[name], table[f"{name}_default"])]
-        shares += [] if one is None else [("one set for all", one.worst, one.worst_default)]
-        told = []
+        shares.append(("one set for all", one.worst, one.worst_default))
+    if tuning.question.metric == MARGIN:
+        margins = []
         for what, *both in shares:
             left, by_default = (100.0 * (1.0 - float(np.max(share))) for share in both)
             kept = "kept" if left >= 0.0 else "not kept"
-            told.append(f"{what} {left:.3g} %, {kept} (with the defaults {by_default:.3g} %)")
-        found.append(f"Least margin to the limits: {'; '.join(told)}.")
+            margins.append(f"{what} {left:.3g} %, {kept} (with the defaults {by_default:.3g} %)")
+        found.append(f"Least margin to the limits: {'; '.join(margins)}.")
     ratios = []
     for ratio, title in PRICES.items():
         if price is not None and ratio in price:
@@ -202,6 +198,9 @@ def conclusions(tuning: Tuning) -> list[str]:
 def notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how sure the search is."""
     found, drive, q = [], tuning.drive, tuning.question
+    if len(drive.mass_names) > 2:
+        load = drive.mass_names[drive.load_index]
+        found.append(f"gap: all gaps together, at the motor shaft; J2: inertia of {load} at its own shaft.")
     if tuning.schedule is not None:
         sure = int((tuning.schedule["agreement"] == q.restarts).sum())
         found.append(
@@ -210,24 +209,15 @@ def notes(tuning: Tuning) -> list[str]:
         if not bool(tuning.schedule["in_time"].all()):
             found.append("Cells that are not in time have the least delay that was found.")
     if tuning.between is not None:
+        beyond = 100 * float(tuning.between["excess"].max())
         found.append(
             f"Half way between the cells, with interpolated gains: {_metric(tuning)} "
-            f"{_between(tuning.between[tuning.metric])}, up to "
-            f"{100 * float(tuning.between['excess'].max()):.1f} % beyond the bound on the start time."
+            f"{_between(tuning.between[tuning.metric])}, up to {beyond:.1f} % beyond the bound on the start "
+            "time."
         )
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
-        found.append(
-            "Optimum: the cell's drive, its motor without lag, dead time and noise; terminal reached."
-        )
-    if drive.gear_ratio is not None:
-        gaps, inertias = (
-            " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
-            for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
-        )
-        found.append(
-            f"At the output shaft, ratio {short(float(drive.gear_ratio))}, without losses: gaps {gaps} rad, "
-            f"load inertias {inertias} kg m2; a torque there is the ratio times that at the motor."
-        )
+        optimum = "the cell's drive, its motor without lag, dead time and noise; terminal reached"
+        found.append(f"Optimum: {optimum}.")
     return [*found, *([f"{tuning.starts:,} starts."] if tuning.starts else [])]
 
 

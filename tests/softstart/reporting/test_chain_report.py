@@ -34,6 +34,7 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
         assert re.findall(r">([\d.]+)<", row[3]) == [f"{k:.3f}" for k in run.shaft_factors]
     for name in CHAIN.shaft_names:
         assert name in page
+    assert f"rise = {gentle.controller.rise:.6g} s" in text  # the parameters of each run
     assert page.count("<figure>") == 6
 
 
@@ -64,6 +65,7 @@ def test_the_optimum_lies_between_bound_and_strategy(monkeypatch):
 def test_lives_of_shafts_are_those_of_fatigue(made):
     page = Page(made.to_html()).text
     assert "Lives cannot be given: damping is missing in rotor - pinion" in page
+    assert "How long the shaft line lasts" not in page  # no chapter that only refuses
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report(damped, controllers=["take-up"], budget=0.0).to_html()
     found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])

@@ -69,9 +69,9 @@ def test_numbers_are_those_of_compare(read, hostile):
         assert cells["K_dyn"] == f"{row.run.k_dyn:.3f}"
         assert cells["K worn"] == f"{row.k_dyn_worn_gap:.3f}"
         assert cells["K light"] == f"{row.k_dyn_light_load:.3f}"
-        assert float(cells["start time s"]) == pytest.approx(row.run.start_time, rel=1e-3)
-        assert float(cells["peak N m"]) == pytest.approx(row.run.peak_torque, rel=1e-3)
-        lost = float(cells["start later s"].replace("\N{MINUS SIGN}", "-"))
+        assert float(cells["start time, s"]) == pytest.approx(row.run.start_time, rel=1e-3)
+        assert float(cells["peak, N m"]) == pytest.approx(row.run.peak_torque, rel=1e-3)
+        lost = float(cells["start later, s"].replace("\N{MINUS SIGN}", "-"))
         assert lost == pytest.approx(row.time_lost, abs=5e-4)
 
 

@@ -13,7 +13,7 @@ from softstart.reporting import report
 from softstart.reporting.document import templates
 from softstart.reporting.figures import limit_figure, traces_figure
 from softstart.reporting.limit import Limit
-from softstart.views.printed import units_of
+from softstart.views.numbers import units_of
 
 from .conftest import Page
 
