@@ -75,8 +75,8 @@ class Folder:
             if not (self.path / "zarr.json").exists():
                 raise self._target.foreign()
             raise self._target.error(
-                "these results were written by an earlier version of softstart or by another program, and a "
-                f"sweep cannot go on with them; {self._target.other}, or delete this one to begin again."
+                "it has no list of finished chunks that this version of softstart reads (an earlier version "
+                f"wrote another one); {self._target.other}, or delete this one to begin again."
             )
         with ExitStack() as stack:
             self._list = stack.enter_context(Records(self._target, self._inputs, ["part"]))

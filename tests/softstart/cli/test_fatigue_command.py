@@ -69,7 +69,7 @@ def test_files(place, done):
     ("more", "said"),
     [
         ((), "damping is missing in motor - load: an undamped shaft rattles without end"),
-        (("--estimate-damping", "teeth=3"), "write gears=N,couplings=N"),
+        (("--estimate-damping", "teeth=3"), "give numbers of gears and couplings"),
         (("--estimate-damping", "gears=x"), "whole number"),
         (("--slope", "steep"), "--slope"),
         (("--set", "shaft.damping=1", "--worn-gap", "0.1"), "wear widens the gap"),

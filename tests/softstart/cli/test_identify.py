@@ -44,7 +44,7 @@ def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> N
         (["identify", "nowhere.csv", "--drive", "crane-4amtkf"], "there is no such file"),
         (
             ["identify", "a.csv", "--drive", "crane-4amtkf", "--torque-is", "guess"],
-            '--torque-is = "guess": there is no such choice; there are measured and demand.',
+            "'--torque-is': 'guess' is not one of 'measured', 'demand'.",
         ),
         (
             ["plan", "crane-4amtkf", "--set", "load.kind=reactive", "--wanted", "gpa"],

@@ -59,7 +59,7 @@ def test_a_controller_of_ones_own(run):
         (("linear",), "Missing option '--controller'"),
         (("linear", "list.toml", "--controller", "ramp"), "a drive has one value"),
         ((*LOOP, "--param", "dampng=1"), "no such parameter"),
-        (("linear", "nosuch.toml", "--controller", "rampp", "--param", "x"), "write a key"),
+        (("linear", "--param", "x", "--controller", "ramp"), "write a key"),
         (("linear", "--controller", "own.py:Raises"), "failed"),
     ],
 )
