@@ -224,6 +224,7 @@ def optimum_figure(best: Optimum) -> Any:
         most = limit if problem.k_dyn is None else problem.k_dyn * problem.base_torque
         if most is not None:
             axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))  # "15 % less" is seen as that
         head(axes, title, "torque, N m")
 
     def speed(axes: Axes, run: Run) -> None:

@@ -218,6 +218,15 @@ def notes(tuning: Tuning) -> list[str]:
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
         optimum = "the cell's drive, its motor without lag, dead time and noise; terminal reached"
         found.append(f"Optimum: {optimum}.")
+    if drive.gear_ratio is not None:
+        gaps, inertias = (
+            " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
+            for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
+        )
+        found.append(
+            f"At the output shaft, ratio {short(float(drive.gear_ratio))}, without losses: gaps {gaps} rad, "
+            f"load inertias {inertias} kg m2; a torque there is the ratio times that at the motor."
+        )
     return [*found, *([f"{tuning.starts:,} starts."] if tuning.starts else [])]
 
 
