@@ -10,12 +10,12 @@ import pytest
 
 
 def run(page, module, expression, *arguments):
-    """An expression of the module's names, evaluated in the page; `a` are the arguments."""
+    """An expression that begins with a name of the module; `a` are the arguments."""
+    name = expression.partition("(")[0]
     return page.evaluate(
         f"""async (a) => {{
           const known = performance.getEntriesByType("resource").map((one) => one.name);
-          const found = known.find((one) => one.endsWith("/{module}.js"));
-          const {{ {expression.partition("(")[0]} }} = await import(found);
+          const {{ {name} }} = await import(known.find((one) => one.endsWith("/{module}.js")));
           return {expression};
         }}""",
         list(arguments),
@@ -31,13 +31,8 @@ def test_ticks_are_round_and_within_or_enclose(page):
 
 def test_packed_traces_are_read_between_their_points(page):
     rows = np.array([[0.0, 1.0, 3.0], [2.0, 4.0, 0.0], [5.0, 6.0, 7.0]], dtype="<f4")
-    packed = {
-        "channels": ["t", "T[0]", "w[0]"],
-        "worst": 0,
-        "motor": 0,
-        "data": base64.b64encode(rows).decode(),
-    }
-    trace = run(page, "trace", "unpack(...a)", packed)
+    packed = {"channels": ["t", "T[0]", "w[0]"], "worst": 0, "motor": 0}
+    trace = run(page, "trace", "unpack(...a)", packed | {"data": base64.b64encode(rows).decode()})
     plain = {name: trace[name] for name in ("t", "T", "w1")}
     assert plain == {"t": [0, 1, 3], "T": [2, 4, 0], "w1": [5, 6, 7]}
     assert [run(page, "trace", "indexAt(...a)", plain["t"], t) for t in (-1, 0, 0.5, 1, 9)] == [0, 0, 1, 1, 3]
@@ -54,5 +49,5 @@ def test_contours_lie_on_their_level(page):
     pieces = run(page, "map", "contour(...a)", rows, 0.25)
     radii = [math.hypot(x, y) / count for piece in pieces for x, y in piece]
     assert radii == pytest.approx([0.5] * len(radii), abs=1.0 / count**2)
-    ends = [tuple(round(v, 9) for v in end) for piece in pieces for end in piece]
+    ends = [tuple(np.round(end, 9)) for piece in pieces for end in piece]
     assert sum(ends.count(end) == 1 for end in ends) == 2  # one line, open at the two edges only

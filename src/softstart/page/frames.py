@@ -58,21 +58,27 @@ class Screen:
         self.follow()
 
     def follow(self) -> None:
-        """Fields and sliders are about the machine as it was loaded and the selected strategy, axes alike."""
+        """Fields, sliders and axes are about the machine as it was loaded and the selected strategy."""
         session = self.session
-        origin, controller = session.origin, session.controllers[session.selected]
-        about = origin, session.selected, type(controller)
+        origin, label = session.origin, session.selected
+        controller = session.controllers[label]
+        about = origin, label, type(controller)
         if self._about == about:
             return
         if self._about[0] is not origin:
-            self.axes = machines.axes_about(origin)
+            self.axes, self._machine = machines.axes_about(origin), machines.entries(origin)
             self.mistakes.clear()
         self._about = about
-        self.entries: Mapping[str, Entry] = machines.entries(origin)
         try:
-            self.entries = {**self.entries, **machines.strategy_entries(controller, origin)}
+            self._own = machines.strategy_entries(controller, origin, label)
         except Exception as error:  # a controller is anyone's code; its start has said what is wrong
             sentence_of(error)  # which is logged
+            self._own = {}
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """All fields by their paths: those of the machine, then those of the selected strategy."""
+        return {**self._machine, **self._own}
 
     @property
     def units(self) -> Units:
@@ -124,7 +130,7 @@ class Screen:
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": machine_fields(session, self.entries, units) | self._strategy_fields(found),
+            "fields": machine_fields(session, self._machine, units) | self._strategy_fields(found),
             "steps": session.steps,
             "drive": session.machine.name,
             "order": list(session.controllers),
@@ -140,28 +146,18 @@ class Screen:
             "here": (units.shown(gap, "rad"), inertia),
             "map_is_old": not self._map_is_right(),
         }
-        for part, place in (("groups", self._machine_groups()), ("strategy", self._strategy_groups())):
-            if self._is_new(part, place):
-                frame[part] = place
+        for part, known in (("groups", self._machine), ("strategy", self._own)):
+            groups = self._grouped(known)
+            if self._is_new(part, groups):
+                frame[part] = groups
         return frame
 
-    def _machine_groups(self) -> list[Frame]:
-        """The fields of the machine, by their groups; limits are folded where the machine has none."""
-        groups: dict[str, list[Frame]] = {machines.HEAD: []}
-        for path, one in self.entries.items():
-            if not path.startswith(STRATEGY):
-                groups.setdefault(one.group, []).append(described(one, self.units))
-        folded = "" if self.session.origin.limits else machines.LIMITS
-        return [{"title": title, "rows": rows, "folded": title == folded} for title, rows in groups.items()]
-
-    def _strategy_groups(self) -> list[Frame]:
-        """The fields of the selected strategy: those with a slider or a choice, then the others folded."""
-        own = [one for path, one in self.entries.items() if path.startswith(STRATEGY)]
-        main = [described(one, self.units) for one in own if one.scale or one.choices]
-        more = [described(one, self.units) for one in own if not (one.scale or one.choices)]
-        title = f"parameters of {self.session.selected}"
-        groups = [(title, main, False), ("more parameters" if main else title, more, bool(main))]
-        return [{"title": title, "rows": rows, "folded": folded} for title, rows, folded in groups if rows]
+    def _grouped(self, known: Mapping[str, Entry]) -> list[Frame]:
+        groups: dict[str, list[Frame]] = {}
+        for one in known.values():
+            groups.setdefault(one.group, []).append(described(one, self.units))
+        folded = (machines.MORE, "" if self.session.origin.limits else machines.LIMITS)
+        return [{"title": title, "rows": rows, "folded": title in folded} for title, rows in groups.items()]
 
     def _strategy_fields(self, found: Strategy) -> dict[str, Frame]:
         """The values with which the selected strategy starts; marks at its defaults and at tuned values."""
@@ -180,9 +176,7 @@ class Screen:
             and (known := session.ready(label)) is not None and known.run is not None
         ]  # fmt: skip
         shown = {}
-        for path, one in self.entries.items():
-            if not path.startswith(STRATEGY):
-                continue
+        for path, one in self._own.items():
             name = path.removeprefix(STRATEGY)
             given = getattr(controller, name)
             value = default.get(name) if given is None else given
@@ -262,9 +256,9 @@ class Screen:
         nominal = machine if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
         head = self._map_head(axes)
-        middle = axes.nearest(*machine.gap_and_inertia)[1]
+        away = np.abs(np.log(np.array(axes.inertias) / machine.gap_and_inertia[1]))  # nearest rows first
         self.sent.pop("map", None)  # from here on it has rows of both, if this is left half-way
-        rows = sorted(range(len(axes.inertias)), key=lambda index: (abs(index - middle), index))
+        rows = np.argsort(away, kind="stable").tolist()
         for index in rows:
             k: list[float | None] = []
             while len(k) < len(axes.gaps):
@@ -327,17 +321,8 @@ def numbers(values: Any) -> list[float | None]:
 
 def described(one: Entry, units: Units) -> Frame:
     """A field as the browser builds it; `text` says that it takes words alone."""
-    return {
-        "path": one.path,
-        "symbol": one.symbol,
-        "label": one.label,
-        "meaning": one.meaning,
-        "unit": unit(units.of(one.unit)),
-        "slider": one.scale is not None,
-        "choices": one.choices,
-        "words": one.words,
-        "text": not (one.unit or one.choices or one.path.startswith(STRATEGY)),
-    }
+    text = not (one.unit or one.choices or one.path.startswith(STRATEGY))
+    return vars(one) | {"unit": unit(units.of(one.unit)), "scale": one.scale is not None, "text": text}
 
 
 def field(one: Entry, text: str, value: Any, marks: Any, units: Units) -> Frame:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
+from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
 from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable
@@ -31,7 +32,7 @@ DELTA = "\N{GREEK SMALL LETTER DELTA}"
 
 HEAD = "Units"  # the group that stands in the head of the page
 UNITS = ("deg, rpm", "rad, rad/s", "arcmin, rpm", "mm on 80 mm, rpm")
-LIMITS = "Limits"  # the group that is folded where there are none
+LIMITS, MORE = "Limits", "more parameters"  # groups that are folded, limits where there are none
 # by table of a machine: its fields in their order; of a chain, a mass and a shaft take turns
 FIELDS: Mapping[str, str] = {
     "": "units name",
@@ -136,18 +137,13 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
     >>> gap.group, gap.symbol, gap.scale
     ('pinion - wheel shaft', '\N{GREEK SMALL LETTER DELTA}\N{SUBSCRIPT TWO}', Scale(low=0.0, high=0.8, ...))
     """
-    values, found = machine.by_path(), {}
-    numbers = range(1, len(machine.mass_names) + 1)
-    parts = [(f"{table}[{k}]", table, k) for k in numbers for table in ("mass", "shaft")]
-    for place, table, k in (
-        *((one, one, 0) for one in ("", "motor", "shaft")), *parts,
-        *((one, one, 0) for one in ("load", "start", "limits")),
-    ):  # fmt: skip
+    values, lumped, found = machine.by_path(), machine.lumped, {}
+    for place, table, k in _places(machine):
         for key in FIELDS[table].split():
             path, word = f"{place}.{key}".lstrip("."), f"{table}.{key}".lstrip(".")
             if path not in values or (k and not _has_field(place, key, values, k == machine.load_index + 1)):
                 continue
-            one = values[path][0]
+            one, value = values[path]
             group = table.capitalize() or (HEAD if key == "units" else type(machine).__name__)
             if k:
                 group = (machine.mass_names if table == "mass" else machine.shaft_names)[k - 1]
@@ -157,9 +153,20 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
                 path, group, LABELS.get(word, key.replace("_", " ")),
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), one.unit,
                 f"{one.meaning}; write for example {', '.join([*words, one.example])}", one.example,
-                () if one.unit else one.choices, words, one.default is None, _scale(place, key, machine),
+                () if one.unit else one.choices, words, one.default is None,
+                _scale(word, value, machine, lumped, k),
             )  # fmt: skip
     return found
+
+
+def _places(machine: Machine) -> list[tuple[str, str, int]]:
+    """The tables of a machine in their order; of a chain its masses and shafts with their numbers."""
+    numbers = range(1, len(machine.mass_names) + 1) if isinstance(machine, Chain) else ()
+    parts = [(f"{table}[{k}]", table, k) for k in numbers for table in ("mass", "shaft")]
+    plain = [
+        (table, table, 0) for table in FIELDS if table not in (("mass", "shaft") if parts else ("mass",))
+    ]
+    return [*plain[:2], *parts, *plain[2:]]
 
 
 def _has_field(place: str, key: str, values: Values, load: bool) -> bool:
@@ -170,35 +177,33 @@ def _has_field(place: str, key: str, values: Values, load: bool) -> bool:
     return key != "contact_law" and (key != "torque" or load or bool(values[f"{place}.torque"][1]))
 
 
-def _scale(place: str, key: str, origin: Machine) -> Scale | None:
-    """The slider of a main parameter, about the machine as it was loaded."""
-    lumped, values = origin.lumped, {path: value for path, (_, value) in origin.by_path().items()}
-    value, table = values[f"{place}.{key}".lstrip(".")], place.partition("[")[0]
-    motor = float(values["motor.starting_torque"])
-    ratio = 1.0  # speed of the part over that of the motor
-    if isinstance(origin, Chain) and place != table:
-        index = int(place[len(table) + 1 : -1]) - (values.get(f"{place}.side") != "after")
-        ratio = origin.speed_ratios()[index]
-    match table, key:
-        case "motor", "starting_torque":
+def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) -> Scale | None:
+    """The slider of a main parameter, about the machine as it was loaded; `k` numbers a part of a chain."""
+    drive: Any = origin.motor
+    motor, ratio = float(drive.starting_torque), 1.0
+    if isinstance(origin, Chain) and k:  # speed of the part over that of the motor
+        after = word.startswith("shaft") and origin.shafts[k - 1].side == "after"
+        ratio = origin.speed_ratios()[k - (not after)]
+    match word.split("."):
+        case ["motor", "starting_torque"]:
             weakest = rounded(min(max(1.1 * lumped.Mc, 0.1 * motor), 0.9 * motor), 2)
-            return Scale(weakest, max(float(values["motor.maximum_torque"]), motor))
-        case "motor", "torque_lag":
+            return Scale(weakest, max(float(drive.maximum_torque), motor))
+        case ["motor", "torque_lag"]:
             return Scale(0.0, rounded(max(0.02, 4.0 * value), 2))
-        case "start", "target_speed":
+        case ["start", "target_speed"]:
             return Scale(rounded(0.2 * value), rounded(2.0 * value))
-        case _, "inertia" | "stiffness":
+        case [_, "inertia" | "stiffness"]:
             return Scale(rounded(value / 5.0), rounded(value * 5.0), logarithmic=True)
-        case "shaft", "gap":
+        case ["shaft", "gap"]:
             return Scale(0.0, 4.0 * value or 0.1 / ratio)
-        case "shaft", "damping":
-            if place != table:
+        case ["shaft", "damping"]:
+            if k:
                 return Scale(0.0, rounded(5.0 * value))
             critical = 2.0 * math.sqrt(lumped.c * lumped.J1 * lumped.J2 / (lumped.J1 + lumped.J2))
             return Scale(0.0, rounded(max(0.3 * critical, 2.0 * value), 2))
-        case "shaft", "damping_ratio":
+        case ["shaft", "damping_ratio"]:
             return Scale(0.0, max(MOST_DAMPING, 2.0 * (value or 0.0)))
-        case "load" | "mass", "torque":  # up to nearly what the motor gives there
+        case ["load" | "mass", "torque"]:  # up to nearly what the motor gives there
             return Scale(min(0.0, 2.0 * value), rounded(max(0.95 * motor / ratio, 0.95 * abs(value)), 3))
     return None
 
@@ -216,11 +221,11 @@ def parameters_of(controller: Controller) -> list[Field[Any]]:
     return [one for one in given if one.metadata.get("choices") or one.metadata.get("kind") == "quantity"]
 
 
-def strategy_entries(controller: Controller, origin: Machine) -> Mapping[str, Entry]:
-    """The fields of a strategy; sliders go as far as tuning would.
+def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, Entry]:
+    """The fields of a strategy, those without a slider or choice last; sliders go as far as tuning would.
 
     >>> from softstart.controller import make_controller
-    >>> found = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"))
+    >>> found = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"), "s-curve")
     >>> found["strategy.rounding"].scale
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
@@ -231,14 +236,16 @@ def strategy_entries(controller: Controller, origin: Machine) -> Mapping[str, En
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
         if low < high:
             scales[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
+    main = [one for one in own if one.name in scales or one.metadata["choices"]] or own
     return {
         STRATEGY + one.name: Entry(
-            STRATEGY + one.name, "", one.name.replace("_", " "), "", about["unit"],
-            f"{about['meaning']}; default: {about['default'] or 'fixed'}",
-            "a value, or nothing for the default", tuple(about["choices"]), (), True, scales.get(one.name),
+            STRATEGY + one.name, f"parameters of {label}" if one in main else MORE,
+            one.name.replace("_", " "), "", one.metadata["unit"],
+            f"{one.metadata['meaning']}; default: {one.metadata['default'] or 'fixed'}",
+            "a value, or nothing for the default", tuple(one.metadata["choices"]), (), True,
+            scales.get(one.name),
         )
-        for one in own
-        if (about := one.metadata)
+        for one in [*main, *(one for one in own if one not in main)]
     }  # fmt: skip
 
 
@@ -281,18 +288,11 @@ def single(machine: Machine) -> Machine:
     return machine
 
 
-@dataclass(frozen=True)
-class Axes:
+class Axes(NamedTuple):
     """The gaps (rad) and load inertias (kg m2) of a map, ascending."""
 
     gaps: tuple[float, ...]
     inertias: tuple[float, ...]
-
-    def nearest(self, gap: float, inertia: float) -> tuple[int, int]:
-        """Indices of the cell in which a drive lies: the gap's scale is even, the inertia's logarithmic."""
-        column = int(np.argmin(np.abs(np.array(self.gaps) - gap)))
-        row = int(np.argmin(np.abs(np.log(np.array(self.inertias) / inertia))))
-        return column, row
 
 
 def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> Axes | None:

@@ -325,7 +325,7 @@ def test_parameters_of_the_selected_strategy_are_fields():
     frame = screen.first()
     main, more = frame["strategy"]
     assert (main["title"], more["title"]) == ("parameters of ramp", "more parameters")
-    assert [row["path"] for row in main["rows"] if row["slider"]] == [
+    assert [row["path"] for row in main["rows"] if row["scale"]] == [
         "strategy.initial", "strategy.time", "strategy.full_torque"
     ]  # fmt: skip
     default = session.result("ramp").run.controller.time

@@ -120,13 +120,6 @@ def test_with_the_controller_kept_the_map_refers_to_the_drive_of_the_moment():
         assert k == simulate(other, made, fitted_to=CRANE, base=CRANE).k_dyn
 
 
-def test_the_cell_of_a_drive_is_the_nearest_one():
-    axes = axes_about(CRANE)
-    for column, row in ((0, 0), (7, 3), (24, 16)):
-        assert axes.nearest(axes.gaps[column], axes.inertias[row]) == (column, row)
-    assert axes.nearest(99.0, 1e-9) == (24, 0)
-
-
 @given(st.sampled_from(sorted(SCALES)), st.integers(0, STEPS))
 def test_a_slider_shows_the_position_it_was_set_to(name, position):
     scale = SCALES[name]

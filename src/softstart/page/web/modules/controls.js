@@ -27,7 +27,7 @@ export class Controls {
     return element("fieldset", {}, element("legend", {}, title), ...lines);
   }
 
-  row({ path, symbol, label, meaning, unit, slider, choices, words, text }) {
+  row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {
     const id = `field-${path.replaceAll(/[.[]/g, "-").replaceAll("]", "")}`;
     const own = path.startsWith("strategy.");
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
