@@ -126,8 +126,8 @@ def at_rest(page: Any) -> None:
     """Wait until the server has sent all that it computes at rest, the map included, and it is drawn."""
     page.wait_for_function(f"""() => {{
       const {{ map, advice, waiting }} = {INSTRUMENT};
-      const mapped = map.whole.hidden || (map.rows?.every(Boolean) && map.fresh.size === map.rows.length);
-      return mapped && !waiting && advice.textContent && !advice.classList.contains("old");
+      const told = advice.textContent && !advice.classList.contains("old");
+      return (map.whole.hidden || map.ready) && !waiting && told;
     }}""")
 
 
@@ -143,6 +143,22 @@ def answered(page: Any) -> None:
 def drawn(page: Any) -> None:
     """Wait for the second picture from now on: what was to be drawn is."""
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def written(page: Any) -> list[dict[str, Any]]:
+    """What stands in the plots when they are drawn again: each text, its place and its width."""
+    found: list[dict[str, Any]] = page.evaluate(f"""() => {{
+      const found = [], own = CanvasRenderingContext2D.prototype, write = own.fillText;
+      own.fillText = function (text, x, y) {{
+        found.push({{ text, x, y, wide: this.measureText(text).width, align: this.textAlign }});
+        write.call(this, text, x, y);
+      }};
+      {INSTRUMENT}.redraw();
+      {INSTRUMENT}.draw();
+      own.fillText = write;
+      return found;
+    }}""")
+    return found
 
 
 def choose(page: Any, strategy: str) -> None:

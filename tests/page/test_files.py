@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from tests.page.conftest import SOFTSTART, at_rest, comes_to, settled, wait_for_rows
+from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, settled, wait_for_rows
 from tests.patience import patient
 
 from softstart import Chain, DataSheet, Drive, InputError, compare, simulate
@@ -338,7 +338,7 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any, screenshot: Any) 
         max(-1.0, min(2.0 * angle / gap, 1.0))
         for angle, gap in zip(twist, wider.at_motor_shaft().gap, strict=True)
     ]
-    pins = [float(pin) for pin in files.locator(".scheme").get_attribute("data-pin").split()]
+    pins = [one["share"] for one in files.evaluate(f"{INSTRUMENT}.scheme.states")]
     assert pins == pytest.approx(shares, abs=0.05)
     for width, height in ((1280, 800), (1920, 1080)):
         files.set_viewport_size({"width": width, "height": height})

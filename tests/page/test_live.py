@@ -9,7 +9,7 @@ from threading import Timer
 from typing import Any
 
 import pytest
-from tests.page.conftest import answered, at_rest, choose, comes_to, drawn, settled, wait_for_rows
+from tests.page.conftest import answered, at_rest, choose, comes_to, drawn, settled, wait_for_rows, written
 
 from softstart import Chain, Drive, simulate
 from softstart.controller import make_controller
@@ -271,7 +271,7 @@ def test_older_frames_change_neither_what_was_written_nor_what_was_selected(page
     instrument = 'const { instrument } = window.getElement(document.querySelector(".instrument"));'
     written = field(page, "shaft.gap").evaluate(f"""(field) => {{
       {instrument}
-      const before = {{ ...instrument.state.fields, "shaft.gap": ["0.6", 180, ""] }};
+      const before = {{ ...instrument.state.fields, "shaft.gap": {{ text: "0.6", position: 180 }} }};
       field.value = "700 mrad";
       for (const what of ["input", "change"]) field.dispatchEvent(new Event(what));
       instrument.controls.show(before, {{}}, instrument.state.stamp);  // of a slide that came before
@@ -311,7 +311,7 @@ def test_a_field_shows_what_the_drive_has_and_a_slider_where_it_is(page):
     page.wait_for_function("""() => {
       const [slider, field] = document.querySelectorAll('[data-path="motor.starting_torque"] input');
       const { rows } = window.getElement(document.querySelector(".instrument")).instrument.controls;
-      return Number(slider.value) === rows.get("motor.starting_torque").position && field.value > 50;
+      return Number(slider.value) === rows.get("motor.starting_torque").shown.position && field.value > 50;
     }""")
 
 
@@ -416,11 +416,7 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit, screenshot):
       return plots.reference.peak[1];
     }""")
     assert peak == direct.peak_torque
-    with page.expect_download() as download:
-        page.get_by_text("SVG", exact=True).click()
-    svg = Path(download.value.path()).read_text(encoding="utf-8")
-    assert f"reference: direct, shaft.gap 28.6479 deg, {direct.k_dyn:.3f}" in svg
-    assert svg.count('stroke-width="4.5" stroke-linejoin="round"/>') == 4  # in three plots, the legend
+    assert "reference" in [one["text"] for one in written(page)]
     at_rest(page)  # then its bench is kept
     page.wait_for_function(
         "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
@@ -431,7 +427,6 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit, screenshot):
         screenshot(page, f"reference-{width}")
         wide = "one => one.scrollWidth - one.clientWidth"
         assert page.locator(".strategies").evaluate(wide) == 0
-        comes_to(page.locator(".strategy .other >> visible=true").count, 0)  # there is no column for it
     linked = opened(visit(url=page.url, select=""))
     linked.locator(".strategies tfoot").wait_for(state="visible")
     page.reload()
@@ -493,20 +488,6 @@ def test_no_number_has_more_digits_than_a_reader_can_use(page):
     assert len(texts) > 20
     shown = [text for text in texts if "softstart-" not in text]
     assert not [text for text in shown if re.search(r"\d\.?\d{9,}|\d\.\d{8,}", text)]
-
-
-def test_a_printed_page_has_plots_table_and_data_within_its_width(page):
-    """Nothing that is pressed is on paper; the picture of it was looked at."""
-    at_rest(opened(page))
-    page.emulate_media(media="print")
-    page.set_viewport_size({"width": 700, "height": 990})  # A4 without its margins
-    for part in (".plots canvas", ".map canvas", ".strategies table", ".advice", ".controls", ".figure"):
-        place = page.locator(part).bounding_box()
-        assert place["width"] > 150, part
-        assert place["x"] + place["width"] <= 700, part
-    for part in (".panels", ".player", ".theme", ".steps", '[data-path="shaft.gap"] input[type=range]'):
-        assert not page.locator(part).is_visible(), part
-    assert page.evaluate("document.documentElement.scrollWidth") <= 700
 
 
 def test_colours_follow_the_system_and_the_switch(page):

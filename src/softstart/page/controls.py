@@ -9,7 +9,7 @@ from typing import Any
 
 from softstart.errors import InputError
 from softstart.page import links
-from softstart.page.frames import SERVER, STRATEGY, Screen
+from softstart.page.frames import SERVER, Screen
 from softstart.page.machines import DIGITS, NODE_DIGITS, Entry
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
@@ -22,19 +22,17 @@ LONGEST_TEXT = 200  # letters in a field
 class Delay:
     """How late messages come, in s: over the quickest one of late, since the two clocks are not set alike.
 
-    >>> delay = Delay(clock=iter([10.0, 10.5, 11.4]).__next__)
-    >>> [round(delay.of(stamp), 3) for stamp in (3.0, 3.5, 4.0)]
+    >>> delay = Delay()
+    >>> [round(delay.of(stamp, now), 3) for stamp, now in ((3.0, 10.0), (3.5, 10.5), (4.0, 11.4))]
     [0.0, 0.0, 0.4]
     """
 
-    def __init__(self, clock: Callable[[], float] = perf_counter) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._offset = math.inf
         self._last = 0.0
 
-    def of(self, stamp: float) -> float:
-        """The delay of a message with the sender's time on it."""
-        now = self._clock()
+    def of(self, stamp: float, now: float) -> float:
+        """The delay of a message with the sender's time on it that was read now."""
         self._offset = min(now - stamp, self._offset + DRIFT * (now - self._last))
         self._last = now
         return now - stamp - self._offset
@@ -78,14 +76,14 @@ class Controls:
         arguments = {name: message.get(name) for name in kinds}
         if act is None or not all(_is_a(kind, arguments[name]) for name, kind in kinds.items()):
             return
+        self._screen.follow()
         # without a field, the message appears next to the figure
-        path = str(arguments.get("path"))
-        place = path if path in self._screen.entries or path in self._screen.strategy_paths() else ""
+        place = path if (path := str(arguments.get("path"))) in self._screen.entries else ""
         version = self._session.version
         stamp: Any = message.get("stamp")
         if _is_a(float, stamp):
             self._screen.stamp = float(stamp)
-            self._screen.late = self._delay.of(float(stamp) / 1000.0)
+            self._screen.late = self._delay.of(float(stamp) / 1000.0, perf_counter())
         try:
             act(*arguments.values())
         except Exception as error:  # a drive may refuse anything
@@ -95,50 +93,33 @@ class Controls:
         if self._session.version == version:
             self._poke()
 
-    def _slide(self, path: str, position: float) -> None:
-        own = path in self._screen.strategy_paths()
-        name = _own(path) if own else path
-        scale = (self._screen.strategy_scales if own else self._screen.scales).get(name)
-        if scale is None:
-            raise InputError(f"{path}: there is no such slider.")
-        value, units, si = scale.value(position), self._screen.units, self._screen.si(path)
-        if units.of(si) != si:
-            value = units.rounded(value, si, DIGITS)
-        if own:
-            self._session.set_parameter(name, value, gesture=path)
-        else:
-            self._session.set_all({path: value}, gesture=path)
-
-    def _edit(self, path: str, text: str) -> None:
-        own = path in self._screen.strategy_paths()
-        example = "a value, or nothing for the default" if own else self._entry(path).parameter.example
-        if len(text) > LONGEST_TEXT:
-            raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {example}.")
-        words = self._screen.units.typed(" ".join(text.split()), self._screen.si(path))
-        if own:
-            self._session.set_parameter(_own(path), words or None)
-        elif words:
-            self._session.set(path, words)
-        elif self._entry(path).parameter.default is None:
-            self._session.clear(path)
-        else:
-            raise InputError(f"{path}: the field is empty; write for example {example}.")
-
-    def _reset(self, path: str) -> None:
-        """A parameter of the machine as it was loaded, or the default of one of the strategy."""
-        if path in self._screen.strategy_paths():
-            self._session.set_parameter(_own(path), None)
-        else:
-            loaded = self._session.origin.by_path()[self._entry(path).path][1]
-            if loaded is None:
-                self._session.clear(path)
-            else:
-                self._session.set(path, loaded)
-
     def _entry(self, path: str) -> Entry:
         if path not in self._screen.entries:
             raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
         return self._screen.entries[path]
+
+    def _slide(self, path: str, position: float) -> None:
+        entry, units = self._entry(path), self._screen.units
+        if entry.scale is None:
+            raise InputError(f"{path}: there is no such slider.")
+        value = entry.scale.value(position)
+        if units.of(entry.unit) != entry.unit:
+            value = units.rounded(value, entry.unit, DIGITS)
+        self._session.set(path, value, gesture=path)
+
+    def _edit(self, path: str, text: str) -> None:
+        entry = self._entry(path)
+        if len(text) > LONGEST_TEXT:
+            raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {entry.example}.")
+        words = self._screen.units.typed(" ".join(text.split()), entry.unit)
+        if not (words or entry.optional):
+            raise InputError(f"{path}: the field is empty; write for example {entry.example}.")
+        self._session.set(path, words or None)
+
+    def _reset(self, path: str) -> None:
+        """A parameter of the machine as it was loaded, or the default of one of the strategy."""
+        _, loaded = self._session.origin.by_path().get(self._entry(path).path, (None, None))
+        self._session.set(path, loaded)
 
     def _leave(self, path: str) -> None:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
@@ -150,7 +131,7 @@ class Controls:
 
     def _hello(self, kept: object, link: object) -> None:
         """A page that is loaded anew goes on with the bench that its tab has kept, or that of its address."""
-        self._screen.forget()
+        self._screen.sent.clear()
         if isinstance(kept, Mapping) and kept.get("server") == SERVER and kept.get("link") == link:
             known = links.kept(str(kept.get("bench")), str(link))
             if known is not None:
@@ -165,11 +146,6 @@ class Controls:
     def _window(self, begin: float, end: float) -> None:
         """What of the starts is seen, in s; all of it if it has no length."""
         self._screen.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
-
-
-def _own(path: str) -> str:
-    """The name of a parameter of the selected strategy."""
-    return path.removeprefix(STRATEGY)
 
 
 def _is_a(kind: type, value: object) -> bool:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
 
+from softstart.page.frames import Frame, Screen
 from softstart.page.sentences import log, sentence_of
 
 WINDOW = 3  # frames sent and not yet drawn
@@ -19,31 +19,11 @@ GLANCES = 60  # small frames between two that were drawn, a second of a hand: mo
 PATIENCE = 1.0  # s, after which a frame that was never answered is taken as lost
 REST = 0.12  # s without a change, after which what is slow or secondary is computed
 
-Frame = dict[str, Any]
-
-
-class Work(Protocol):
-    """What is computed: in frames now, in slices when the drive has come to rest."""
-
-    @property
-    def version(self) -> int:
-        """Counts the changes."""
-
-    def glance(self) -> Frame | None:
-        """The one figure that follows every step of the hand, if it is quick to compute."""
-
-    def first(self) -> Frame:
-        """The frame that must follow the hand."""
-
-    def others(self) -> Iterator[Frame | None]:
-        """Further frames of the same drive; each step takes a few ms; may be left at any step."""
-
-    def at_rest(self) -> Iterator[Frame | None]:
-        """What can wait: each step takes a few ms; may be left at any step, and is begun anew then."""
+__all__ = ["Frame", "Live"]
 
 
 class Live:
-    """Sends frames of `work` by `send(number, frame)` as long as `run` runs.
+    """Sends frames of a screen by `send(number, frame)` as long as `run` runs.
 
     `poke` says that something changed, `drawn(number)` that the browser has drawn a frame. Frames are
     numbered from 1; a glance has the number 0 and is not answered.
@@ -51,15 +31,13 @@ class Live:
 
     def __init__(
         self,
-        work: Work,
+        screen: Screen,
         send: Callable[[int, Frame], None],
         trouble: Callable[[str], None] = log.error,
-        rest: float = REST,
     ) -> None:
-        self._work = work
+        self._screen = screen
         self._send = send
         self._trouble = trouble
-        self._rest = rest
         self._changed = asyncio.Event()
         self._drawn = asyncio.Event()
         self._sent = 0
@@ -72,7 +50,7 @@ class Live:
         if self._glances >= GLANCES:
             return
         try:
-            frame = self._work.glance()
+            frame = self._screen.glance()
         except Exception as error:  # told with the frame that follows, if it is still so
             log.debug("no glance", exc_info=error)
             return
@@ -105,13 +83,13 @@ class Live:
     async def _follow(self) -> None:
         await self._room()
         self._changed.clear()  # the frame below is of the drive as it is now
-        self._put(self._work.first())
-        if await self._going_on(self._work.others()):
+        self._put(self._screen.first())
+        if await self._going_on(self._screen.others()):
             return
         try:
-            await asyncio.wait_for(self._changed.wait(), self._rest)
+            await asyncio.wait_for(self._changed.wait(), REST)
         except TimeoutError:
-            await self._going_on(self._work.at_rest())
+            await self._going_on(self._screen.at_rest())
 
     async def _going_on(self, steps: Iterator[Frame | None]) -> bool:
         """Take the steps one by one; True if something changed meanwhile, and the rest was left."""

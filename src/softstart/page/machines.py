@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.elements import Shaft
-from softstart.chain.machines import Machine, varied
+from softstart.chain.machines import Machine, Values, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
-from softstart.drive import PARAMETERS, Drive
+from softstart.controller.tuned import Tuned
+from softstart.drive import Drive
+from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
-from softstart.input.parameters import Parameter
 from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable
 
@@ -27,180 +26,45 @@ NODE_DIGITS = 6  # of the gaps and inertias of a map
 SAME = 12  # digits in which two places of a map are one
 GAPS, INERTIAS = 25, 17  # of the map
 MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
-ZETA = "\N{GREEK SMALL LETTER ZETA}"
 MOST_DAMPING = 0.2  # damping ratio of a shaft, by its slider: geared trains have 0.01 to 0.06
+STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
+DELTA = "\N{GREEK SMALL LETTER DELTA}"
 
 HEAD = "Units"  # the group that stands in the head of the page
 UNITS = ("deg, rpm", "rad, rad/s", "arcmin, rpm", "mm on 80 mm, rpm")
-LIMITS = "Limits"  # the group that is folded where there are none
-
-# by group: names of the parameters of a drive, and what stands before the field
-GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
-    HEAD: (("units", "units"),),
-    "Drive": (("name", "name"),),
-    "Motor": (
-        ("starting_torque", "starting torque"),
-        ("motor_inertia", "inertia"),
-        ("torque_lag", "torque lag"),
-        ("maximum_torque", "largest torque"),
-        ("minimum_torque", "braking torque"),
-        ("torque_rate", "torque rate"),
-        ("computing_delay", "dead time"),
-        ("motor_friction", "friction"),
-        ("motor_viscous_friction", "viscous friction"),
-        ("encoder_lines", "encoder lines"),
-        ("torque_noise", "torque noise"),
-    ),
-    "Shaft": (
-        ("gap", "total gap"),
-        ("stiffness", "stiffness"),
-        ("damping", "damping"),
-        ("contact_law", "contact law"),
-    ),
-    "Load": (
-        ("load_inertia", "inertia"),
-        ("load_torque", "torque"),
-        ("load_kind", "kind"),
-        ("load_viscous_friction", "viscous friction"),
-    ),
-    "Start": (
-        ("target_speed", "target speed"),
-        ("start_position", "position"),
-        ("brake", "brake"),
-        ("release", "release"),
-        ("initial_load_speed", "speed before"),
-    ),
-    LIMITS: (
-        ("permissible_torque", "shaft torque"),
-        ("permissible_start_time", "start time"),
-        ("starts_per_hour", "starts per hour"),
-        ("required_life", "life"),
-        ("fatigue_slope", "slope of S-N"),
-        ("fatigue_torque", "S-N torque"),
-        ("fatigue_cycles", "S-N cycles"),
-    ),
-}  # fmt: skip
-SYMBOLS = {
-    "starting_torque": "Ms",
-    "motor_inertia": "J\N{SUBSCRIPT ONE}",
-    "torque_lag": "\N{GREEK SMALL LETTER TAU}",
-    "gap": "\N{GREEK SMALL LETTER DELTA}",
-    "stiffness": "c",
-    "damping": "d",
-    "start_position": "\N{GREEK SMALL LETTER THETA}",
-    "load_inertia": "J\N{SUBSCRIPT TWO}",
-    "load_torque": "Mc",
-    "target_speed": "\N{GREEK SMALL LETTER OMEGA}",
+LIMITS, MORE = "Limits", "more parameters"  # groups that are folded, limits where there are none
+# by table of a machine: its fields in their order; of a chain, a mass and a shaft take turns
+FIELDS: Mapping[str, str] = {
+    "": "units name",
+    "motor": "starting_torque inertia torque_lag maximum_torque minimum_torque torque_rate computing_delay "
+    "friction viscous_friction encoder_lines torque_noise",
+    "mass": "inertia torque",
+    "shaft": "gap stiffness damping damping_ratio contact_law permissible_torque",
+    "load": "inertia torque kind viscous_friction",
+    "start": "target_speed position brake release initial_load_speed",
+    "limits": "shaft_torque start_time starts_per_hour life fatigue.slope fatigue.torque fatigue.cycles",
 }
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One field of the page: what `--set` calls it, its parameter, its group, and what stands before it."""
-
-    path: str
-    parameter: Parameter
-    group: str
-    label: str
-    symbol: str
-
-    @property
-    def suggestions(self) -> tuple[str, ...]:
-        """Texts that a field of words offers."""
-        return UNITS if self.path == "units" else ()
-
-
-def entries(machine: Machine) -> Mapping[str, Entry]:
-    """The fields of a machine by their paths, in their order on the page.
-
-    >>> list(entries(Drive.load("crane-4amtkf")))[:3]
-    ['units', 'name', 'motor.starting_torque']
-    >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].group
-    'pinion - wheel shaft'
-    """
-    known = machine.by_path()
-    rows = _rows_of_chain(machine) if isinstance(machine, Chain) else _rows_of_drive()
-    made = (Entry(path, known[path][0], *words) for path, *words in rows if path in known)
-    return MappingProxyType({one.path: one for one in made})
-
-
-def _rows_of_drive() -> Iterator[tuple[str, str, str, str]]:
-    """Path, group, label and symbol of each field of a drive."""
-    for group, rows in GROUPS.items():
-        for name, label in rows:
-            yield PARAMETERS[name].path, group, label, SYMBOLS.get(name, "")
-
-
-def _rows_of_chain(chain: Chain) -> Iterator[tuple[str, str, str, str]]:
-    """The same of a chain: its motor, then masses and shafts in their order."""
-    yield "units", HEAD, "units", ""
-    yield "name", "Chain", "name", ""
-    for name, label in GROUPS["Motor"]:
-        yield f"motor.{name}", "Motor", label, SYMBOLS.get(name, "")
-    for i, mass in enumerate(chain.masses):
-        yield f"mass[{i + 1}].inertia", mass.name, "inertia", f"J{_below(i)}"
-        if mass.torque or i == chain.load_index:
-            yield f"mass[{i + 1}].torque", mass.name, "load torque", f"M{_below(i)}"
-        if i < len(chain.shafts):
-            yield from _rows_of_shaft(chain.shafts[i], i, chain.shaft_names[i])
-    for name, label in (("target_speed", "target speed"), ("position", "position")):
-        yield f"start.{name}", "Start", label, SYMBOLS.get(name, "")
-
-
-def _rows_of_shaft(shaft: Shaft, index: int, group: str) -> Iterator[tuple[str, str, str, str]]:
-    where = f"shaft[{index + 1}]"
-    yield f"{where}.gap", group, "total gap", f"{SYMBOLS['gap']}{_below(index)}"
-    if not shaft.rigid:
-        yield f"{where}.stiffness", group, "stiffness", f"c{_below(index)}"
-        if shaft.damping > 0.0:
-            yield f"{where}.damping", group, "damping", f"d{_below(index)}"
-        else:
-            yield f"{where}.damping_ratio", group, "damping ratio", f"{ZETA}{_below(index)}"
-    yield f"{where}.permissible_torque", group, "permissible", ""
-
-
-def _below(index: int) -> str:
-    """The number of a mass or shaft as a subscript."""
-    return "".join(chr(ord("\N{SUBSCRIPT ZERO}") + int(digit)) for digit in str(index + 1))
-
-
-def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
-    """The machine with changes as typed, by the paths of their parameters.
-
-    >>> changed(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
-    0.03490...
-    """
-    if isinstance(machine, Chain):
-        return Chain.from_toml(machine.to_toml(), also=settings)
-    return machine.with_settings(f"{path}={text}" for path, text in settings.items())
-
-
-def without(machine: Machine, path: str) -> Machine:
-    """The machine without a value that it need not have: a limit, or what follows another parameter then.
-
-    >>> drive = Drive.load("crane-4amtkf").with_settings(["limits.shaft_torque=70"])
-    >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
-    None
-    """
-    knob = machine.knob(path)
-    assert knob is not None
-    return machine.with_values({knob.name: None})
-
-
-def machine_from(text: str, where: str = "") -> Machine:
-    """The drive or the chain of a TOML text; a chain has tables [[mass]]."""
-    return (Chain if is_chain_text(text) else Drive).from_toml(text, where=where)
-
-
-def single(machine: Machine) -> Machine:
-    """The machine if the page can start it; InputError if nothing moves it."""
-    if machine.motor is None:
-        raise InputError("[motor] is missing: the page starts the chain by its motor; add it to the file.")
-    if machine.target_speed is None:
-        raise InputError(
-            "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
-        )
-    return machine
+# what stands before a field, where that is not its key
+LABELS = {
+    "motor.maximum_torque": "largest torque",
+    "motor.minimum_torque": "braking torque",
+    "motor.computing_delay": "dead time",
+    "mass.torque": "load torque",
+    "shaft.gap": "total gap",
+    "shaft.permissible_torque": "permissible",
+    "start.initial_load_speed": "speed before",
+    "limits.fatigue.slope": "slope of S-N",
+    "limits.fatigue.torque": "S-N torque",
+    "limits.fatigue.cycles": "S-N cycles",
+}
+SYMBOLS = {
+    "motor.starting_torque": "Ms", "motor.inertia": "J1", "motor.torque_lag": "\N{GREEK SMALL LETTER TAU}",
+    "mass.inertia": "J", "mass.torque": "M", "load.inertia": "J2", "load.torque": "Mc",
+    "shaft.gap": DELTA, "shaft.stiffness": "c", "shaft.damping": "d",
+    "shaft.damping_ratio": "\N{GREEK SMALL LETTER ZETA}",
+    "start.target_speed": "\N{GREEK SMALL LETTER OMEGA}", "start.position": "\N{GREEK SMALL LETTER THETA}",
+}  # fmt: skip
+BELOW = {ord(str(digit)): chr(ord("\N{SUBSCRIPT ZERO}") + digit) for digit in range(10)}
 
 
 def rounded(value: float, digits: int = DIGITS) -> float:
@@ -243,100 +107,192 @@ class Scale:
         return round(STEPS * min(max(share, 0.0), 1.0))
 
 
-def scales_about(origin: Machine) -> Mapping[str, Scale]:
-    """The sliders of the main parameters, about the machine as it was loaded; by path of the parameter.
+@dataclass(frozen=True)
+class Entry:
+    """One field of the page: what `--set` calls it, its group, what stands before it, its unit in SI.
 
-    >>> scales_about(Drive.load("crane-4amtkf"))["shaft.gap"]
-    Scale(low=0.0, high=2.0, logarithmic=False)
-    >>> scales_about(Chain.load("crane-4-mass"))["shaft[1].gap"]
-    Scale(low=0.0, high=0.4, logarithmic=False)
+    `choices` are all that it takes, `words` what it offers beside numbers. `optional`: an empty field takes
+    the value back. `scale` is that of its slider, if it has one.
     """
-    motor: Any = origin.motor
-    Ms, highest, target = (
-        float(motor.starting_torque),
-        float(motor.maximum_torque),
-        float(origin.target_speed or 1.0),
-    )
-    weakest = rounded(min(max(1.1 * origin.lumped.Mc, 0.1 * Ms), 0.9 * Ms), 2)
-    found = {
-        "motor.starting_torque": Scale(weakest, max(highest, Ms)),
-        "motor.torque_lag": Scale(0.0, rounded(max(0.02, 4.0 * float(motor.torque_lag)), 2)),
-        "start.target_speed": Scale(rounded(0.2 * target), rounded(2.0 * target)),
-    }
-    if isinstance(origin, Chain):
-        ratios = origin.speed_ratios()
-        for i, mass in enumerate(origin.masses):
-            found[f"mass[{i + 1}].inertia"] = _about(mass.inertia)
-        load = origin.load_index
-        found[f"mass[{load + 1}].torque"] = _torques(origin.masses[load].torque, Ms / ratios[load])
-        for i, shaft in enumerate(origin.shafts, 1):
-            at = ratios[i - 1 if shaft.side == "before" else i]
-            found[f"shaft[{i}].gap"] = _gaps(shaft.gap, 0.1 / at)
-            if not shaft.rigid:
-                found[f"shaft[{i}].stiffness"] = _about(shaft.stiffness)
-                if shaft.damping > 0.0:
-                    found[f"shaft[{i}].damping"] = Scale(0.0, rounded(5.0 * shaft.damping))
-                else:
-                    most = max(MOST_DAMPING, 2.0 * (shaft.damping_ratio or 0.0))
-                    found[f"shaft[{i}].damping_ratio"] = Scale(0.0, most)
-        return MappingProxyType(found)
-    J1, J2, c, d = float(origin.J1), float(origin.J2), float(origin.c), float(origin.d)
-    critical = 2.0 * math.sqrt(c * J1 * J2 / (J1 + J2))
-    return MappingProxyType(
-        found
-        | {
-            "motor.inertia": _about(J1),
-            "shaft.stiffness": _about(c),
-            "shaft.damping": Scale(0.0, rounded(max(0.3 * critical, 2.0 * d), 2)),
-            "shaft.gap": _gaps(float(origin.gap), 0.1),
-            "load.inertia": _about(J2),
-            "load.torque": _torques(float(origin.Mc), Ms),
-        }
-    )
+
+    path: str
+    group: str
+    label: str
+    symbol: str
+    unit: str
+    meaning: str
+    example: str
+    choices: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+    optional: bool = False
+    scale: Scale | None = None
 
 
-def _about(value: float) -> Scale:
-    return Scale(rounded(value / 5.0), rounded(value * 5.0), logarithmic=True)
+def entries(machine: Machine) -> Mapping[str, Entry]:
+    """The fields of a drive or chain by their paths, in their order on the page.
+
+    >>> list(entries(Drive.load("crane-4amtkf")))[:3]
+    ['units', 'name', 'motor.starting_torque']
+    >>> gap = entries(Chain.load("crane-4-mass"))["shaft[2].gap"]
+    >>> gap.group, gap.symbol, gap.scale
+    ('pinion - wheel shaft', '\N{GREEK SMALL LETTER DELTA}\N{SUBSCRIPT TWO}', Scale(low=0.0, high=0.8, ...))
+    """
+    values, lumped, found = machine.by_path(), machine.lumped, {}
+    for place, table, k in _places(machine):
+        for key in FIELDS[table].split():
+            path, word = f"{place}.{key}".lstrip("."), f"{table}.{key}".lstrip(".")
+            if path not in values or (k and not _has_field(place, key, values, k == machine.load_index + 1)):
+                continue
+            one, value = values[path]
+            group = table.capitalize() or (HEAD if key == "units" else type(machine).__name__)
+            if k:
+                group = (machine.mass_names if table == "mass" else machine.shaft_names)[k - 1]
+            symbol = SYMBOLS.get(word, "")
+            words = UNITS if path == "units" else one.choices if one.unit else ()
+            found[path] = Entry(
+                path, group, LABELS.get(word, key.replace("_", " ")),
+                f"{symbol}{k if k and symbol else ''}".translate(BELOW), one.unit,
+                f"{one.meaning}; write for example {', '.join([*words, one.example])}", one.example,
+                () if one.unit else one.choices, words, one.default is None,
+                _scale(word, value, machine, lumped, k),
+            )  # fmt: skip
+    return found
 
 
-def _gaps(gap: float, otherwise: float) -> Scale:
-    return Scale(0.0, 4.0 * gap if gap > 0.0 else otherwise)
+def _places(machine: Machine) -> list[tuple[str, str, int]]:
+    """The tables of a machine in their order; of a chain its masses and shafts with their numbers."""
+    numbers = range(1, len(machine.mass_names) + 1) if isinstance(machine, Chain) else ()
+    parts = [(f"{table}[{k}]", table, k) for k in numbers for table in ("mass", "shaft")]
+    plain = [
+        (table, table, 0) for table in FIELDS if table not in (("mass", "shaft") if parts else ("mass",))
+    ]
+    return [*plain[:2], *parts, *plain[2:]]
 
 
-def _torques(torque: float, motor: float) -> Scale:
-    """Load torques up to nearly what the motor gives there."""
-    return Scale(min(0.0, 2.0 * torque), rounded(max(0.95 * motor, 0.95 * abs(torque)), 3))
+def _has_field(place: str, key: str, values: Values, load: bool) -> bool:
+    """Whether a value of a mass or shaft has a field: not what a rigid shaft lacks; damping in one way."""
+    if key in ("stiffness", "damping", "damping_ratio"):
+        other = "damping_ratio" if values[f"{place}.damping"][1] else "damping"
+        return key != other and not math.isinf(values[f"{place}.stiffness"][1])
+    return key != "contact_law" and (key != "torque" or load or bool(values[f"{place}.torque"][1]))
 
 
-def scales_of(controller: Controller, origin: Machine) -> Mapping[str, Scale]:
-    """Sliders of a strategy's parameters, as far as tuning would go, about the drive as it was loaded.
+def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) -> Scale | None:
+    """The slider of a main parameter, about the machine as it was loaded; `k` numbers a part of a chain."""
+    drive: Any = origin.motor
+    motor, ratio = float(drive.starting_torque), 1.0
+    if isinstance(origin, Chain) and k:  # speed of the part over that of the motor
+        after = word.startswith("shaft") and origin.shafts[k - 1].side == "after"
+        ratio = origin.speed_ratios()[k - (not after)]
+    match word.split("."):
+        case ["motor", "starting_torque"]:
+            weakest = rounded(min(max(1.1 * lumped.Mc, 0.1 * motor), 0.9 * motor), 2)
+            return Scale(weakest, max(float(drive.maximum_torque), motor))
+        case ["motor", "torque_lag"]:
+            return Scale(0.0, rounded(max(0.02, 4.0 * value), 2))
+        case ["start", "target_speed"]:
+            return Scale(rounded(0.2 * value), rounded(2.0 * value))
+        case [_, "inertia" | "stiffness"]:
+            return Scale(rounded(value / 5.0), rounded(value * 5.0), logarithmic=True)
+        case ["shaft", "gap"]:
+            return Scale(0.0, 4.0 * value or 0.1 / ratio)
+        case ["shaft", "damping"]:
+            if k:
+                return Scale(0.0, rounded(5.0 * value))
+            critical = 2.0 * math.sqrt(lumped.c * lumped.J1 * lumped.J2 / (lumped.J1 + lumped.J2))
+            return Scale(0.0, rounded(max(0.3 * critical, 2.0 * value), 2))
+        case ["shaft", "damping_ratio"]:
+            return Scale(0.0, max(MOST_DAMPING, 2.0 * (value or 0.0)))
+        case ["load" | "mass", "torque"]:  # up to nearly what the motor gives there
+            return Scale(min(0.0, 2.0 * value), rounded(max(0.95 * motor / ratio, 0.95 * abs(value)), 3))
+    return None
+
+
+def parameters_of(controller: Controller) -> list[Field[Any]]:
+    """The parameters that the page can change: quantities, and texts with a choice.
+
+    None of tuned gains and profiles, which come from files.
 
     >>> from softstart.controller import make_controller
-    >>> scales_of(make_controller("s-curve"), Drive.load("crane-4amtkf"))["rounding"]
+    >>> [one.name for one in parameters_of(make_controller("ramp"))]
+    ['initial', 'time', 'full_torque', 'period']
+    """
+    given = () if isinstance(controller, Tuned) else fields(controller)
+    return [one for one in given if one.metadata.get("choices") or one.metadata.get("kind") == "quantity"]
+
+
+def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, Entry]:
+    """The fields of a strategy, those without a slider or choice last; sliders go as far as tuning would.
+
+    >>> from softstart.controller import make_controller
+    >>> found = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"), "s-curve")
+    >>> found["strategy.rounding"].scale
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
-    found = {}
-    default = controller.defaults(origin.design_drive)
-    names = tunable(controller)
-    for one in ranges_of(controller, names) if names else ():
+    own = parameters_of(controller)
+    default, names = controller.defaults(origin.design_drive) if own else {}, tunable(controller)
+    scales = {}
+    for one in ranges_of(controller, names) if own and names else ():
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
         if low < high:
-            found[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
-    return MappingProxyType(found)
+            scales[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
+    main = [one for one in own if one.name in scales or one.metadata["choices"]] or own
+    return {
+        STRATEGY + one.name: Entry(
+            STRATEGY + one.name, f"parameters of {label}" if one in main else MORE,
+            one.name.replace("_", " "), "", one.metadata["unit"],
+            f"{one.metadata['meaning']}; default: {one.metadata['default'] or 'fixed'}",
+            "a value, or nothing for the default", tuple(one.metadata["choices"]), (), True,
+            scales.get(one.name),
+        )
+        for one in [*main, *(one for one in own if one not in main)]
+    }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Axes:
+def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
+    """The machine with changes as typed, by the paths of their parameters.
+
+    >>> changed(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
+    0.03490...
+    """
+    if isinstance(machine, Chain):
+        return Chain.from_toml(machine.to_toml(), also=settings)
+    return machine.with_settings(f"{path}={text}" for path, text in settings.items())
+
+
+def without(machine: Machine, path: str) -> Machine:
+    """The machine without a value that it need not have: a limit, or what follows another parameter then.
+
+    >>> drive = Drive.load("crane-4amtkf").with_settings(["limits.shaft_torque=70"])
+    >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
+    None
+    """
+    knob = machine.knob(path)
+    assert knob is not None
+    return machine.with_values({knob.name: None})
+
+
+def machine_from(text: str, where: str = "") -> Machine:
+    """The drive or the chain of a TOML text; a chain has tables [[mass]]."""
+    return (Chain if is_chain_text(text) else Drive).from_toml(text, where=where)
+
+
+def single(machine: Machine) -> Machine:
+    """The machine if the page can start it; InputError if nothing moves it."""
+    if machine.motor is None:
+        raise InputError("[motor] is missing: the page starts the chain by its motor; add it to the file.")
+    if machine.target_speed is None:
+        raise InputError(
+            "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
+        )
+    return machine
+
+
+class Axes(NamedTuple):
     """The gaps (rad) and load inertias (kg m2) of a map, ascending."""
 
     gaps: tuple[float, ...]
     inertias: tuple[float, ...]
-
-    def nearest(self, gap: float, inertia: float) -> tuple[int, int]:
-        """Indices of the cell in which a drive lies: the gap's scale is even, the inertia's logarithmic."""
-        column = int(np.argmin(np.abs(np.array(self.gaps) - gap)))
-        row = int(np.argmin(np.abs(np.log(np.array(self.inertias) / inertia))))
-        return column, row
 
 
 def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> Axes | None:
@@ -367,34 +323,23 @@ def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
     >>> map_words(Chain.load("crane-4-mass"))[1]
     ('all gaps, at the motor shaft', 'inertia of crane')
     """
-    gap = SYMBOLS["gap"]
-    if len(machine.shaft_names) > 1:
-        symbols = f"\N{N-ARY SUMMATION}{gap}", f"J{_below(machine.load_index)}"
-        return symbols, (
-            "all gaps, at the motor shaft",
-            f"inertia of {machine.mass_names[machine.load_index]}",
-        )
-    return (gap, SYMBOLS["load_inertia"]), (f"gap {gap}", SYMBOLS["load_inertia"])
+    inertia = f"J{machine.load_index + 1}".translate(BELOW)
+    if len(machine.shaft_names) == 1:
+        return (DELTA, inertia), (f"gap {DELTA}", inertia)
+    load = machine.mass_names[machine.load_index]
+    return (f"\N{N-ARY SUMMATION}{DELTA}", inertia), ("all gaps, at the motor shaft", f"inertia of {load}")
 
 
-def placeless(machine: Machine, axes: Axes, origin: Machine) -> Machine:
-    """What a map depends on: the machine at one place of it, wherever in the map it stands.
+def placeless(machine: Machine, axes: Axes, origin: Machine) -> tuple[Any, ...]:
+    """What a map depends on: the values of the machine at one place of it, wherever in it the machine stands.
 
     >>> chain = Chain.load("crane-4-mass")
     >>> axes = axes_about(chain)
     >>> placeless(chain.moved(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
-    there = machine.moved(axes.gaps[-1], axes.inertias[0], origin)
-    if not isinstance(there, Chain):
-        return there
-    load = there.load_index
-    masses = (
-        one.replace(inertia=rounded(one.inertia, SAME)) if i == load else one
-        for i, one in enumerate(there.masses)
-    )
-    shafts = (one.replace(gap=rounded(one.gap, SAME)) for one in there.shafts)
-    return replace(there, masses=tuple(masses), shafts=tuple(shafts))
+    there = machine.moved(axes.gaps[-1], axes.inertias[0], origin).by_path()
+    return tuple(rounded(one, SAME) if isinstance(one, float) else one for _, one in there.values())
 
 
 def k_dyn_row(

@@ -17,7 +17,7 @@ from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import changed, single, without
+from softstart.page.machines import STRATEGY, changed, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
@@ -39,13 +39,14 @@ MOST_EVENTS = 200_000  # of one start on the page, some tenths of a second; the 
 class Strategy:
     """One strategy on the drive of the moment: its start, or the sentence that says why there is none.
 
-    `cost` is the processor time that it took to compute, in s.
+    `cost` is the processor time that it took to compute, in s; `given_up`: it had too many events.
     """
 
     name: str
     run: Run | None
     trouble: str = ""
     cost: float = 0.0
+    given_up: bool = False
 
     @property
     def k_dyn(self) -> float:
@@ -122,45 +123,39 @@ class Session:
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = _main(names)
         self._first = {name: make_controller(name) for name in names}
-        self._bench = Bench(drive, drive, self._first, selected, frozenset((selected,)))
+        self.bench = Bench(drive, drive, self._first, selected, frozenset((selected,)))
         self._past: list[Bench] = []
         self._future: list[Bench] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
         self.name = secrets.token_urlsafe(9)
-        self._version = 0
+        self.version = 0  # how often anything was changed
         self._listeners: list[Callable[[], None]] = []
         self._results: dict[str, Strategy] = {}
-        self._cases: dict[tuple[str, str], Case] = {}
-        self._rows: dict[str, Row] = {}
+        self.rows: dict[str, Row] = {}  # of a comparison, by label, as far as they are computed
         self._direct: list[Run | None] = []  # empty until it is computed
         self._reference: tuple[Reference, Strategy] | None = None
 
     # the state -----------------------------------------------------------------------------------------
 
     @property
-    def bench(self) -> Bench:
-        """All that can be changed, as it is now."""
-        return self._bench
-
-    @property
     def machine(self) -> Machine:
         """The drive or the chain as it is now."""
-        return self._bench.drive
+        return self.bench.drive
 
     @property
     def origin(self) -> Machine:
         """The drive or chain as it was loaded: ranges of sliders and maps are about it."""
-        return self._bench.origin
+        return self.bench.origin
 
     @property
     def controllers(self) -> Mapping[str, Controller]:
         """All strategies of the table: controllers by label, shown or not."""
-        return self._bench.controllers
+        return self.bench.controllers
 
     @property
     def shown(self) -> tuple[str, ...]:
         """Labels of the strategies that are drawn, in the order of the table; the selected one always is."""
-        drawn = {*self._bench.drawn, self.selected}
+        drawn = {*self.bench.drawn, self.selected}
         return tuple(label for label in self.controllers if label in drawn)
 
     @property
@@ -177,12 +172,7 @@ class Session:
     @property
     def selected(self) -> str:
         """Label of the strategy whose figure is large and whose map is drawn."""
-        return self._bench.selected
-
-    @property
-    def version(self) -> int:
-        """How often anything was changed."""
-        return self._version
+        return self.bench.selected
 
     @property
     def steps(self) -> tuple[int, int]:
@@ -201,8 +191,10 @@ class Session:
 
     # changes -------------------------------------------------------------------------------------------
 
-    def set(self, path: str, value: str | float) -> None:
-        """Change one parameter, `shaft.gap` or `gap`, to an SI number or a text with a unit.
+    def set(self, path: str, value: str | float | None, gesture: str = "") -> None:
+        """Change one parameter, `shaft.gap`, `gap` or `strategy.time`, to an SI number or a text with a unit.
+
+        None takes a value back that need not be given, as a limit. Changes of one gesture are one step.
 
         >>> session = Session()
         >>> session.set("gap", "4 metres")
@@ -211,17 +203,18 @@ class Session:
         >>> session.machine.gap
         0.5
         """
-        self.set_all({path: value})
+        if path.startswith(STRATEGY):
+            self.set_parameter(path.removeprefix(STRATEGY), value, gesture)
+        elif value is None:
+            self._put(drive=single(without(self.machine, path)))
+        else:
+            self.set_all({path: value}, gesture)
 
     def set_all(self, changes: Mapping[str, str | float], gesture: str = "") -> None:
-        """Change several parameters in one step, or none of them; changes of one gesture are one step."""
+        """Change several parameters of the machine in one step, or none of them."""
         settings = {path: value if isinstance(value, str) else repr(float(value))
                     for path, value in changes.items()}  # fmt: skip
         self._put(gesture, drive=single(changed(self.machine, settings)))
-
-    def clear(self, path: str) -> None:
-        """Take a value back that the machine need not have, as a limit."""
-        self._put(drive=single(without(self.machine, path)))
 
     def move(self, gap: float, load_inertia: float) -> None:
         """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""
@@ -244,7 +237,7 @@ class Session:
         drive = single(drive)
         own = {label: one for label, one in self.controllers.items() if label in self._first} or self._first
         selected = self.selected if self.selected in own else _main(own)
-        drawn = self._bench.drawn.intersection(own)
+        drawn = self.bench.drawn.intersection(own)
         self._put(drive=drive, origin=drive, controllers=own, selected=selected, drawn=drawn)
 
     def restore(self, bench: Bench) -> None:
@@ -255,13 +248,13 @@ class Session:
     def undo(self) -> None:
         """Take the last change back; nothing happens if there is none."""
         if self._past:
-            self._future.append(self._bench)
+            self._future.append(self.bench)
             self._go_to(self._past.pop())
 
     def redo(self) -> None:
         """Make the change that was taken back last; nothing happens if there is none."""
         if self._future:
-            self._past.append(self._bench)
+            self._past.append(self.bench)
             self._go_to(self._future.pop())
 
     def add(self, label: str, controller: Controller, *, select: bool = True) -> str:
@@ -276,7 +269,7 @@ class Session:
             )
         self._put(
             controllers={**self.controllers, label: controller},
-            drawn=self._bench.drawn | {label},
+            drawn=self.bench.drawn | {label},
             selected=label if select else self.selected,
         )
         return label
@@ -288,19 +281,19 @@ class Session:
             raise InputError(f'strategy "{label}": this is the last strategy; add another one first.')
         left = {name: controller for name, controller in self.controllers.items() if name != label}
         selected = next(iter(left)) if self.selected == label else self.selected
-        self._put(controllers=left, drawn=self._bench.drawn - {label}, selected=selected)
+        self._put(controllers=left, drawn=self.bench.drawn - {label}, selected=selected)
 
     def select(self, label: str) -> None:
         """Make a strategy the one whose figure is large; it is shown from then on."""
         self._known(label)
-        if label != self.selected or label not in self._bench.drawn:
-            self._put(selected=label, drawn=self._bench.drawn | {label})
+        if label != self.selected or label not in self.bench.drawn:
+            self._put(selected=label, drawn=self.bench.drawn | {label})
 
     def show(self, label: str, visible: bool = True) -> None:
         """Draw a strategy or hide it."""
         self._known(label)
-        if visible != (label in self._bench.drawn):
-            self._put(drawn=self._bench.drawn ^ {label})
+        if visible != (label in self.bench.drawn):
+            self._put(drawn=self.bench.drawn ^ {label})
 
     def keep_reference(self, kept: bool = True) -> None:
         """Compare with the selected strategy on the drive as both are now; with nothing if not `kept`.
@@ -316,7 +309,7 @@ class Session:
         made = Reference(self.machine, label, self.controllers[label]) if kept else None
         if made is not None and (known := self.ready(label)) is not None:
             self._reference = made, known
-        if made is not self._bench.reference:
+        if made is not self.bench.reference:
             self._put(reference=made)
 
     def select_gentlest(self) -> None:
@@ -342,72 +335,45 @@ class Session:
 
         A start that has more than `max_events` events is given up, and is not kept as the result.
         """
-        known = self._results.get(label)
-        if known is not None:
-            return known
         self._known(label)
-        found, given_up = _started(label, self.machine, self.controllers[label], max_events)
-        if not given_up or max_events >= MOST_EVENTS:
+        if label not in self._results:
+            found = _started(label, self.machine, self.controllers[label], max_events)
+            if found.given_up and max_events < MOST_EVENTS:
+                return found
             self._results[label] = found
-        return found
+        return self._results[label]
 
     def reference(self) -> Strategy | None:
         """The start that all are compared with, on the drive that it was kept with; None if none was kept."""
-        kept = self._bench.reference
+        kept = self.bench.reference
         if kept is None:
             return None
         if self._reference is None or self._reference[0] is not kept:
-            self._reference = kept, _started(kept.label, kept.drive, kept.controller, MOST_EVENTS)[0]
+            self._reference = kept, _started(kept.label, kept.drive, kept.controller, MOST_EVENTS)
         return self._reference[1]
 
-    def worn(self, label: str) -> float:
-        """K_dyn of a strategy, set up for this drive, when the gap is 4 times as wide; NaN where it fails.
-
-        The same figure, with the same cap on events, as `k_dyn_worn_gap` of `softstart.compare`.
-        """
-        return self._case(label, "gap x4").k_dyn
-
-    def worn_ready(self, label: str) -> float | None:
-        """`worn` if it is computed already."""
-        found = self._cases.get((label, "gap x4"))
-        return None if found is None else found.k_dyn
-
-    def _case(self, label: str, case: str) -> Case:
-        """A strategy when the drive has changed."""
-        key = label, case
-        if key not in self._cases:
-            self._known(label)
+    def judged(self, label: str) -> Iterator[None]:
+        """Compute the row of a strategy in a comparison, step by step; there is none if its start fails."""
+        run = self.result(label).run
+        if run is None or label in self.rows:
+            return
+        cases = {}
+        for case in CASES:
+            yield None
             try:
-                self._cases[key] = changed_case(self.machine, self.controllers[label], case)
+                cases[case] = changed_case(self.machine, self.controllers[label], case)
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
-                self._cases[key] = Case.of(None)
-        return self._cases[key]
-
-    def judged(self, label: str) -> Iterator[Row | None]:
-        """The row of a strategy in a comparison, after steps that give None; none if its start fails."""
-        run = self.result(label).run
-        yield None
-        for case in CASES:
-            self._case(label, case)
-            yield None
-        if run is not None:
-            direct = self.direct()
-            row = Row(run, direct, {case: self._case(label, case) for case in CASES}, label=label)
-            _ = run.settled_time, row.flags  # computed here, kept in the runs
-            self._rows[label] = row
-            yield row
-
-    def judged_ready(self, label: str) -> Row | None:
-        """The row of a strategy if it is computed already."""
-        return self._rows.get(label)
+                cases[case] = Case.of(None)
+        row = Row(run, self.direct(), cases, label=label)
+        _ = run.settled_time, row.flags  # computed here, kept in the runs
+        self.rows[label] = row
 
     def recommendation(self) -> Recommendation:
         """What is recommended among the strategies, and why: the text of `softstart.compare`."""
         for label in self.controllers:
-            if label not in self._rows:
-                list(self.judged(label))
-        return recommend(self.machine, [self._rows[one] for one in self.controllers if one in self._rows])
+            list(self.judged(label))
+        return recommend(self.machine, [self.rows[one] for one in self.controllers if one in self.rows])
 
     def direct(self) -> Run | None:
         """The start that the others are compared with; None where it fails."""
@@ -420,10 +386,10 @@ class Session:
                 self._direct = [None]
         return self._direct[0]
 
-    def time_lost(self, label: str) -> float:
+    def time_lost(self, found: Strategy) -> float:
         """Start time over that of `direct`, s; NaN where one of them is."""
         direct = self.direct()
-        return self.result(label).start_time - (math.nan if direct is None else direct.start_time)
+        return found.start_time - (math.nan if direct is None else direct.start_time)
 
     def close(self) -> None:
         """Let go of all results and listeners: the user has gone."""
@@ -438,15 +404,15 @@ class Session:
         now = time.monotonic()
         last, when = self._gesture
         if not gesture or gesture != last or now - when > PAUSE or not self._past:
-            self._past = [*self._past[1 - MOST_STEPS :], self._bench]
+            self._past = [*self._past[1 - MOST_STEPS :], self.bench]
         self._gesture = (gesture, now)
         self._future = []
-        self._bench = self._adopted(replace(self._bench, **changes))
+        self.bench = self._adopted(replace(self.bench, **changes))
         self._changed()
 
     def _go_to(self, bench: Bench) -> None:
         self._gesture = ("", -math.inf)
-        self._bench = self._adopted(bench)
+        self.bench = self._adopted(bench)
         self._changed()
 
     def _adopted(self, bench: Bench) -> Bench:
@@ -462,12 +428,10 @@ class Session:
     def _forget(self, labels: Iterable[str]) -> None:
         for label in labels:
             self._results.pop(label, None)
-            self._rows.pop(label, None)
-            for case in CASES:
-                self._cases.pop((label, case), None)
+            self.rows.pop(label, None)
 
     def _changed(self) -> None:
-        self._version += 1
+        self.version += 1
         for listener in tuple(self._listeners):
             listener()
 
@@ -483,12 +447,10 @@ def _main(labels: Iterable[str]) -> str:
     return REFERENCE if REFERENCE in labels else next(iter(labels), REFERENCE)
 
 
-def _started(label: str, drive: Machine, controller: Controller, max_events: int) -> tuple[Strategy, bool]:
-    """A start, and whether it was given up for its events; what goes wrong in it becomes its sentence."""
+def _started(label: str, drive: Machine, controller: Controller, max_events: int) -> Strategy:
     began = time.thread_time()
     try:
-        run = simulate(drive, controller, max_events=max_events)
+        run, trouble, given_up = simulate(drive, controller, max_events=max_events), "", False
     except Exception as error:  # a controller is anyone's code and may fail in any way
-        found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
-        return found, isinstance(error, SimulationError)
-    return Strategy(label, run, "", time.thread_time() - began), False
+        run, trouble, given_up = None, sentence_of(error, FAILED_START), isinstance(error, SimulationError)
+    return Strategy(label, run, trouble, time.thread_time() - began, given_up)

@@ -8,8 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.chain import Chain
@@ -17,16 +15,8 @@ from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
-from softstart.page.frames import Screen, channels_at, open_somewhere, traces_of
-from softstart.page.machines import (
-    GROUPS,
-    axes_about,
-    changed,
-    entries,
-    k_dyn_row,
-    machine_from,
-    scales_about,
-)
+from softstart.page.frames import Screen, channels_at, traces_of
+from softstart.page.machines import axes_about, changed, entries, k_dyn_row, machine_from
 from softstart.page.sentences import changed_since, differences
 from softstart.page.session import Session
 
@@ -47,7 +37,7 @@ def test_the_figures_of_a_chain_are_those_of_simulate():
     controls.take({"what": "edit", "path": "mass[4].inertia", "text": "50 kg*m^2"})
     assert not screen.mistakes
     now = session.machine
-    assert now.shafts[1].gap == screen.scales["shaft[2].gap"].value(100)
+    assert now.shafts[1].gap == screen.entries["shaft[2].gap"].scale.value(100)
     assert now.masses[3].inertia == 50.0
     for name in ("direct", "ramp", "take-up"):
         assert session.result(name).k_dyn == simulate(now, name).k_dyn
@@ -82,7 +72,8 @@ def test_a_damping_ratio_that_was_not_given_is_taken_back():
     controls.take({"what": "reset", "path": "shaft[2].damping_ratio"})
     assert not screen.mistakes
     assert session.machine == CHAIN
-    assert screen.first()["fields"]["shaft[2].damping_ratio"][:2] == ["0", 0]
+    shown = screen.first()["fields"]["shaft[2].damping_ratio"]
+    assert (shown["text"], shown["position"]) == ("0", 0)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +85,7 @@ def test_each_field_reads_what_it_writes(chain):
     for path, value in before.items():
         if isinstance(value, float):
             assert changed(chain, {path: repr(value)}).by_path()[path][1] == value
-    for path, scale in scales_about(chain).items():
+    for path, scale in ((path, one.scale) for path, one in entries(chain).items() if one.scale):
         there = changed(chain, {path: repr(scale.value(300))}).by_path()
         assert there[path][1] == scale.value(300)
         assert {key: there[key][1] for key in before if key != path} == {
@@ -110,8 +101,7 @@ def test_traces_hold_each_shaft_and_body():
         assert np.array_equal(traces[f"T[{k}]"], states["T"][:, k])
         assert np.array_equal(traces[f"theta[{k}]"], states["twist"][:, k])
         assert np.abs(traces[f"T[{k}]"]).max() == pytest.approx(run.peak_torques[k], rel=1e-12)
-    assert np.array_equal(traces["T"], traces[f"T[{run.worst_shaft}]"])
-    assert np.array_equal(traces["w2"], states["w"][:, 3])
+    assert np.array_equal(traces["w[3]"], states["w"][:, 3])
     assert {event.time for event in run.events} <= set(traces["t"])
 
 
@@ -136,30 +126,6 @@ def test_stages_of_a_gap_are_open_where_it_carries_nothing(strategy):
     data = np.frombuffer(base64.b64decode(picture["data"]), dtype="<f4")
     assert data.size % len(picture["channels"]) == 0
     assert json.loads(json.dumps(picture)) is not None
-
-
-@given(
-    st.lists(
-        st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), min_size=1, max_size=8),
-        min_size=1,
-        max_size=4,
-    )
-)
-@settings(max_examples=60, deadline=None)
-def test_several_gaps_are_open_where_one_of_them_is(rows):
-    end = 8.5
-    each = []
-    for row in rows:
-        edges = np.cumsum([0.0, *(length for length, _ in row)])
-        edges[-1] = end
-        each.append([(a, b, int(shut)) for a, b, (_, shut) in zip(edges, edges[1:], row, strict=False)])
-    joined = open_somewhere(each)
-    assert joined[0][0] == 0.0
-    assert joined[-1][1] == end
-    for when in np.linspace(0.003, end - 0.003, 200):
-        wanted = any(a < when < b and not side for stages in each for a, b, side in stages)
-        found = [not side for a, b, side in joined if a < when < b]
-        assert not found or found == [wanted]
 
 
 def test_the_map_of_a_chain_is_made_of_its_starts():
@@ -205,10 +171,12 @@ def test_a_link_brings_the_chain_back_and_a_drive_replaces_it():
     assert other.drive == session.machine
     assert [group["title"] for group in screen.first()["groups"]][3:5] == ["rotor", "rotor - pinion"]
     session.take(Drive.load("crane-4amtkf"))
-    assert [group["title"] for group in screen.first()["groups"]] == list(GROUPS)
+    assert [group["title"] for group in screen.first()["groups"]] == [
+        "Units", "Drive", "Motor", "Shaft", "Load", "Start", "Limits"
+    ]  # fmt: skip
     session.undo()
     frame = screen.first()
-    assert frame["fields"]["shaft[3].gap"][0] == "0.6 deg"
+    assert frame["fields"]["shaft[3].gap"]["text"] == "0.6 deg"
     assert frame["figure"]["k_dyn"] == simulate(other.drive, "direct").k_dyn
 
 

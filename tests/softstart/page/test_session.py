@@ -35,8 +35,9 @@ def test_all_figures_are_those_of_compare_to_the_bit():
         assert strategy.name == row.run.controller.name
         assert strategy.k_dyn == row.run.k_dyn
         assert strategy.start_time == row.run.start_time
-        assert session.worn(strategy.name) == row.k_dyn_worn_gap
-        assert session.time_lost(strategy.name) == row.time_lost
+        list(session.judged(strategy.name))
+        assert session.rows[strategy.name].k_dyn_worn_gap == row.k_dyn_worn_gap
+        assert session.time_lost(strategy) == row.time_lost
 
 
 def test_set_takes_numbers_and_texts_and_counts_changes():
@@ -109,11 +110,11 @@ def test_the_steps_that_can_be_undone_are_limited(monkeypatch):
 
 def test_time_lost_is_against_direct_as_it_is_without_parameters():
     session = Session(controllers=["direct", "ramp"])
-    expected = session.time_lost("ramp")
+    expected = session.time_lost(session.result("ramp"))
     session.select("direct")
     session.set_parameter("torque", 40)
-    assert session.time_lost("ramp") == expected
-    assert session.time_lost("direct") > 0.0
+    assert session.time_lost(session.result("ramp")) == expected
+    assert session.time_lost(session.result("direct")) > 0.0
 
 
 def test_a_link_brings_back_drive_strategies_and_selection():

@@ -1,110 +1,85 @@
 // Sliders and fields of the drive: what is typed or slid is sent at once, what the server says is shown.
-import { element } from "./numbers.js";
+import { element, put } from "./numbers.js";
 
 const STEPS = 600;
 
 export class Controls {
   constructor(place, own, head, say) {
-    this.say = say;
-    this.head = head;
-    this.rows = new Map();
-    this.own = own;
-    this.groups = place.appendChild(element("div"));
+    Object.assign(this, { say, own, head, rows: new Map(), groups: place.appendChild(element("div")) });
   }
 
-  box(title, rows) {
-    const box = element("fieldset", {}, element("legend", {}, title));
-    for (const row of rows) box.append(...this.row(row));
-    return box;
-  }
-
-  // the parameters of the drive or chain, in place of those of the one before
-  machine(groups) {
-    for (const path of this.rows.keys()) if (!path.startsWith("strategy.")) this.rows.delete(path);
-    this.head.replaceChildren(...groups.filter(({ head }) => head).flatMap(({ rows }) => rows.flatMap((row) => this.row(row))));
-    this.groups.replaceChildren(...groups.filter(({ head }) => !head).map(({ title, rows, folded }) => {
-      const box = this.box(title, rows);
-      if (!folded) return box;
-      box.firstChild.remove();
-      return element("details", {}, element("summary", {}, title), box);
-    }));
-  }
-
-  // the parameters of the selected strategy, in place of those of the one before
-  strategy({ name, rows }) {
-    for (const path of this.rows.keys()) if (path.startsWith("strategy.")) this.rows.delete(path);
-    const main = rows.filter((row) => row.slider || row.choices.length);
-    const more = rows.filter((row) => !main.includes(row));
-    const parts = main.length ? [this.box(`parameters of ${name}`, main)] : [];
-    if (more.length) {
-      const box = this.box("", more);
-      box.firstChild.remove();
-      parts.push(main.length ? element("details", {}, element("summary", {}, "more parameters"), box) : this.box(`parameters of ${name}`, more));
+  // the fields of another machine, the first group in the head of the page; or of another strategy
+  build({ groups, strategy }) {
+    if (groups) {
+      this.head.replaceChildren(...groups[0].rows.flatMap((row) => this.row(row)));
+      this.groups.replaceChildren(...groups.slice(1).map((group) => this.box(group)));
     }
-    this.own.replaceChildren(...parts);
-    this.own.hidden = !parts.length;
+    if (strategy) {
+      this.own.replaceChildren(...strategy.map((group) => this.box(group)));
+      this.own.hidden = !strategy.length;
+    }
+    for (const [path, { line }] of this.rows) if (!line.isConnected) this.rows.delete(path);
   }
 
-  row({ path, symbol, label, meaning, unit, slider, choices, words, suggestions }) {
+  box({ title, rows, folded }) {
+    const lines = rows.flatMap((row) => this.row(row));
+    if (folded) return element("details", {}, element("summary", {}, title), element("fieldset", {}, ...lines));
+    return element("fieldset", {}, element("legend", {}, title), ...lines);
+  }
+
+  row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {
     const id = `field-${path.replaceAll(/[.[]/g, "-").replaceAll("]", "")}`;
-    const name = element("label", { for: id, title: meaning }, ...(symbol || !path.startsWith("strategy.") ? [element("i", {}, symbol)] : []), label);
+    const own = path.startsWith("strategy.");
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
-    const line = element("div", { class: `row${slider ? "" : " plain"}${words ? " words" : ""}${suggestions.length ? " wide" : ""}`, "data-path": path }, name);
+    const line = element("div", { class: `row${slider ? "" : " plain"}${text ? " words" : ""}${words.length ? " wide" : ""}`, "data-path": path },
+      element("label", { for: id, title: meaning }, ...(own ? [] : [element("i", {}, symbol)]), label));
     // stamps of what was asked last: by the field until that is answered, by the slider
-    const parts = { line, mistake, other: element("span", { class: "other" }), asked: -1, slid: -1 };
+    const parts = { line, mistake, unit, shown: {}, asked: -1, slid: -1 };
     if (slider) {
-      parts.slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${label}, slider` });
-      parts.slider.addEventListener("input", () => {
-        parts.slid = this.say({ what: "slide", path, position: Number(parts.slider.value) });
-      });
-      parts.slider.addEventListener("pointerdown", () => this.hold(parts));
-      parts.slider.addEventListener("dblclick", () => this.say({ what: "reset", path }));
-      parts.slider.addEventListener("keydown", (event) => {
-        if (event.key === "Delete" || event.key === "Backspace") this.say({ what: "reset", path });
-      });
       parts.marks = element("span", { class: "marks", "aria-hidden": "true" });
+      parts.slider = element("input", {
+        type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${label}, slider`,
+        oninput: () => (parts.slid = this.say({ what: "slide", path, position: Number(parts.slider.value) })),
+        onpointerdown: () => this.hold(parts),
+        ondblclick: () => this.say({ what: "reset", path }),
+        onkeydown: ({ key }) => (key === "Delete" || key === "Backspace") && this.say({ what: "reset", path }),
+      });
       line.append(element("span", { class: "track" }, parts.marks, parts.slider));
     }
-    if (!words && !suggestions.length) line.append(parts.other);
+    const onchange = () => this.edit(path, parts);
     if (choices.length) {
-      parts.field = element("select", { id, "aria-describedby": mistake.id }, ...choices.map((choice) => element("option", {}, choice)));
-      parts.field.addEventListener("change", () => this.edit(path, parts));
-      line.append(parts.field, element("span", { class: "unit" }));
+      parts.field = element("select", { id, onchange, "aria-describedby": mistake.id }, ...choices.map((choice) => element("option", {}, choice)));
     } else {
-      const list = suggestions.length ? `${id}-words` : null;
-      parts.field = element("input", { id, type: "text", spellcheck: "false", autocomplete: "off", list, "aria-describedby": mistake.id });
-      this.listen(path, parts);
-      line.append(parts.field);
-      if (list) line.append(element("datalist", { id: list }, ...suggestions.map((value) => element("option", { value }))));
-      if (!words) line.append(element("span", { class: "unit" }, unit));
+      const list = words.length ? `${id}-words` : null;
+      parts.field = element("input", {
+        id, list, type: "text", spellcheck: "false", autocomplete: "off", "aria-describedby": mistake.id, onchange,
+        onfocus: () => parts.field.select(),
+        oninput: () => {
+          parts.typing = true;
+          parts.field.dataset.writing = "";
+        },
+        // what was typed and taken back by hand is no change to the browser: the field follows the drive again
+        onblur: () => this.leave(parts),
+        onkeydown: ({ key }) => key === "Escape" && this.escape(path, parts),
+      });
+      if (list) line.append(element("datalist", { id: list }, ...words.map((value) => element("option", { value }))));
     }
+    line.append(parts.field);
+    if (!text) line.append(element("span", { class: "unit" }, unit));
     this.rows.set(path, parts);
     return [line, mistake];
   }
 
-  listen(path, parts) {
-    const { field } = parts;
-    field.addEventListener("focus", () => field.select());
-    field.addEventListener("input", () => {
-      parts.typing = true;
-      field.dataset.writing = "";
-    });
-    field.addEventListener("change", () => this.edit(path, parts));
-    // what was typed and taken back by hand is no change to the browser: the field follows the drive again
-    field.addEventListener("blur", () => this.leave(parts));
-    field.addEventListener("keydown", (event) => {
-      if (event.key !== "Escape") return;
-      parts.refused = false;
-      parts.typing = true;
-      this.leave(parts);
-      // not sent as a text: the field shows six digits, and the drive may have more
-      if (parts.sentence || parts.asked >= 0) this.say({ what: "leave", path });
-    });
+  // not sent as a text: the field shows six digits, and the drive may have more
+  escape(path, parts) {
+    Object.assign(parts, { refused: false, typing: true });
+    this.leave(parts);
+    if (parts.sentence || parts.asked >= 0) this.say({ what: "leave", path });
   }
 
   leave(parts) {
     delete parts.field.dataset.writing;
-    if (parts.typing && !parts.refused) parts.field.value = parts.text ?? "";
+    if (parts.typing && !parts.refused) parts.field.value = parts.shown.text ?? "";
     parts.typing = false;
   }
 
@@ -126,30 +101,16 @@ export class Controls {
   }
 
   // the thumb where the drive is, once the server has answered; a step beside it is the rounding of the value
-  put(parts) {
-    if (!parts.slider || parts.held || parts.slid > this.stamp) return;
-    const near = document.activeElement === parts.slider ? 1 : 0;
-    if (Math.abs(Number(parts.slider.value) - parts.position) > near) parts.slider.value = parts.position;
-    this.fill(parts);
-  }
-
-  fill(parts) {
-    const share = `${(100 * parts.slider.value) / STEPS}%`;
-    if (parts.share !== share) parts.slider.style.setProperty("--share", share);
-    parts.share = share;
+  put({ slider, held, slid, shown }) {
+    if (!slider || held || slid > this.stamp) return;
+    const near = document.activeElement === slider ? 1 : 0;
+    if (Math.abs(Number(slider.value) - shown.position) > near) slider.value = shown.position;
   }
 
   // where the value was when the drive was loaded, or the default and tuned values of a strategy
-  mark(parts, marks) {
-    const key = JSON.stringify(marks);
-    if (parts.marked === key) return;
-    parts.marked = key;
-    parts.marks.replaceChildren(...marks.map(([position, meaning], index) => {
-      const tick = element("i", { class: index ? "tuned" : "", title: meaning });
-      tick.style.setProperty("--share", position / STEPS);
-      return tick;
-    }));
-    parts.slider.title = [...marks.map(([, meaning]) => meaning), "double click or Delete: back to the first of these"].join("; ");
+  mark({ marks, slider }, all) {
+    marks.replaceChildren(...all.map(([position, title], index) => element("i", { class: index ? "tuned" : "", title, style: `--share: ${position / STEPS}` })));
+    slider.title = [...all.map(([, title]) => title), "double click or Delete: back to the first of these"].join("; ");
   }
 
   // `stamp` is that of the last thing the server had taken in when it sent this
@@ -159,35 +120,28 @@ export class Controls {
       if (parts.asked > stamp) continue; // it does not know yet what was written here
       const answered = parts.asked >= 0;
       parts.asked = -1;
-      const [text, position, other, marks] = fields[path] ?? ["", null, "", []];
+      const { field, slider, line, mistake, shown: before } = parts;
+      const shown = (parts.shown = fields[path] ?? { text: "" });
       const sentence = mistakes[path] ?? "";
-      const { field, slider } = parts;
       if (parts.sentence !== sentence) {
         parts.sentence = sentence;
-        parts.mistake.textContent = sentence;
-        parts.mistake.hidden = !sentence;
-        parts.line.classList.toggle("wrong", Boolean(sentence));
+        put(mistake, sentence);
+        mistake.hidden = !sentence;
+        line.classList.toggle("wrong", Boolean(sentence));
         field.setAttribute("aria-invalid", String(Boolean(sentence)));
       }
       // a field that is being written or was refused keeps what its writer wrote
       parts.refused = Boolean(sentence) && (answered || Boolean(parts.refused));
-      if (!parts.typing && !parts.refused && field.value !== text) {
-        field.value = text;
+      if (!parts.typing && !parts.refused && field.value !== shown.text) {
+        field.value = shown.text;
         if (answered && document.activeElement === field) field.select?.();
       }
-      if (parts.text !== text || parts.position !== position) {
-        parts.text = text;
-        parts.position = position;
-        parts.line.classList.toggle("typed", text.includes(" ")); // with a unit of its own
-        if (slider) {
-          this.fill(parts);
-          slider.setAttribute("aria-valuetext", other ? `${text}, ${other}` : text);
-        }
-        parts.other.textContent = other;
-        parts.other.title = other;
+      if (before.text !== shown.text) {
+        line.classList.toggle("typed", shown.text.includes(" ")); // with a unit of its own
+        slider?.setAttribute("aria-valuetext", `${shown.text} ${parts.unit}`);
       }
-      parts.line.classList.toggle("changed", other === "changed");
-      if (slider) this.mark(parts, marks);
+      line.classList.toggle("changed", Boolean(shown.changed));
+      if (slider && String(before.marks) !== String(shown.marks)) this.mark(parts, shown.marks ?? []);
       this.put(parts);
     }
   }

@@ -2,7 +2,7 @@
 import { Controls } from "./controls.js";
 import { Figure } from "./figure.js";
 import { GapMap } from "./map.js";
-import { element } from "./numbers.js";
+import { element, put, stored } from "./numbers.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Scheme } from "./scheme.js";
@@ -16,45 +16,36 @@ export class Instrument {
   constructor(root, send) {
     this.send = send;
     this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", stamp: 0 };
-    this.driveName = root.querySelector(".drive-name");
     this.waiting = 0;
+    const part = (name) => root.querySelector(`.${name}`);
     const say = (message) => this.say(message);
-    this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
-    this.scheme = new Scheme(root.querySelector(".controls"));
-    this.remarks = root.querySelector(".controls").appendChild(element("div", { class: "remarks", role: "status" }));
-    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), root.querySelector(".units"), say);
-    this.steps = new Steps(root.querySelector(".steps"), say);
-    this.figure = new Figure(root.querySelector(".figure"), say);
-    this.table = new Table(root.querySelector(".strategies"), this.theme, say);
-    this.advice = root.querySelector(".advice");
+    [this.driveName, this.advice] = [part("drive-name"), part("advice")];
+    this.theme = new Theme(part("theme"), () => this.redraw());
+    this.scheme = new Scheme(part("controls"));
+    this.remarks = part("controls").appendChild(element("div", { class: "remarks", role: "status" }));
+    this.controls = new Controls(part("controls"), part("strategy"), part("units"), say);
+    this.steps = new Steps(part("steps"), say);
+    this.figure = new Figure(part("figure"), say);
+    this.table = new Table(part("strategies"), this.theme, say);
     const windowed = (window) => say({ what: "window", begin: window?.[0] ?? 0, end: window?.[1] ?? 0 });
-    this.plots = new Plots(root.querySelector(".plots"), this.theme, windowed, (t) => this.timed(t));
-    this.player = new Player(root.querySelector(".player"), this.plots);
-    this.map = new GapMap(root.querySelector(".map"), this.theme, say);
+    this.plots = new Plots(part("plots"), this.theme, windowed, (t) => this.timed(t));
+    this.player = new Player(part("player"), this.plots);
+    this.map = new GapMap(part("map"), this.theme, say);
     this.resized = new ResizeObserver(() => this.redraw());
-    for (const part of root.querySelectorAll("canvas")) this.resized.observe(part.parentElement);
+    for (const canvas of root.querySelectorAll("canvas")) this.resized.observe(canvas.parentElement);
   }
 
   // a page is loaded anew by its reader, or when the line was lost for long: it goes on with its drive
   hello() {
-    let kept = null;
-    try {
-      kept = JSON.parse(sessionStorage.getItem(KEPT));
-    } catch {
-      // a browser that keeps nothing begins with the address, or with the drive of the server
-    }
-    this.say({ what: "hello", kept, link: location.hash.slice(1) });
-    window.addEventListener("hashchange", (this.followed = () => this.say({ what: "hello", kept: null, link: location.hash.slice(1) })));
+    const hello = (kept) => this.say({ what: "hello", kept, link: location.hash.slice(1) });
+    hello(JSON.parse(stored("sessionStorage", KEPT)));
+    window.addEventListener("hashchange", (this.followed = () => hello(null)));
   }
 
   // in this tab, and in its address: a copied address brings back the same drive, strategies and settings
   keep(bench) {
     history.replaceState(history.state, "", `#${bench.link}`);
-    try {
-      sessionStorage.setItem(KEPT, JSON.stringify(bench));
-    } catch {
-      // see above
-    }
+    stored("sessionStorage", KEPT, JSON.stringify(bench));
   }
 
   // the stamp comes back with the first frame that knows of the message
@@ -66,68 +57,45 @@ export class Instrument {
 
   // numbers are shown at once; pictures wait for the next refresh of the screen, where only the newest counts
   take(number, frame) {
-    const state = this.state;
-    if (frame.order) {
-      const known = new Set(frame.order);
-      for (const name of state.rows.keys()) if (!known.has(name)) state.rows.delete(name);
-      for (const name of state.traces.keys()) if (!known.has(name)) state.traces.delete(name);
-      const { order, shown, added, changed, selected } = frame;
-      Object.assign(state, { order, shown, added, changed, selected });
-      state.stamp = frame.stamp;
-      state.here = frame.here;
-      this.map.show(frame.mapped);
-      if (frame.other) this.forget();
-      state.reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
-      state.fields = frame.fields;
-      this.steps.show(frame.steps);
-      if (frame.groups) this.controls.machine(frame.groups);
-      if (frame.strategy) this.controls.strategy(frame.strategy);
-    }
-    for (const row of frame.rows ?? []) state.rows.set(row.name, { ...state.rows.get(row.name), ...row });
-    for (const [name, packed] of Object.entries(frame.traces ?? {})) {
+    const { state } = this;
+    const { order, rows = [], traces = {}, figure, fields, mistakes, recommendation, doubts, assumed, drive } = frame;
+    for (const row of rows) state.rows.set(row.name, row);
+    for (const [name, packed] of Object.entries(traces)) {
       if (packed) state.traces.set(name, packed);
       else state.traces.delete(name);
       this.plotted = false;
     }
-    if (frame.figure) {
+    if (figure) {
       // a glance has shown it already, unless the start was too long for one
-      if (this.version !== frame.version || frame.at_rest) this.figure.show(frame.figure);
-      this.version = frame.version;
-      this.stamp = frame.stamp;
+      if (this.version !== frame.version || !this.figure.figure.reached) this.figure.show(figure);
+      Object.assign(this, { version: frame.version, stamp: frame.stamp });
     }
-    if (frame.recommendation !== undefined || frame.order) this.advise(frame.recommendation);
-    if (frame.recommendation !== undefined) this.table.rest();
-    if (frame.remarks) this.remark(frame.remarks);
-    if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
-    if (frame.fields) this.controls.show(frame.fields, frame.mistakes, frame.stamp);
+    if (order) {
+      for (const known of [state.rows, state.traces]) for (const name of known.keys()) if (!order.includes(name)) known.delete(name);
+      const { shown, added, changed, selected, stamp, here } = frame;
+      const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
+      Object.assign(state, { order, shown, added, changed, selected, stamp, here, fields, reference });
+      this.plotted = false;
+      this.steps.show(frame.steps);
+      this.controls.build(frame);
+      this.controls.show(fields, mistakes, stamp);
+      this.figure.tell(mistakes[""] ?? "");
+      put(this.driveName, drive);
+      document.title = `softstart: ${(this.driveName.title = drive)}`;
+      this.advice.classList.add("old"); // it is of the drive as it was when it was last at rest
+    }
+    if (recommendation !== undefined) {
+      put(this.advice, recommendation);
+      this.advice.classList.remove("old");
+      this.table.rest();
+      const texts = [...doubts, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
+      this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < doubts.length ? "doubt" : "" }, text)));
+    }
     if (frame.keep) this.keep(frame.keep);
-    if (frame.drive !== undefined && this.driveName.textContent !== frame.drive) {
-      this.driveName.textContent = this.driveName.title = frame.drive;
-      document.title = `softstart: ${frame.drive}`;
-    }
     this.map.take(frame);
     if (!number) return; // a glance: the figure alone
     this.number = number;
-    if (frame.order) this.plotted = false;
     this.waiting ||= requestAnimationFrame(() => this.draw());
-  }
-
-  // another drive or chain was loaded: what is computed at rest is not known of it
-  forget() {
-    for (const [name, row] of this.state.rows) this.state.rows.set(name, { ...row, worn: null, settled: null, limits: "", flag: "" });
-    this.map.forget();
-  }
-
-  // what is recommended, for the drive as it was when it was last at rest
-  advise(text) {
-    this.advice.classList.toggle("old", text === undefined);
-    if (text !== undefined && this.advice.textContent !== text) this.advice.textContent = text;
-  }
-
-  // what can hardly be, and what is assumed of the machine
-  remark({ doubts, assumed }) {
-    const texts = [...doubts, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
-    this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < doubts.length ? "doubt" : "" }, text)));
   }
 
   // the plots read this instant: so stands the drive
@@ -162,9 +130,7 @@ export class Instrument {
   end() {
     this.ended = true;
     this.resized.disconnect();
-    this.theme.end();
-    this.steps.end();
-    this.player.end();
+    for (const part of [this.theme, this.steps, this.player]) part.end();
     window.removeEventListener("hashchange", this.followed);
   }
 }

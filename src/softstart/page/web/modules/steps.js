@@ -1,20 +1,13 @@
 // Undo and redo: two buttons, and the usual keys outside of a field that is being written.
-import { element } from "./numbers.js";
-
-const STEPS = [["undo", "\u21b6", "Ctrl+Z"], ["redo", "\u21b7", "Ctrl+Shift+Z or Ctrl+Y"]];
+import { button } from "./numbers.js";
 
 export class Steps {
   constructor(place, say) {
     this.say = say;
-    this.buttons = STEPS.map(([what, sign, keys]) => {
-      const title = what[0].toUpperCase() + what.slice(1);
-      const button = element("button", { type: "button", title: `${title} (${keys})`, "aria-label": title, disabled: true }, sign);
-      button.addEventListener("click", () => say({ what }));
-      place.append(button);
-      return button;
-    });
-    this.keys = (event) => this.press(event);
-    window.addEventListener("keydown", this.keys);
+    const step = (what, title, sign, keys) => button(sign, `${title} (${keys})`, () => say({ what }), { "aria-label": title, disabled: true });
+    this.buttons = [step("undo", "Undo", "\u21b6", "Ctrl+Z"), step("redo", "Redo", "\u21b7", "Ctrl+Shift+Z or Ctrl+Y")];
+    place.append(...this.buttons);
+    window.addEventListener("keydown", (this.keys = (event) => this.press(event)));
   }
 
   // the browser's own undo works in a text that was changed and not yet sent
@@ -29,7 +22,7 @@ export class Steps {
   }
 
   show(counts) {
-    this.buttons.forEach((button, index) => (button.disabled = !counts[index]));
+    this.buttons.forEach((one, index) => (one.disabled = !counts[index]));
   }
 
   end() {

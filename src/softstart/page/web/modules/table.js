@@ -1,6 +1,6 @@
 // Strategies side by side: one is selected, any may be drawn. They are in the order of a column, by K at first,
 // whenever the drive has come to rest: no row moves under a hand.
-import { element, fixed, significant } from "./numbers.js";
+import { button, element, fixed, put, significant } from "./numbers.js";
 
 // key, heading, its index, the text of a cell, what it is
 const COLUMNS = [
@@ -12,26 +12,18 @@ const COLUMNS = [
   ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed"],
   ["time_lost", "later, s", "", (row) => fixed(row.time_lost, 4), "How much later than with direct the load has its target speed"],
 ];
+const FIGURES = COLUMNS.slice(1);
+const cells = () => FIGURES.map(([key]) => element("td", { class: "number", "data-key": key }));
 
 export class Table {
   constructor(place, theme, say) {
-    this.theme = theme;
-    this.say = say;
-    this.lines = new Map();
-    this.by = "k_dyn";
-    this.asked = -1; // stamp of what was selected last
-    this.body = element("tbody");
-    const heads = COLUMNS.map(([key, text, sub, , meaning]) => {
-      const button = element("button", { type: "button", title: `${meaning}; press to sort` }, text);
-      if (sub) button.append(element("sub", {}, sub));
-      button.addEventListener("click", () => this.sort(key));
-      return element("th", { scope: "col", "data-key": key }, button);
-    });
-    this.heads = heads;
-    const first = element("th", { scope: "col", class: "eye" }, element("span", { class: "hidden" }, "drawn"));
-    const last = element("th", { class: "bar-head", scope: "col" }, element("span", {}, "K (line: 1)"));
-    const head = element("tr", {}, first, ...heads, last);
-    place.append(element("table", {}, element("thead", {}, head), this.body, this.foot()));
+    // `by`: key of the column that sorts; `asked`: stamp of what was selected last
+    Object.assign(this, { theme, say, lines: new Map(), by: "k_dyn", asked: -1, body: element("tbody") });
+    this.heads = COLUMNS.map(([key, text, sub, , meaning]) => element("th", { scope: "col", "data-key": key },
+      element("button", { type: "button", title: `${meaning}; press to sort`, onclick: () => this.sort(key) }, text, ...(sub ? [element("sub", {}, sub)] : []))));
+    const first = element("th", { scope: "col", class: "eye", "aria-label": "drawn" });
+    const last = element("th", { scope: "col", class: "bar-head" }, "K (line: 1)");
+    place.append(element("table", {}, element("thead", {}, element("tr", {}, first, ...this.heads, last)), this.body, this.foot()));
   }
 
   sort(key) {
@@ -65,15 +57,11 @@ export class Table {
       line.tr.style.setProperty("--colour", this.theme.strategy(state.order.indexOf(name)));
       if (!row || line.row === row) continue;
       line.row = row;
-      line.cells.forEach((cell, index) => {
-        const text = COLUMNS[index + 1][3](row);
-        if (cell.textContent !== text) cell.textContent = text;
-      });
-      const words = [row.limits?.replace("exceeded -", "over "), row.flag].filter(Boolean); // a narrow column
-      const said = words.join("\n");
-      if (line.flag.textContent !== said) line.flag.textContent = said;
+      line.cells.forEach((cell, index) => put(cell, FIGURES[index][3](row)));
+      const words = [row.limits.replace("exceeded -", "over "), row.flag].filter(Boolean); // a narrow column
+      put(line.flag, words.join("\n"));
       line.flag.classList.toggle("two", words.length > 1);
-      line.flag.classList.toggle("kept", !row.flag && Boolean(row.limits?.startsWith("kept")));
+      line.flag.classList.toggle("kept", !row.flag && row.limits.startsWith("kept"));
       line.tr.title = row.trouble;
       line.tr.classList.toggle("trouble", Boolean(row.trouble));
       line.bar.style.setProperty("--share", `${(100 * (row.k_dyn ?? 0)) / largest}%`);
@@ -84,9 +72,8 @@ export class Table {
   // the start that all are compared with
   foot() {
     this.name = element("span");
-    const out = element("button", { type: "button", class: "out", title: "Clear the reference", "aria-label": "clear the reference" }, "\u00d7");
-    out.addEventListener("click", () => this.say({ what: "reference", kept: false }));
-    this.compared = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
+    this.compared = cells();
+    const out = button("\u00d7", "Clear the reference", () => this.say({ what: "reference", kept: false }), { class: "out", "aria-label": "clear the reference" });
     const title = element("td", { class: "title" }, element("div", {}, this.name, out));
     return (this.reference = element("tfoot", { hidden: true }, element("tr", {}, element("td"), title, ...this.compared, element("td"))));
   }
@@ -95,7 +82,7 @@ export class Table {
     this.reference.hidden = !reference;
     if (!reference) return;
     this.name.textContent = this.name.title = `reference: ${reference.name}`;
-    this.compared.forEach((cell, index) => (cell.textContent = COLUMNS[index + 1][3](reference)));
+    this.compared.forEach((cell, index) => (cell.textContent = FIGURES[index][3](reference)));
   }
 
   arrange(state) {
@@ -104,15 +91,11 @@ export class Table {
     if (this.sorted === wanted) return;
     this.sorted = wanted;
     for (const [name, line] of this.lines) {
-      if (!state.order.includes(name)) {
-        line.tr.remove();
-        this.lines.delete(name);
-      }
+      if (state.order.includes(name)) continue;
+      line.tr.remove();
+      this.lines.delete(name);
     }
-    const value = (name) => {
-      const found = state.rows.get(name)?.[this.by];
-      return typeof found === "number" ? found : Infinity;
-    };
+    const value = (name) => state.rows.get(name)?.[this.by] ?? Infinity;
     const focused = document.activeElement; // a row that is moved loses it
     const names = [...state.order];
     if (this.by === "name") names.sort();
@@ -123,32 +106,24 @@ export class Table {
       if (this.body.children[index] !== tr) this.body.insertBefore(tr, this.body.children[index] ?? null);
     });
     if (this.body.contains(focused)) focused.focus();
-    for (const head of this.heads) {
-      head.setAttribute("aria-sort", head.dataset.key === this.by ? "ascending" : "none");
-    }
+    for (const head of this.heads) head.setAttribute("aria-sort", head.dataset.key === this.by ? "ascending" : "none");
   }
 
   line(name) {
-    const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}` });
-    const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}` });
-    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
-    const flag = element("span", { class: "flag", title: "Whether it keeps the limits, by the least margin; why it is never recommended: slow, not settled, harder than direct start" });
-    const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
-    const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
-    out.addEventListener("click", () => this.say({ what: "remove", name }));
-    const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
-    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), changed, out));
-    const tr = element("tr", { "data-name": name }, element("td", { class: "eye" }, eye), title, ...cells, bar);
     const select = () => {
       radio.checked = true;
       this.asked = this.say({ what: "select", name });
     };
-    radio.addEventListener("change", select);
-    tr.addEventListener("click", (event) => {
-      if (!event.target.closest("input, label, button")) select();
-    });
-    const line = { tr, eye, radio, cells, bar, flag, out, changed, asked: -1 };
-    eye.addEventListener("change", () => (line.asked = this.say({ what: "show", name, visible: eye.checked })));
+    const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}`, onchange: () => (line.asked = this.say({ what: "show", name, visible: eye.checked })) });
+    const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}`, onchange: select });
+    const flag = element("span", { class: "flag", title: "Whether it keeps the limits, by the least margin; why it is never recommended: slow, not settled, harder than direct start" });
+    const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
+    const out = button("\u00d7", `Take ${name} out`, () => this.say({ what: "remove", name }), { class: "out", "aria-label": `take ${name} out`, hidden: true });
+    const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
+    const line = { eye, radio, cells: cells(), bar, flag, out, changed, asked: -1 };
+    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), changed, out));
+    const onclick = (event) => event.target.closest("input, label, button") || select();
+    line.tr = element("tr", { "data-name": name, onclick }, element("td", { class: "eye" }, eye), title, ...line.cells, bar);
     return line;
   }
 }

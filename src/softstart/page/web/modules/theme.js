@@ -1,5 +1,5 @@
 // Light and dark: follows the system unless told otherwise; the choice stays in this browser.
-import { element } from "./numbers.js";
+import { element, stored } from "./numbers.js";
 
 const CHOICES = [["auto", "Auto"], ["light", "Light"], ["dark", "Dark"]];
 const KEY = "softstart-colours";
@@ -13,17 +13,11 @@ export class Theme {
   constructor(place, changed) {
     this.changed = changed;
     this.buttons = CHOICES.map(([choice, text]) => {
-      const input = element("input", { type: "radio", name: "theme", value: choice });
-      input.addEventListener("change", () => this.choose(choice));
+      const input = element("input", { type: "radio", name: "theme", value: choice, onchange: () => this.choose(choice) });
       place.append(element("label", {}, input, element("span", {}, text)));
       return input;
     });
-    let kept = "auto";
-    try {
-      kept = localStorage.getItem(KEY) ?? "auto";
-    } catch {
-      // a browser that keeps nothing follows the system
-    }
+    const kept = stored("localStorage", KEY);
     this.observer = new MutationObserver(() => this.read());
     this.observer.observe(document.body, { attributes: true, attributeFilter: ["class"] });
     this.choose(CHOICES.some(([choice]) => choice === kept) ? kept : "auto");
@@ -31,11 +25,7 @@ export class Theme {
 
   choose(choice) {
     for (const button of this.buttons) button.checked = button.value === choice;
-    try {
-      localStorage.setItem(KEY, choice);
-    } catch {
-      // see above
-    }
+    stored("localStorage", KEY, choice);
     window.Quasar?.Dark.set(choice === "auto" ? "auto" : choice === "dark");
     this.read();
   }
@@ -43,10 +33,9 @@ export class Theme {
   read() {
     this.dark = document.body.classList.contains("body--dark");
     const style = getComputedStyle(document.body);
-    const colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const names = ["ink", "quiet", "line", "kept", "grid", "paper", "shade", "accent", "torque", "motor", "load", "warn"];
-    this.colours = Object.fromEntries(names.map((name) => [name, colour(name)]));
-    this.font = style.getPropertyValue("--font").trim();
+    const names = ["font", "ink", "quiet", "line", "kept", "grid", "paper", "shade", "accent", "warn"];
+    this.colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    this.font = this.colours.font;
     const palette = this.dark ? DARK : LIGHT;
     palette.forEach((tone, index) => document.body.style.setProperty(`--strategy-${index}`, tone));
     this.changed();

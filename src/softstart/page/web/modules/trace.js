@@ -1,18 +1,13 @@
 // A start as the browser has it: channels over time, what they are at an instant, and where the bodies stand.
-// rows of single-precision numbers in base 64, as the server packs them
-function unpack(packed) {
-  const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
-  const all = new Float32Array(bytes.buffer);
+// `T`, `theta`, `w1` and `w2` are those of the shaft with the largest torque, of motor and load.
+export function unpack(packed) {
+  if (!packed?.data) return packed;
+  const all = new Float32Array(Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0)).buffer);
   const size = all.length / packed.channels.length;
   const found = { ...packed, data: undefined };
   packed.channels.forEach((name, row) => (found[name] = all.subarray(row * size, (row + 1) * size)));
-  return found;
-}
-
-// the traces of what the page knows, each unpacked when first looked at: most are overtaken before
-export function unpackAll(state) {
-  for (const [name, trace] of state.traces) if (trace.data) state.traces.set(name, unpack(trace));
-  if (state.reference?.trace?.data) state.reference.trace = unpack(state.reference.trace);
+  const { worst, motor, load } = packed;
+  return Object.assign(found, { T: found[`T[${worst}]`], theta: found[`theta[${worst}]`], w1: found[`w[${motor}]`], w2: found[`w[${load}]`] });
 }
 
 // index of the first instant that is not before t
@@ -49,18 +44,14 @@ export function extent(trace, channel, [from, to], low = Infinity, high = -Infin
 
 // angle of a body since the start: its speed summed up
 export function angleAt(trace, channel, t) {
-  const sums = ((trace.sums ??= {})[channel] ??= summed(trace.t, trace[channel]));
+  const speeds = trace[channel];
+  const sums = ((trace.sums ??= {})[channel] ??= speeds.reduce((found, w, i) => {
+    if (i) found[i] = found[i - 1] + 0.5 * (trace.t[i] - trace.t[i - 1]) * (w + speeds[i - 1]);
+    return found;
+  }, new Float64Array(speeds.length)));
   const i = Math.min(indexAt(trace.t, t), sums.length - 1);
-  return sums[i] + (t - trace.t[i]) * trace[channel][i];
-}
-
-function summed(times, values) {
-  const sums = new Float64Array(times.length);
-  for (let i = 1; i < times.length; i++) sums[i] = sums[i - 1] + 0.5 * (times[i] - times[i - 1]) * (values[i] + values[i - 1]);
-  return sums;
+  return sums[i] + (t - trace.t[i]) * speeds[i];
 }
 
 // the stage of an instant as [start, end, side]: side 0 while the gap is open
-export function stageAt(stages, t) {
-  return stages.findLast(([start]) => start <= t) ?? [0, Infinity, 0];
-}
+export const stageAt = (stages, t) => stages.findLast(([start]) => start <= t) ?? [0, Infinity, 0];

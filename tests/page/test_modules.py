@@ -1,0 +1,53 @@
+"""The functions behind the pictures, by closed forms: their modules are imported in the browser."""
+
+from __future__ import annotations
+
+import base64
+import math
+
+import numpy as np
+import pytest
+
+
+def run(page, module, expression, *arguments):
+    """An expression that begins with a name of the module; `a` are the arguments."""
+    name = expression.partition("(")[0]
+    return page.evaluate(
+        f"""async (a) => {{
+          const known = performance.getEntriesByType("resource").map((one) => one.name);
+          const {{ {name} }} = await import(known.find((one) => one.endsWith("/{module}.js")));
+          return {expression};
+        }}""",
+        list(arguments),
+    )
+
+
+def test_ticks_are_round_and_within_or_enclose(page):
+    assert run(page, "numbers", "ticks(0, 1, 5)") == pytest.approx([0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert run(page, "numbers", "ticks(-3, 47, 6)") == [0, 10, 20, 30, 40]
+    assert run(page, "numbers", "ticks(-3, 47, 6, true)") == [-10, 0, 10, 20, 30, 40, 50]
+    assert run(page, "numbers", "ticks(0, 3e-4, 3).digits") == 4
+
+
+def test_packed_traces_are_read_between_their_points(page):
+    rows = np.array([[0.0, 1.0, 3.0], [2.0, 4.0, 0.0], [5.0, 6.0, 7.0]], dtype="<f4")
+    packed = {"channels": ["t", "T[0]", "w[0]"], "worst": 0, "motor": 0}
+    trace = run(page, "trace", "unpack(...a)", packed | {"data": base64.b64encode(rows).decode()})
+    plain = {name: trace[name] for name in ("t", "T", "w1")}
+    assert plain == {"t": [0, 1, 3], "T": [2, 4, 0], "w1": [5, 6, 7]}
+    assert [run(page, "trace", "indexAt(...a)", plain["t"], t) for t in (-1, 0, 0.5, 1, 9)] == [0, 0, 1, 1, 3]
+    assert [run(page, "trace", "valueAt(...a)", plain, "T", t) for t in (0, 0.5, 2)] == [2, 3, 2]
+    assert run(page, "trace", "extent(...a)", plain, "T", [0, 1]) == [2, 4]
+    assert run(page, "trace", "angleAt(...a)", plain, "w1", 3) == pytest.approx(5.5 + 13.0)
+
+
+def test_contours_lie_on_their_level(page):
+    """Marching squares on a paraboloid: along each piece the level is kept to the order of the grid."""
+    count = 40
+    rows = [[(i / count) ** 2 + (j / count) ** 2 for i in range(count)] for j in range(count)]
+    rows[5][5] = None
+    pieces = run(page, "map", "contour(...a)", rows, 0.25)
+    radii = [math.hypot(x, y) / count for piece in pieces for x, y in piece]
+    assert radii == pytest.approx([0.5] * len(radii), abs=1.0 / count**2)
+    ends = [tuple(np.round(end, 9)) for piece in pieces for end in piece]
+    assert sum(ends.count(end) == 1 for end in ends) == 2  # one line, open at the two edges only
