@@ -181,7 +181,8 @@ def test_without_its_list_a_sweep_is_refused(pristine, tmp_path, damage):
     damage(folder / "status" / "softstart.sqlite")
     with pytest.raises(InputError, match=r"to = .*; give another folder") as caught:
         sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    assert "is damaged" in str(caught.value) or "no list of finished chunks" in str(caught.value)
+    said = "is damaged", "holds something else", "no list of finished chunks"
+    assert any(words in str(caught.value) for words in said)
 
 
 def test_other_readers_notice_a_flipped_bit_too(pristine, tmp_path):
