@@ -63,7 +63,7 @@ class Screen:
         origin, label = session.origin, session.selected
         controller = session.controllers[label]
         about = origin, label, type(controller)
-        if self._about == about:
+        if self._about[0] is origin and self._about == about:
             return
         if self._about[0] is not origin:
             self.axes, self._machine = machines.axes_about(origin), machines.entries(origin)
@@ -399,7 +399,7 @@ def outcomes(found: Strategy) -> Frame:
 
 def row(session: Session, found: Strategy) -> Frame:
     """One line of the table; `worn`, `settled`, `limits` and `flag` are empty until they are computed."""
-    known = session.rows.get(found.name)
+    known = session.row(found.name)
     flags = () if known is None else known.flags
     trouble = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
     return outcomes(found) | {

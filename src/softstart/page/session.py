@@ -130,9 +130,10 @@ class Session:
         self.name = secrets.token_urlsafe(9)
         self.version = 0  # how often anything was changed
         self._listeners: list[Callable[[], None]] = []
-        self._results: dict[str, Strategy] = {}
-        self.rows: dict[str, Row] = {}  # of a comparison, by label, as far as they are computed
-        self._direct: list[Run | None] = []  # empty until it is computed
+        # what was computed last, by label, and for what; `ready` and `row` tell whether it still holds
+        self._results: dict[str, tuple[Machine, Controller, Strategy]] = {}
+        self._rows: dict[str, Row] = {}
+        self._direct: tuple[Machine, Run | None] | None = None
         self._reference: tuple[Reference, Strategy] | None = None
 
     # the state -----------------------------------------------------------------------------------------
@@ -328,7 +329,13 @@ class Session:
 
     def ready(self, label: str) -> Strategy | None:
         """The result of a strategy if it is computed already."""
-        return self._results.get(label)
+        drive, controller, found = self._results.get(label, (None, None, None))
+        return found if drive is self.machine and controller is self.controllers.get(label) else None
+
+    def row(self, label: str) -> Row | None:
+        """The row of a strategy in a comparison, if it is computed already, see `judged`."""
+        row, found = self._rows.get(label), self.ready(label)
+        return row if row is not None and found is not None and row.run is found.run else None
 
     def result(self, label: str, max_events: int = MOST_EVENTS) -> Strategy:
         """A strategy on the drive as it is now. What goes wrong in its start becomes its sentence.
@@ -336,12 +343,13 @@ class Session:
         A start that has more than `max_events` events is given up, and is not kept as the result.
         """
         self._known(label)
-        if label not in self._results:
-            found = _started(label, self.machine, self.controllers[label], max_events)
-            if found.given_up and max_events < MOST_EVENTS:
-                return found
-            self._results[label] = found
-        return self._results[label]
+        if (known := self.ready(label)) is not None:
+            return known
+        drive, controller = self.machine, self.controllers[label]
+        found = _started(label, drive, controller, max_events)
+        if not found.given_up or max_events >= MOST_EVENTS:
+            self._results[label] = drive, controller, found
+        return found
 
     def reference(self) -> Strategy | None:
         """The start that all are compared with, on the drive that it was kept with; None if none was kept."""
@@ -355,7 +363,7 @@ class Session:
     def judged(self, label: str) -> Iterator[None]:
         """Compute the row of a strategy in a comparison, step by step; there is none if its start fails."""
         run = self.result(label).run
-        if run is None or label in self.rows:
+        if run is None or self.row(label) is not None:
             return
         cases = {}
         for case in CASES:
@@ -365,26 +373,28 @@ class Session:
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
                 cases[case] = Case.of(None)
-        row = Row(run, self.direct(), cases, label=label)
-        _ = run.settled_time, row.flags  # computed here, kept in the runs
-        self.rows[label] = row
+        self._rows[label] = Row(run, self.direct(), cases, label=label)
+        _ = run.settled_time, self._rows[label].flags  # computed here, kept in the runs
 
     def recommendation(self) -> Recommendation:
         """What is recommended among the strategies, and why: the text of `softstart.compare`."""
         for label in self.controllers:
             list(self.judged(label))
-        return recommend(self.machine, [self.rows[one] for one in self.controllers if one in self.rows])
+        return recommend(
+            self.machine, [row for one in self.controllers if (row := self.row(one)) is not None]
+        )
 
     def direct(self) -> Run | None:
         """The start that the others are compared with; None where it fails."""
-        if not self._direct:
-            known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None
+        if self._direct is None or self._direct[0] is not self.machine:
+            known = self.ready(REFERENCE) if REFERENCE not in self.changed else None
             run = known.run if known is not None else None
             try:
-                self._direct = [run or simulate(self.machine, REFERENCE, max_events=MOST_EVENTS)]
+                run = run or simulate(self.machine, REFERENCE, max_events=MOST_EVENTS)
             except (InputError, SimulationError):
-                self._direct = [None]
-        return self._direct[0]
+                run = None
+            self._direct = self.machine, run
+        return self._direct[1]
 
     def time_lost(self, found: Strategy) -> float:
         """Start time over that of `direct`, s; NaN where one of them is."""
@@ -394,7 +404,8 @@ class Session:
     def close(self) -> None:
         """Let go of all results and listeners: the user has gone."""
         self._listeners.clear()
-        self._forget(list(self.controllers))
+        self._results.clear()
+        self._rows.clear()
         self._past, self._future, self._reference = [], [], None
 
     # ---------------------------------------------------------------------------------------------------
@@ -405,32 +416,11 @@ class Session:
         last, when = self._gesture
         if not gesture or gesture != last or now - when > PAUSE or not self._past:
             self._past = [*self._past[1 - MOST_STEPS :], self.bench]
-        self._gesture = (gesture, now)
         self._future = []
-        self.bench = self._adopted(replace(self.bench, **changes))
-        self._changed()
+        self._go_to(replace(self.bench, **changes), (gesture, now))
 
-    def _go_to(self, bench: Bench) -> None:
-        self._gesture = ("", -math.inf)
-        self.bench = self._adopted(bench)
-        self._changed()
-
-    def _adopted(self, bench: Bench) -> Bench:
-        """A bench whose results are not those of the present one where the two differ."""
-        if bench.drive is not self.machine:
-            self._forget(list(self.controllers))
-            self._direct.clear()
-        for label, controller in self.controllers.items():
-            if bench.controllers.get(label) is not controller:
-                self._forget([label])
-        return bench
-
-    def _forget(self, labels: Iterable[str]) -> None:
-        for label in labels:
-            self._results.pop(label, None)
-            self.rows.pop(label, None)
-
-    def _changed(self) -> None:
+    def _go_to(self, bench: Bench, gesture: tuple[str, float] = ("", -math.inf)) -> None:
+        self.bench, self._gesture = bench, gesture
         self.version += 1
         for listener in tuple(self._listeners):
             listener()

@@ -89,7 +89,7 @@ def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
         rows |= {row["name"]: row for row in frame.get("rows", [])}
     for name in session.controllers:
         assert rows[name]["k_dyn"] == simulate(session.machine, name).k_dyn
-        assert rows[name]["worn"] == session.rows[name].k_dyn_worn_gap
+        assert rows[name]["worn"] == session.row(name).k_dyn_worn_gap
 
 
 def test_every_step_has_its_glance_until_the_browser_stops_drawing(monkeypatch):

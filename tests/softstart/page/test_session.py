@@ -36,7 +36,7 @@ def test_all_figures_are_those_of_compare_to_the_bit():
         assert strategy.k_dyn == row.run.k_dyn
         assert strategy.start_time == row.run.start_time
         list(session.judged(strategy.name))
-        assert session.rows[strategy.name].k_dyn_worn_gap == row.k_dyn_worn_gap
+        assert session.row(strategy.name).k_dyn_worn_gap == row.k_dyn_worn_gap
         assert session.time_lost(strategy) == row.time_lost
 
 
