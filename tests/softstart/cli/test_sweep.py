@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import json
+import sqlite3
+from contextlib import closing
 
 import pytest
 import xarray
@@ -124,11 +127,16 @@ LONG = (
 
 
 def test_an_interrupted_command_says_how_to_go_on(interrupted, place, as_json):
-    status = place / "grid" / "sweep.zarr" / "status" / "c"
-    err = interrupted(*LONG, begun=status.exists)
+    home = place / "grid" / "sweep.zarr"
+    listed = home / "status" / "softstart.sqlite"
+    err = interrupted(*LONG, begun=lambda: listed.exists() and b'{"part": [' in listed.read_bytes())
     assert "finished chunks are kept in grid/sweep.zarr; run the same command to continue." in err
     assert [path.name for path in (place / "grid").iterdir()] == ["sweep.zarr"]
-    done = {path: path.stat().st_mtime_ns for path in status.rglob("*") if path.name.isdigit()}
+    with closing(sqlite3.connect(listed)) as base:
+        records = [json.loads(text) for (text,) in base.execute("SELECT record FROM parts WHERE key > ''")]
+    files = [home / name for one in records if isinstance(one["part"], list) for name in one["files"]]
+    done = {path: path.stat().st_mtime_ns for path in files}
+    assert done
     told = as_json(*LONG)
     assert told["starts"] == 8_000
     assert 0 < told["computed"] < 8_000
