@@ -37,7 +37,6 @@ export class Theme {
     this.colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
     this.font = this.colours.font;
     const palette = this.dark ? DARK : LIGHT;
-    palette.forEach((tone, index) => document.body.style.setProperty(`--strategy-${index}`, tone));
     this.changed();
   }
 
