@@ -36,7 +36,6 @@ export class Theme {
     const names = ["font", "ink", "quiet", "line", "kept", "grid", "paper", "shade", "accent", "warn"];
     this.colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
     this.font = this.colours.font;
-    const palette = this.dark ? DARK : LIGHT;
     this.changed();
   }
 
