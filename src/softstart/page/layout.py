@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -24,6 +25,7 @@ from softstart.page.session import Session
 
 WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
+LARGE = "Sheet"  # this tab is built when it is opened: others would feel it
 # further tabs: title, module and class
 PANELS = (
     ("Optimum", "panels", "OptimumPanel"),
@@ -50,6 +52,14 @@ def style() -> str:
     """The style sheets of the page, in order."""
     names = ("style.css", "quasar.css", "panels.css")
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
+
+
+def warm(drive: Machine) -> None:
+    """Do what the first tab would wait for, and others behind it."""
+    gentlest(drive)
+    for _, module, _ in PANELS:
+        with suppress(Exception):  # said in its tab
+            import_module(f"softstart.page.{module}")
 
 
 @cache
@@ -121,12 +131,22 @@ def _panels(session: Session, client: Client) -> None:
         for title in (EXPLORE, *(title for title, _, _ in PANELS)):
             ui.tab(title).classes(f"tab-{title.lower()}")
     with ui.tab_panels(tabs, value=EXPLORE, animated=False).classes("panel-body"):
-        for title, module, name in PANELS:
+        places = {}
+        for title, _, _ in PANELS:
             with ui.tab_panel(title):
-                try:
-                    panel = getattr(import_module(f"softstart.page.{module}"), name)
-                    with ui.element("div").classes("panel"):
-                        panel(session, user)
-                except Exception as error:  # the live part must work without it
-                    log.debug("the panel %s cannot be built", title, exc_info=error)
-                    ui.label(sentence_of(error))
+                places[title] = ui.element("div").classes("panel")
+
+    def fill(title: str) -> None:
+        if (place := places.pop(title, None)) is None:  # it is there already
+            return
+        module, name = next(one[1:] for one in PANELS if one[0] == title)
+        with place:
+            try:
+                getattr(import_module(f"softstart.page.{module}"), name)(session, user)
+            except Exception as error:  # the live part must work without it
+                log.debug("the panel %s cannot be built", title, exc_info=error)
+                ui.label(sentence_of(error))
+
+    tabs.on_value_change(lambda event: fill(str(event.value)))
+    for title in [one for one in places if one != LARGE]:
+        fill(title)

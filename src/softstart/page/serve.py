@@ -181,7 +181,7 @@ def application(drive: Machine) -> App:
 
     for noisy in NOISY:
         logging.getLogger(noisy).setLevel(logging.CRITICAL)
-    layout.gentlest(drive)  # before anybody waits for it
+    layout.warm(drive)
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @ui.page("/", title=f"softstart: {drive.name}")
