@@ -595,7 +595,7 @@ def _wrong(attack: Attack, ended: Ended, left: set[str]) -> list[str]:
 @cache
 def option_names() -> frozenset[str]:
     """The options of all commands, as a remedy may name them."""
-    context = click.Context(cli)
+    context = click.Context(cli, **cli.context_settings)
     commands = [cli.get_command(context, name) for name in cli.list_commands(context)]
     parameters = [one for command in (cli, *commands) for one in command.get_params(context)]
     return frozenset(name for one in parameters for name in (*one.opts, *one.secondary_opts))

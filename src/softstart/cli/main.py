@@ -74,6 +74,8 @@ def _run(given: list[str]) -> int:
         with suppress(InputError, click.UsageError):  # the line is wrong before its last word
             cli.main(given, prog_name="softstart")
         return DONE
+    if STOPPING.is_set():
+        return INTERRUPTED
     try:
         with cli.make_context("softstart", list(given), obj=tuple(given)) as context:
             cli.invoke(context)
