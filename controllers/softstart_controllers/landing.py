@@ -163,7 +163,7 @@ def approach(p: Parameters, x: State, t: float, speed: float) -> float:
 
 @inner
 def open_again(t: float, motor_speed: float, load_speed_now: float, x: State, y: State) -> None:
-    """The flanks have parted: watch anew, from the speeds of motor and load."""
+    """The flanks have parted: watch again, from the speeds of motor and load."""
     y.count = 0.0
     y.free_speed = motor_speed
     y.contacts = x.contacts + 1.0

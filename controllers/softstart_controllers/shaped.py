@@ -236,7 +236,7 @@ class Shaped(CompiledController):
     No such levels may exist: the landing was too hard, or a load at rest still holds. Then the mean torque
     is T - 4 T'/Omega, within 0 and the full torque, which lets the swing die out (T'' = -4 Omega T'), or the
     torque is low until the load breaks away, and the levels are asked for again in every sample. Where the
-    flanks part again, the gap is closed anew.
+    flanks part again, the gap is closed again.
 
     *Limits.* After contact it counts on its model: elastic `frequency`, inertias, load torque and speed of
     the load are those of the nominal drive. A first-order lag of the torque commutes with the shaper, and is

@@ -268,7 +268,7 @@ class StateFeedback(CompiledController):
 
     *Limits.* Designs are made for groups without units on a grid (`contact_designs`), so
     neighbouring weights may give the same start. Where the estimate pulls by half the threshold, the gap
-    counts as open again and is closed anew. At `patience` the feedback is dropped for the full torque.
+    counts as open again and is closed again. At `patience` the feedback is dropped for the full torque.
 
     Source: linear-quadratic-Gaussian control as in the manual of python-control; landing as `shaped`.
 

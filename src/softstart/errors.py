@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
-MOST, LONGEST = 30, 1500  # sentences of one error, and letters of one sentence: more would fill pages
+MOST, LONGEST = 30, 1500  # sentences of one error, and characters of one sentence: more would fill pages
 
 
 class InputError(ValueError):

@@ -363,7 +363,7 @@ class Pool:
                     raise
         raise SimulationError(
             f"A process died {ATTEMPTS} times ({death}) while it computed {self.describe(task)}; if the "
-            f"system ended it for want of memory, {self.advice}. {self.kept}"
+            f"system ended it because memory ran out, {self.advice}. {self.kept}"
         )
 
     def _worker(self) -> Worker:

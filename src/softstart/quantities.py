@@ -405,7 +405,7 @@ def _single(value: object, unit: str, infinite: bool) -> float:
     if isinstance(value, str):
         return _text(value, unit, infinite)
     if isinstance(value, bool | np.bool_):
-        raise RefusedError(f"true and false are no quantities; {_remedy(unit)}")
+        raise RefusedError(f"true and false are not quantities; {_remedy(unit)}")
     if value is None:
         raise RefusedError(f"there is no value; {_remedy(unit)}")
     if isinstance(value, list | tuple):
@@ -415,7 +415,7 @@ def _single(value: object, unit: str, infinite: bool) -> float:
         a = {"dict": "a table", "complex": "a complex number"}.get(
             kind, f"a{'n' * (kind[0] in 'aeiou')} {kind}"
         )
-        raise RefusedError(f"{a} is no quantity; {_remedy(unit)}")
+        raise RefusedError(f"{a} is not a quantity; {_remedy(unit)}")
     try:
         return _checked(float(value), unit, infinite)
     except OverflowError:
@@ -434,7 +434,7 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     stripped = text.strip().replace("\N{MINUS SIGN}", "-")
     match = _NUMBER.match(stripped)
     if match is None:
-        raise RefusedError(f"this is no number with a unit; {_remedy(unit)}")
+        raise RefusedError(f"this is not a number with a unit; {_remedy(unit)}")
     written = stripped[match.end() :].strip()
     if "," in written:
         raise RefusedError(doubtful_comma(stripped, unit))

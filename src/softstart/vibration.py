@@ -1,6 +1,6 @@
 """Natural vibration of a chain with its gaps closed, and the two masses that stand for it.
 
-The mass-normalised stiffness of a chain is B'B with B bidiagonal, one row a shaft, and its natural
+The mass-normalised stiffness of a chain is B'B with B bidiagonal, one row per shaft, and its natural
 frequencies are the singular values of B. The entries of a bidiagonal matrix determine them to the last
 digits, however many decades they span (J. Demmel, W. Kahan, SIAM J. Sci. Stat. Comput. 11 (1990) 873-912,
 doi:10.1137/0911052), and LAPACK keeps those digits (qd algorithm) if the matrix is square, so that nothing

@@ -52,7 +52,7 @@ class Extent:
     kinds: tuple[LoadKind, ...] = ("active",)  # that of [G]; optima of reactive loads take ten times as long
 
 
-Map = NDArray[np.float64]  # one row a gap, one column a load inertia
+Map = NDArray[np.float64]  # one row per gap, one column per load inertia
 BETTER = 1e-9
 
 

@@ -220,7 +220,7 @@ MOST = 6.0  # K_dyn shown at the most
 
 
 def life_figure(found: Life) -> Figure:
-    """K_dyn over the gap, a panel a controller, a line a way of setting up."""
+    """K_dyn over the gap, a panel per controller, a line per way of setting up."""
     return _panels(found, lambda one: one.k_dyn, "$K_{dyn}$", "dotted: direct")
 
 

@@ -131,7 +131,7 @@ TOML = [
     ("profile = 3\n", "[profile] = 3: write a table with the lists"),
     ("[profile]\ntime = [0]\n", "torque is missing: write a list"),
     ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
-    ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "time[1] = True: true and false are no quantities"),
+    ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "time[1] = True: true and false are not quantities"),
     ("[profile]\ntime = [0, inf]\ntorque = [1, 1]\n", "time[1] = inf: it must be finite"),
     ("[profile]\ntime = [0, 1]\ntorque = [1]\n", "2 times for 1 torques"),
     ("[profile]\ntime = [1, 2]\ntorque = [1, 1]\n", "its first time is 1 s"),

@@ -111,7 +111,7 @@ def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerS
 class Design:
     """A layout of the balancer: where its arm is computed, and what of it is used.
 
-    `gas`: for the gas torque too, not that of inertia alone; `variable`: anew at every speed, not at the
+    `gas`: for the gas torque too, not that of inertia alone; `variable`: computed at every speed, not at the
     tuning speed once; `sideways`: its offset e too, not its height h alone.
     """
 
@@ -432,7 +432,7 @@ def _residual(
     moments: Complex,
     places: Complex | None = None,
 ) -> Residual:
-    """What is left with the forces of these shafts and with these moments over w^2, a row a speed."""
+    """What is left with the forces of these shafts and with these moments over w^2, a row per speed."""
     w2 = speeds**2
     if engine.gas is None:
         left = -np.outer(w2, engine.inertia_harmonics)

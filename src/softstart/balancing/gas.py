@@ -49,7 +49,7 @@ class GasCycle(Hashable, Protocol):
         """Angles in rad between which the pressure is smooth."""
 
     def shapes(self, cylinders: Cylinders, theta: Vector) -> Vector:
-        """Shapes of the pressure at angles in rad, one row a shape."""
+        """Shapes of the pressure at angles in rad, one row per shape."""
 
     def weights(self, cylinders: Cylinders, speed: float, load: float) -> Vector:
         """Factors on the shapes that give the pressure difference in Pa on the piston."""
@@ -101,7 +101,7 @@ def shape_work(cycle: GasCycle, cylinders: Cylinders) -> Vector:
 
 @lru_cache(maxsize=32)
 def torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Complex:
-    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row a shape."""
+    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row per shape."""
     theta, torque = _torque_shapes(cycle, cylinders)
     turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * highest + 1)))
     # einsum: threads of a BLAS cost more than such a small product where other processes work too

@@ -128,7 +128,7 @@ def cli(context: click.Context) -> None:
 
 
 def short_help(name: str, limit: int = 45) -> str:
-    """The help of a command in at most `limit` letters, as click shortens it."""
+    """The help of a command in at most `limit` characters, as click shortens it."""
     return click.Command(name, help=COMMANDS[name][1]).get_short_help_str(limit)
 
 

@@ -129,7 +129,7 @@ class GainSchedule(Tuned):
     logarithmic; at a node they are those of the node to the bit. Outside the grid the nearest value on its
     edge is taken: nothing is extrapolated. All other parameters follow the drive, as they do without tuning.
 
-    `gains` holds name, scale and values (a row a gap, a column a load inertia).
+    `gains` holds name, scale and values (a row per gap, a column per load inertia).
 
     >>> gains = (("time", "linear", np.array([[0.1], [0.2]])),)
     >>> schedule = GainSchedule("schedule", make_controller("ramp"), (0.5, 1.0), (0.175,), gains)
@@ -288,7 +288,7 @@ def _name(document: Mapping[str, Any], path: Path) -> str:
 def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
     found = document.get(key, None if needed else {})
     if not isinstance(found, dict):
-        raise _wrong(path, f"the table [{key}] is missing; let softstart tune write the file anew")
+        raise _wrong(path, f"the table [{key}] is missing; write the file again with softstart tune")
     return found
 
 
@@ -351,7 +351,7 @@ def _positive(gains: dict[str, Gain], path: Path) -> dict[str, Gain]:
         if gain.scale == "logarithmic" and not np.all(gain.values > 0.0):
             raise _wrong(path, f'the gain {name} is 0 or less in a cell; its scale must be "linear"')
     if not gains:
-        raise _wrong(path, "it has no gains; let softstart tune write the file anew")
+        raise _wrong(path, "it has no gains; write the file again with softstart tune")
     return gains
 
 
@@ -441,7 +441,7 @@ def schedule_text(saved: ScheduleFile, about: Mapping[str, Any] | None = None) -
 
 
 def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:
-    """The CSV text of a schedule: comment lines that say what it is, then one row a cell.
+    """The CSV text of a schedule: comment lines that say what it is, then one row per cell.
 
     `columns` are further figures of each cell; they are not read back.
     """

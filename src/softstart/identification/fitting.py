@@ -780,7 +780,7 @@ class Fitter:
         is the end. So is a bound that L does not exclude. The steps begin at that of the `others` from which
         they get furthest, see `elsewhere`.
 
-        A fit that went far along a valley has explained errors as motion: the deviations are found anew from
+        A fit that went far along a valley has explained errors as motion: the deviations are found again from
         what is left at the end, and hold for both places. No end lies nearer than the quadratic.
         """
         bound = float((solution.upper if sign > 0.0 else solution.lower)[i])

@@ -47,7 +47,7 @@ class Estimate:
         False if the interval is wider than a factor of 3; of a friction, than a tenth of the torque that
         accelerates.
     by_profile : bool
-        Whether the interval is where the fit gets worse, with all other parameters fitted anew, because its
+        Whether the interval is where the fit gets worse, with all other parameters refitted, because its
         quadratic would mislead.
     reason : str
         Why it is unknown; else empty.

@@ -345,7 +345,7 @@ def _without_intervals(space: Space, solution: Solution) -> list[Estimate]:
 
 
 def _estimates(fitter: Fitter, solution: Solution, guess: Vector, others: Sequence[Other]) -> list[Estimate]:
-    """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
+    """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
     space, found, lost = fitter.space, [], set[str]()
     covariance = covariance_of(solution.part.jacobian, space)
     sizes, untold = _sizes(solution, covariance), _untold(fitter, solution, guess)

@@ -311,7 +311,7 @@ def _read_text(parameter: Parameter, value: object) -> str:
     if not isinstance(value, str) or not (title or value.strip() or parameter.default == ""):
         raise RefusedError(f"{what} must be text, such as {parameter.example}")
     if any(0xD800 <= ord(letter) < 0xE000 for letter in value):
-        raise RefusedError("this text has half a character (a lone surrogate); write it again")
+        raise RefusedError("this text contains an incomplete character (a lone surrogate); write it again")
     if title and (not value.strip() or len(value.splitlines()) > 1):
         raise RefusedError(f"{what} must be one line of text that is not empty")
     if title and len(value) > LONGEST_LINE:

@@ -85,7 +85,7 @@ def compile_now(module: Any) -> None:
 def named(row: Any, dtype: Any) -> Any:
     """The same memory with names: row 0 of `row.view(dtype)`, in compiled functions at no cost.
 
-    numba compiles `view` anew for each pair of types, a tenth of a second each.
+    numba compiles `view` again for each pair of types, a tenth of a second each.
 
     >>> import numpy as np
     >>> float(named(np.array([3.0, 4.0]), np.dtype([("x", float), ("y", float)]))["y"])

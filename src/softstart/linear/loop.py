@@ -10,7 +10,7 @@ closed-loop pole and -1 is the critical point. All crossings are found, and the 
     modulus margin: the least distance |1 + L| from -1, the inverse of the peak of the sensitivity
 
 A delay is no mere turn of phase here: a controller that measures the torque it made measures the delay too,
-and between samples a held demand is divided anew, so L under a delay is not L e^(-jws). But whole samples
+and between samples a held demand is divided again, so L under a delay is not L e^(-jws). But whole samples
 are: with s = n h + f, 0 <= f < h,
 
     L_s(z) = z^-n L_f(z)

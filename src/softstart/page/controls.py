@@ -16,7 +16,7 @@ from softstart.page.session import Session
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LARGEST = 1e15  # beyond any number of a message: clocks in ms, positions, values
-LONGEST_TEXT = 200  # letters in a field
+LONGEST_TEXT = 200  # characters in a field
 
 
 class Delay:
@@ -110,7 +110,9 @@ class Controls:
     def _edit(self, path: str, text: str) -> None:
         entry = self._entry(path)
         if len(text) > LONGEST_TEXT:
-            raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {entry.example}.")
+            raise InputError(
+                f"{path}: the text has more than {LONGEST_TEXT} characters; write {entry.example}."
+            )
         words = self._screen.units.typed(" ".join(text.split()), entry.unit)
         if not (words or entry.optional):
             raise InputError(f"{path}: the field is empty; write for example {entry.example}.")
@@ -130,7 +132,7 @@ class Controls:
         self._screen.mistakes.clear()
 
     def _hello(self, kept: object, link: object) -> None:
-        """A page that is loaded anew goes on with the bench that its tab has kept, or that of its address."""
+        """A page that is reloaded goes on with the bench that its tab has kept, or that of its address."""
         self._screen.sent.clear()
         if isinstance(kept, Mapping) and kept.get("server") == SERVER and kept.get("link") == link:
             known = links.kept(str(kept.get("bench")), str(link))

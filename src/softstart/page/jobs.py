@@ -33,7 +33,7 @@ log = logging.getLogger("softstart.page")
 class State(Enum):
     """Where a job is; the values are the sentences shown."""
 
-    WAITING = "Waiting for its turn."
+    WAITING = "Queued."
     RUNNING = "Computing."
     DONE = "Done."
     CANCELLED = "Cancelled."

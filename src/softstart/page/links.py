@@ -2,7 +2,7 @@
 
 A link holds the drive, the parameters of installed strategies, what is selected and drawn, and the reference.
 Tuned gains and profiles come from files and are not part of it; the server keeps them for a tab that is
-loaded anew.
+reloaded.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from softstart.errors import InputError
 from softstart.page.machines import machine_from, single
 from softstart.page.session import Bench, Reference, Session
 
-MOST_KEPT = 64  # benches of tabs that may be loaded anew
-LONGEST = 16_384  # letters of a link
+MOST_KEPT = 64  # benches of tabs that may be reloaded
+LONGEST = 16_384  # characters of a link
 LARGEST = 65_536  # bytes that it may hold
 
 _kept: OrderedDict[str, tuple[str, Bench]] = OrderedDict()  # link and bench

@@ -443,7 +443,7 @@ class TaskPanel:
         controllers: dict[str, Controller] = dict(self._found.controllers) if self._found else {}
         self._stale.check()
         label = self.session.add(label, controllers[label], select=False)
-        notify(f"{label} is among the strategies.")
+        notify(f"{label} was added to the strategies.")
 
     def _use(self) -> None:
         if self._found is not None and self._found.drive is not None:

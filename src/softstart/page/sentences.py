@@ -13,8 +13,8 @@ from softstart.quantities import Units, shortest
 from softstart.views.numbers import unit, units_of
 
 log = logging.getLogger("softstart.page")
-LONGEST = 300  # letters of an exception
-LONGEST_NAME = 60  # letters of a name in a sentence
+LONGEST = 300  # characters of an exception
+LONGEST_NAME = 60  # characters of a name in a sentence
 NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source", "assumed", "units", "gear_ratio")  # they change no result
 

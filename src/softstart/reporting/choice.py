@@ -26,7 +26,7 @@ MOST_MAPS = 4
 
 @dataclass(frozen=True, eq=False)
 class RobustnessMap:
-    """K_dyn and start time (s) of one strategy: a row a gap (rad), a column a load inertia (kg m2).
+    """K_dyn and start time (s) of one strategy: a row per gap (rad), a column per load inertia (kg m2).
 
     K_dyn refers to the mean torque of the nominal drive, so that it compares shaft torques. NaN where the
     start was not finished or the load did not reach its target speed.

@@ -257,7 +257,7 @@ def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Ga
 
 
 def table_of(dataset: xarray.Dataset) -> dict[str, Any]:
-    """A dataset over the grid as nested lists, one row a gap; NaN is None."""
+    """A dataset over the grid as nested lists, one row per gap; NaN is None."""
     return {
         str(name): [[_plain(value) for value in row] for row in np.asarray(values).tolist()]
         for name, values in dataset.items()

@@ -357,7 +357,7 @@ def _varied(drive: Machine, name: str) -> Knob:
     known = {path: one for path in drive.knobs() if (one := drive.knob(path)) and one.parameter.unit}
     near = nearest(name, [*known, *(one.name for one in known.values())])
     hint = f"did you mean {near}?" if near else f"name one of its file, as {next(iter(known))}."
-    raise InputError(f"tolerances: {name} is no quantity of a {drive.KIND}; {hint}")
+    raise InputError(f"tolerances: {name} is not a quantity of a {drive.KIND}; {hint}")
 
 
 def _levels(varied: Knob, given: Any) -> list[Level]:

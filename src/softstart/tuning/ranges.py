@@ -154,7 +154,9 @@ def _range(controller: str, name: str, ends: Any, known: Mapping[str, Field[Any]
         raise InputError(f"free: the controller {controller} has no parameter {name}; {hint}")
     field = known[name]
     if field.metadata.get("kind", "quantity") != "quantity":
-        raise InputError(f"free: {name} of the controller {controller} is no quantity; it cannot be tuned.")
+        raise InputError(
+            f"free: {name} of the controller {controller} is not a quantity; it cannot be tuned."
+        )
     declared = _declared(field)
     if ends is None:
         if declared is None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 MOST_MODES = 12
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
 TALLEST, DISC = 150.0, 16.0  # px, of the discs of the scheme: the tallest, and their thickness
-WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; letters of a mass in it
+WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; characters of a mass in it
 
 
 # sheets ----------------------------------------------------------------------------------------------------

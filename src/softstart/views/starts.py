@@ -68,7 +68,7 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
-        ["shaft torque settled from", with_unit(run.settling_time(), "s")],
+        ["shaft torque settled after", with_unit(run.settling_time(), "s")],
         ["first contact", with_unit(run.first_contact, "s")],
         ["speed of impact", with_unit(run.impact_speed, "rad/s")],
         ["motor torque at contact", with_unit(run.torque_at_contact, "N m")],

@@ -104,7 +104,7 @@ def _columns(table: Dataset) -> dict[str, list[Any]]:
 
 
 def cell_table(tuning: Tuning, table: Dataset) -> Table:
-    """The schedule, one row a cell."""
+    """The schedule, one row per cell."""
     of, metric = _columns(table), _metric(tuning)
     numbers = {
         "gap\nrad": of["gap"],
@@ -144,7 +144,7 @@ def _tables(tuning: Tuning) -> Iterator[Table]:
 
 
 def _grid(tuning: Tuning, title: str, values: Any) -> Table:
-    """A figure over the grid, one row a gap."""
+    """A figure over the grid, one row per gap."""
     q = tuning.question
     cells = [short(gap) for gap in q.gaps], *(column_of(column) for column in values.to_numpy().T.tolist())
     headings = ["gap rad", *(f"J2 {inertia:.4g}" for inertia in q.load_inertias)]

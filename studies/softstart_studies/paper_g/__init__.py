@@ -109,7 +109,7 @@ class PaperG(Study):
 
 
 def curves_csv(figures: Mapping[str, Sequence[curves.Curve]]) -> str:
-    """Curves and points as text, one row a value; the plant's column is empty where it was not asked."""
+    """Curves and points as text, one row per value; the plant's column is empty where it was not asked."""
     stream = io.StringIO()
     stream.write("figure,curve,M1/Ms,closed form,plant\n")
     for number, drawn in figures.items():

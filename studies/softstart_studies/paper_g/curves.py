@@ -167,7 +167,7 @@ def _note(printed: str, exact: float, terms: tuple[float, ...]) -> str:
 
 
 def agreement_table(figures: Mapping[str, Sequence[Curve]]) -> Table:
-    """Largest relative difference between plant and closed form, one row a figure."""
+    """Largest relative difference between plant and closed form, one row per figure."""
     rows = []
     for name, curves in figures.items():
         points = sum(len(curve.at) for curve in curves)

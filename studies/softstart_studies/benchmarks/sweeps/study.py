@@ -73,10 +73,10 @@ def claims(found: Found) -> list[Claim]:
         )
     made.append(
         Claim(
-            "Killed twice and begun again, a sweep has the same bits and makes no finished chunk anew.",
+            "Killed twice and begun again, a sweep has the same bits and computes no finished chunk again.",
             Verdict.of(found.resumed and found.kept),
             f"Bits {'agree' if found.resumed else 'differ'}; finished chunks were "
-            f"{'kept' if found.kept else 'made anew'}.",
+            f"{'kept' if found.kept else 'computed again'}.",
         )
     )
     if found.on_cluster is not None:

@@ -35,7 +35,7 @@ export class Instrument {
     for (const canvas of root.querySelectorAll("canvas")) this.resized.observe(canvas.parentElement);
   }
 
-  // a page is loaded anew by its reader, or when the line was lost for long: it goes on with its drive
+  // a page is reloaded by its reader, or when the line was lost for long: it goes on with its drive
   hello() {
     const hello = (kept) => this.say({ what: "hello", kept, link: location.hash.slice(1) });
     hello(JSON.parse(stored("sessionStorage", KEPT)));
@@ -105,7 +105,7 @@ export class Instrument {
     this.player.show(t);
   }
 
-  // size or colours have changed: everything anew
+  // size or colours have changed: draw everything again
   redraw() {
     this.plotted = false;
     this.map?.fade();

@@ -53,7 +53,7 @@ export function stored(storage, key, value) {
   }
 }
 
-// what is written already is not written again: the browser would lay it out anew
+// what is written already is not written again: the browser would lay it out again
 export function put(place, text) {
   if (place.textContent !== text) place.textContent = text;
 }
