@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 54360, "tests": 38456}  # lines; lower a number when it has fallen, never raise it
+MOST = {"src, controllers": 52621, "tests": 38349}  # lines; lower a number when it has fallen, never raise it
 LONGEST = 896  # lines of the longest file
 
 
