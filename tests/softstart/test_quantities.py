@@ -163,9 +163,9 @@ REFUSED = [
     (True, "rad", "true and false are not quantities"),
     (np.bool_(True), "rad", "true and false are not quantities"),
     (None, "rad", "there is no value"),
-    (1j, "rad", "a complex number is no quantity"),
-    ({}, "rad", "a table is no quantity"),
-    (b"1", "rad", "a bytes is no quantity"),
+    (1j, "rad", "a complex number is not a quantity"),
+    ({}, "rad", "a table is not a quantity"),
+    (b"1", "rad", "a bytes is not a quantity"),
     ([], "rad", "an empty list holds no value"),
     ([[1, 2], [3]], "rad", "the rows of a list must all have the same length"),
 ]

@@ -17,7 +17,7 @@ GOOD_TOML = Drive(**GOOD).to_toml()
 # a line of the good file, what stands there instead, what the sentence begins with, what it says
 TOML = [
     ("gap = 0.5", 'gap = "5 m"', '[shaft] gap = "5 m": ', "m is a length"),
-    ("gap = 0.5", "gap = 2024-01-01", "[shaft] gap = 2024-01-01: ", "a date is no quantity"),
+    ("gap = 0.5", "gap = 2024-01-01", "[shaft] gap = 2024-01-01: ", "a date is not a quantity"),
     ("gap = 0.5", "", "[shaft] gap is missing: ", 'write for example gap = "0.5 rad"'),
     ("gap = 0.5", "gapp = 0.5", "[shaft] gapp = 0.5: ", "[shaft] has no key gapp; did you mean gap?"),
     ("gap = 0.5", "Gap = 0.5", "[shaft] Gap = 0.5: ", "did you mean gap?"),

@@ -43,7 +43,7 @@ PYTHON = [
     ("name", "two\nlines", 'name = "two\\nlines": ', "one line of text"),
     ("name", 5, "name = 5: ", "must be text"),
     ("source", ["a", "b"], "source = ['a', 'b']: ", "must be text"),
-    ("source", "\ud800", "source = ", "half a character"),
+    ("source", "\ud800", "source = ", "incomplete character"),
     ("gapp", 1, "gapp = 1: ", "did you mean gap?"),
     ("J1", 1, "J1 = 1: ", "did you mean motor_inertia?"),
     ("inertia", 1, "inertia = 1: ", "did you mean motor_inertia or load_inertia?"),
@@ -90,7 +90,7 @@ def test_several_cross_checks_at_once(sentences):
 SETTINGS = [
     ("load.inertia", '"load.inertia": ', "a key, an equals sign and a value"),
     ("=0.07", '"=0.07": ', "a key, an equals sign and a value"),
-    ("load.inertia=", 'load.inertia = "": ', "no number with a unit"),
+    ("load.inertia=", 'load.inertia = "": ', "not a number with a unit"),
     ("load.inertia=-1", 'load.inertia = "-1": ', "must be above 0"),
     ("load_inertia=-1", 'load_inertia = "-1": ', "must be above 0"),
     ("load.inertai=1", "load.inertai=1: ", "did you mean load.inertia?"),

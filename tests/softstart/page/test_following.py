@@ -529,4 +529,4 @@ def test_a_message_that_the_page_does_not_send_is_dropped(wrong):
 def test_a_text_too_long_for_a_field_is_not_read_and_not_repeated():
     controls, screen = controls_of(Session(controllers=["direct"]))
     controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
-    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 letters")
+    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")
