@@ -110,7 +110,7 @@ def test_a_law_is_read_with_its_units(tmp_path):
 
 BAD_LAWS = {
     "three columns": ("0,1,2\n", 'line 1, "0,1,2", has 3 values instead of 2'),
-    "word": ("0,0\n1,much\n", 'line 2, torque = "much": this is no number'),
+    "word": ("0,0\n1,much\n", 'line 2, torque = "much": this is not a number'),
     "unit": ("t [m],M\n1,2\n", "m is a length, not a time"),
 }
 
