@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from softstart.chain.model import Chain, ChainArrays
 
-
 AT_REST = 1e18  # times the inertia of all others: the motion of a mass at rest is below rounding
 FACTOR = 10.0
 """The least (frequency/first natural frequency)^2 of all that two masses leave out; see `reduce_chain`."""

@@ -111,10 +111,8 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
     gap.fill("0.7")
     gap.press("Enter")
     page.get_by_test_id("optimum-stale").wait_for()
-    comes_to(
-        lambda: page.get_by_test_id("optimum-stale").inner_text(),
-        "For shaft.gap 0.5 rad; the drive has changed since.",
-    )
+    changed = "For shaft.gap 0.5 rad; the drive has changed since."
+    comes_to(lambda: page.get_by_test_id("optimum-stale").inner_text(), changed)
 
     load = page.locator('[data-path="load.torque"] input[type=text]')
     load.fill("-2")
@@ -182,8 +180,7 @@ def test_two_users_have_their_own_sessions_and_a_closed_tab_ends_its_jobs(
     assert first.get_by_text(best, exact=True).count() == 0
     until(lambda: len(server.jobs()) > 0, 5.0, second)
     first.context.close()
-    spare = 1  # one process waits for the next job
-    until(lambda: len(server.jobs()) <= spare, 25.0, second)
+    until(lambda: len(server.jobs()) <= 1, 25.0, second)  # one process waits for the next job
     second.get_by_test_id("optimum-time").fill("0.5")
     second.get_by_test_id("optimum-go").click()
     assert k_dyn(second, "optimum 0.5 s") == f"{optimize(CRANE, 0.5).k_dyn:.3f}"

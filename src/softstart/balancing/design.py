@@ -32,7 +32,6 @@ from softstart.quantities import to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
 NOTHING = 1e-9  # of the forces of all cylinders: rounding, not a force
 RPM = 30.0 / math.pi  # of one rad/s
 POINTS = 96  # speeds over the range

@@ -22,9 +22,10 @@ from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError, SimulationError
-from softstart.input.documents import Table
+from softstart.input.documents import Table, parsed
 from softstart.input.files import ABSENT, Library, read_text, refusal_of
 from softstart.input.parameter_set import read_settings
+from softstart.input.parameters import Wording
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import RefusedError, to_si, values_in, whole_number
 
@@ -115,9 +116,9 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
 def _data_sheet(name: str) -> str | None:
     """The text of the file of this name, if it is a data sheet."""
     if name not in drive_names() and refusal_of(name) is None:
-        with suppress(RefusedError, ValueError):  # told by the reader of drives
+        with suppress(RefusedError, InputError):  # told by the reader of drives
             text = read_text(name)
-            return text if DataSheet.describes(tomllib.loads(text)) else None
+            return text if DataSheet.describes(parsed(text, Wording(name), "a drive")) else None
     return None
 
 

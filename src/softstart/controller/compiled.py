@@ -29,7 +29,6 @@ from softstart.kernel.motor import (  # isort: skip
 # indices of `command`; the new state follows from STATE on
 from softstart.kernel.motor import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
 
-
 __all__ = [
     "ASK_AGAIN",
     "LOAD_SPEED",

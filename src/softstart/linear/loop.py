@@ -62,7 +62,6 @@ from softstart.linear.systems import (
 if TYPE_CHECKING:
     import control
 
-
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
 FRACTIONS = 14  # of a sample
 NEAR = 0.5  # of a sample: how far from a whole number a guess may be

@@ -32,7 +32,6 @@ from softstart.linear.systems import Mode
 if TYPE_CHECKING:
     import control
 
-
 INERTIAS = (0.4, 1.0, 2.5)
 STIFFNESSES = (0.9, 1.1)
 POOR = 0.02  # mismatch above which a note says that the view is doubtful

@@ -392,7 +392,7 @@ class TaskPanel:
             self._stale = StaleNote(session, self.name)
             self._buttons = box("panel-actions")
             self._shown = ui.html("", sanitize=False).classes("answer")
-            self._shown.props(f'data-testid="{self.name}-answer"')
+            self._shown.props(f'data-testid="{self.name}-answer" tabindex=0 role=group aria-label="Answer"')
             for event in ("click", "keydown"):
                 self._shown.on(event, js_handler=ENLARGE)
         self._result.set_visibility(False)

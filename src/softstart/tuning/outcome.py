@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from softstart.chain.machines import Machine
 
-
 What = Literal["schedule", "robust"]
 
 

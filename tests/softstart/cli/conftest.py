@@ -97,6 +97,7 @@ def place(tmp_path, monkeypatch):
     (tmp_path / "nothing.py").write_text("x = 1\n")
     (tmp_path / "quits.py").write_text("raise SystemExit(5)\n")
     (tmp_path / "good.toml").write_text(DRIVE)
+    (tmp_path / "deep.toml").write_text(f"[{'a.' * 60_000}a]\nb = 1\n")  # took memory by its square
     (tmp_path / "empty.toml").write_text("")
     (tmp_path / "broken.toml").write_text("name = \n")
     (tmp_path / "latin.toml").write_bytes(b'name = "caf\xe9"\n')
