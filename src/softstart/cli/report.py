@@ -102,6 +102,8 @@ def _check_file(option: str, out: str) -> None:
     reason = ""
     if not out.strip() or "\0" in out:
         reason = "this cannot be the name of a file"
+    elif out.startswith("--"):
+        reason = "this is an option, not the name of a file"
     elif path.exists() and not path.is_file():  # a device or a pipe would be replaced by the file
         reason = "this is a folder" if path.is_dir() else "this is no ordinary file"
     else:

@@ -104,6 +104,7 @@ for line in OF_A_DRIVE:
     name = line.split()[0]
     ONE_SENTENCE[f"{name}: misspelt"] = (line.format("crane-4amtk").split(), ["did you mean crane-4amtkf?"])
     ONE_SENTENCE[f"{name}: output"] = (line.format("--out good.toml").split(), ["is a file, not a folder"])
+ONE_SENTENCE["pdf"] = (["report", "good.toml", "--pdf", "--json"], ["--pdf", "this is an option"])
 ONE_SENTENCE["deep"] = (["compare", "deep.toml"], ["deep.toml: line 1", "keys are nested too deeply"])
 
 
