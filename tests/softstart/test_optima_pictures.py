@@ -10,7 +10,7 @@ from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, Optimum
 from softstart.profile import TorqueProfile
 from softstart.views.drawing import save_figure
-from softstart.views.optima import front_figure, optimum_figure, scenario_table
+from softstart.views.optima import front_figure, optimum_figure
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
