@@ -10,7 +10,7 @@ from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, Optimum
 from softstart.profile import TorqueProfile
 from softstart.views.drawing import save_figure
-from softstart.views.optima import front_figure, optimum_figure
+from softstart.views.optima import front_figure, optimum_figure, scenario_table
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -103,8 +103,7 @@ def test_the_front_is_drawn_from_its_points():
 def test_a_tall_front_has_a_logarithmic_axis_a_flat_one_begins_at_zero():
     assert front_figure(front([("direct", 0.24, 9.0)])).axes[0].get_yscale() == "log"
     flat = front_figure(front([])).axes[0]
-    assert flat.get_yscale() == "linear"
-    assert flat.get_ylim()[0] == 0.0
+    assert (flat.get_yscale(), flat.get_ylim()[0]) == ("linear", 0.0)
 
 
 def test_pictures_are_files(tmp_path):
@@ -124,3 +123,13 @@ def test_one_profile_for_several_machines_is_drawn_from_all_runs():
         assert any(np.array_equal(one, np.column_stack([run.t, run.T])) for one in drawn)
     worst = max(best.runs, key=lambda run: run.peak_torque)
     assert [worst.peak_time, worst.peak_torque] in [one[0].tolist() for one in drawn]
+    rows = scenario_table(best).rows
+    assert [row[:3] for row in rows] == [
+        ["1", "0.500", "0.1750"], ["2", "0.400", "0.1750"], ["3", "1.000", "0.1000"],
+    ]  # fmt: skip
+    assert [float(row[4]) for row in rows] == pytest.approx(best.k_dyn_each, abs=1e-4)
+
+
+def test_a_front_without_any_optimum_is_drawn():
+    refused = FrontPoint(0.2, "reached", "INFEASIBLE", "too short", shortest_start_time=0.235)
+    assert front_figure(Front(CRANE, "reached", (refused,), ())).axes[0].get_legend() is not None
