@@ -6,26 +6,23 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
 from softstart_controllers.reduced import (
-    RAISE_AT,
     closing_speed,
     delay_of,
     mean_under,
     raise_parameter,
-    reduced_torque,
+    reduced_torque_parameter,
     swing_duration,
-)  # fmt: skip
+)
 from softstart_controllers.sampled import (
-    PATIENCE_DEFAULT,
-    PERIOD_DEFAULT,
-    check,
     encoder_count,
+    full_torque_parameter,
     mean_torque,
-    patience,
-    sample_period,
+    patience_parameter,
+    period_parameter,
 )
 
 LONGEST_WINDOW = 30  # samples kept of half a window
@@ -41,12 +38,12 @@ class Parameters:
     """Torques, the motor, and the window of the second difference."""
 
     torque: float
-    full: float
+    full_torque: float
     period: float
     J1: float
     half: float
     stride: float
-    drop: float
+    threshold: float
     wait: float
     patience: float
 
@@ -95,12 +92,12 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
             middle = x.ring[(kept + RING - half) % RING]
             oldest = x.ring[(kept + RING - 2 * half) % RING]
             y.ring[kept % RING] = lost
-            if x.raise_at == math.inf and lost - 2.0 * middle + oldest > p.drop:
+            if x.raise_at == math.inf and lost - 2.0 * middle + oldest > p.threshold:
                 y.raise_at = t + p.wait
         if y.raise_at == math.inf and t >= p.patience:
             y.raise_at = t
     waiting = t + 0.5 * p.period < y.raise_at
-    y.torque = p.torque if waiting else p.full
+    y.torque = p.torque if waiting else p.full_torque
     y.ask_again = (sample + 1) * p.period if waiting else math.inf
     y.sample = sample + 1
     y.demand = y.torque
@@ -155,66 +152,42 @@ class AccelerationDelay(CompiledController):
     effort: ClassVar[Effort | None] = Effort.STEPS
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
-    torque: float | None = parameter(
-        "N*m",
-        "reduced torque",
-        "load torque plus 15 % of the accelerating torque",
-        multiples=(0.3, 4.0),
-    )
-    full_torque: float | None = parameter(
-        "N*m", "torque after the delay", "starting torque Ms", multiples=(0.4, 1.0)
-    )
+    torque: float | None = reduced_torque_parameter("reduced torque", "above 0")
+    full_torque: float | None = full_torque_parameter("torque after the delay", "0 or more")
     delay: float | None = parameter(
         "s",
         "how long the torque stays reduced after contact",
         "until the torque peak of stage 2, [G](14), or its end, [G](15)",
+        value=lambda drive, p: delay_of(drive, p.torque, p.raise_at),
+        rule="0 or more",
         multiples=(0.2, 3.0),
     )
     drop: float | None = parameter(
         "1",
         "drop of the acceleration that means contact, as a share of torque/J1",
         "0.3, or half the share that a closed drive takes on the mean where that is less, at least 0.05",
+        value=lambda drive, p: min(max(0.5 * mean_under(drive, p.torque) / p.torque, SMALLEST_DROP), DROP),
+        rule="above 0",
     )
     latency: float | None = parameter(
-        "s", "time from contact until it is seen", "from the window and the shaft torque of [G](11)"
+        "s",
+        "time from contact until it is seen",
+        "from the window and the shaft torque of [G](11)",
+        value=lambda drive, p: detection_latency(drive, p.torque, p.drop, p.period),
+        rule="0 or more",
     )
-    patience: float | None = parameter("s", "longest wait for contact", PATIENCE_DEFAULT)
-    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+    patience: float | None = patience_parameter("longest wait for contact")
+    period: float | None = period_parameter()
     raise_at: str | None = raise_parameter()
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            above_zero=("torque", "drop", "period"),
-            not_negative=("full_torque", "delay", "latency", "patience"),
-        )
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """Torque, drop, delay, latency and patience from the nominal drive."""
-        torque = reduced_torque(drive) if self.torque is None else self.torque
-        period = sample_period(drive) if self.period is None else self.period
-        drop = _drop(drive, torque) if self.drop is None else self.drop
-        return {
-            "torque": torque,
-            "full_torque": drive.Ms,
-            "delay": delay_of(drive, torque, self.raise_at or RAISE_AT),
-            "drop": drop,
-            "latency": detection_latency(drive, torque, drop, period),
-            "patience": patience(drive),
-            "period": period,
-            "raise_at": RAISE_AT,
-        }
-
-    def vector(self, drive: Drive) -> Vector:
-        """(torque, full torque, period, J1, kept samples in W, stride, threshold, wait, patience)."""
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """The window, and the wait from when the contact is seen."""
         half, stride, threshold = window(drive, self.torque, self.drop, self.period)
         delay: Any = self.delay
         wait = max(delay - self.latency, 0.0)
-        return stack(
-            self.torque, self.full_torque, self.period, drive.J1, half, stride, threshold, wait,
-            self.patience,
-        )  # fmt: skip
+        return {"J1": drive.J1, "half": half, "stride": stride, "threshold": threshold, "wait": wait}
 
 
 def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int, float]:
@@ -269,8 +242,3 @@ def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> floa
         else:
             low = middle
     return high + 0.5 * stride * period
-
-
-def _drop(drive: Drive, torque: Any) -> float:
-    """Half of M12avg/M1 in contact, within 0.05 and 0.3."""
-    return min(max(0.5 * mean_under(drive, torque) / torque, SMALLEST_DROP), DROP)

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter
 from softstart.controller.compiled import Answer, Vector, named, record
-from softstart.drive import Drive
 
 
 class Parameters:
@@ -44,13 +43,8 @@ class Direct(CompiledController):
     source: ClassVar[str] = "[G]"
     effort: ClassVar[Effort | None] = Effort.CONTACTOR
     kernel: ClassVar[Any] = step
+    record: ClassVar[Any] = PARAMETERS
 
-    torque: float | None = parameter("N*m", "motor torque", "starting torque Ms")
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """The starting torque."""
-        return {"torque": drive.Ms}
-
-    def vector(self, drive: Drive) -> Vector:
-        """(torque,)."""
-        return stack(self.torque)
+    torque: float | None = parameter(
+        "N*m", "motor torque", "starting torque Ms", value=lambda drive, p: drive.Ms
+    )

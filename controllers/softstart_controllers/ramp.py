@@ -1,4 +1,4 @@
-"""Torque ramp: what every soft starter offers."""
+"""Torque ramp: what every soft starter offers; with rounded ends it is the S-curve of every inverter."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, named, record
+from softstart.controller import CompiledController, Effort, compiled_step, parameter
+from softstart.controller.compiled import MEASURED, Answer, Vector, named, record, size
 from softstart.drive import Drive
-from softstart_controllers.sampled import PERIOD_DEFAULT, check, pulling_load, sample_period
+from softstart_controllers.sampled import full_torque_parameter, period_parameter, pulling_load
 
 
 class Parameters:
     """What the step is given."""
 
     initial: float
-    full: float
+    full_torque: float
     time: float
+    rounding: float
     period: float
 
 
@@ -32,17 +33,26 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """A straight line over time, sampled."""
+    """A line over time, straight or with rounded ends, sampled."""
     p = named(parameters, PARAMETERS)
     x = named(state, STATE)
     y = named(command, COMMAND)
     t = named(measured, MEASURED).time
     y.sample = x.sample + 1.0
+    end = 0.5 * p.rounding  # each rounded end, as a share of the time
     if t < p.time:
-        y.torque = p.initial + (p.full - p.initial) * (t / p.time)
+        passed = t / p.time
+        left = 1.0 - passed
+        if passed < end:
+            share = 0.5 * passed * passed / (end * (1.0 - end))
+        elif passed <= 1.0 - end:
+            share = (passed - 0.5 * end) / (1.0 - end)
+        else:
+            share = 1.0 - 0.5 * left * left / (end * (1.0 - end))
+        y.torque = p.initial + (p.full_torque - p.initial) * share
         y.ask_again = y.sample * p.period
     else:
-        y.torque = p.full
+        y.torque = p.full_torque
         y.ask_again = math.inf
 
 
@@ -71,29 +81,28 @@ class Ramp(CompiledController):
     source: ClassVar[str] = "practice"
     effort: ClassVar[Effort | None] = Effort.RAMPS
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = 1
+    state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
     initial: float | None = parameter(
-        "N*m", "torque at the start", "load torque, 0 where it does not brake", multiples=(0.3, 4.0)
+        "N*m",
+        "torque at the start",
+        "load torque, 0 where it does not brake",
+        value=lambda drive, p: pulling_load(drive),
+        rule="finite",
+        multiples=(0.3, 4.0),
     )
-    time: float | None = parameter("s", "duration of the rise", "two elastic periods", multiples=(0.1, 10.0))
-    full_torque: float | None = parameter(
-        "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
+    time: float | None = parameter(
+        "s",
+        "duration of the rise",
+        "two elastic periods",
+        value=lambda drive, p: 2.0 * drive.elastic_period,
+        rule="0 or more",
+        multiples=(0.1, 10.0),
     )
-    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+    full_torque: float | None = full_torque_parameter("torque after the rise")
+    period: float | None = period_parameter()
 
-    def __post_init__(self) -> None:
-        check(self, above_zero=("period",), not_negative=("time",))
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """From load torque, starting torque and elastic period."""
-        return {
-            "initial": pulling_load(drive),
-            "time": 2.0 * drive.elastic_period,
-            "full_torque": drive.Ms,
-            "period": sample_period(drive),
-        }
-
-    def vector(self, drive: Drive) -> Vector:
-        """The numbers of `Parameters`."""
-        return stack(self.initial, self.full_torque, self.time, self.period)
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """Straight from end to end."""
+        return {"rounding": 0.0}

@@ -1,4 +1,11 @@
-"""The reduced torque that the strategies of [G] start with, and when they raise it."""
+"""The law of [G]'s reduced torque: low until contact is seen and for a time after that, then full torque.
+
+Three strategies follow it. What differs is when the torque is raised, and by what the contact is seen:
+
+    reduced-first-stage    at contact                            sees the gap
+    reduced-two-stage      at the peak or the end of stage 2     sees the gap
+    acceleration-delay     at the peak or the end of stage 2     sees the encoder
+"""
 
 from __future__ import annotations
 
@@ -6,13 +13,48 @@ import math
 from typing import Any
 
 from softstart import formulas
-from softstart.controller import parameter
+from softstart.controller import compiled_step, parameter
+from softstart.controller.base import Rule
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import pulling_load
 
 SHARE = 0.15
 INSTANTS = ("peak", "end")  # of stage 2, at which the torque is raised
-RAISE_AT = "peak"
+
+
+class Parameters:
+    """What the step is given; `wait` counts from contact."""
+
+    torque: float
+    full_torque: float
+    wait: float
+
+
+class State:
+    """When the torque is raised; 0 before contact."""
+
+    raise_at: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+
+
+@compiled_step
+def step_of_gap(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Reduced until the wait after contact has passed, or the gap opens again; asked at the events of the gap."""
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    y = named(command, COMMAND)
+    y.raise_at = named(state, STATE).raise_at
+    if m.stage >= 2.0 and y.raise_at == 0.0:
+        y.raise_at = m.time + p.wait
+    waiting = m.stage < 2.0 or (m.stage < 3.0 and m.time < y.raise_at)
+    y.torque = p.torque if waiting else p.full_torque
+    if waiting:
+        y.ask_again = y.raise_at if y.raise_at > m.time else math.inf
+    else:
+        y.ask_again = NEVER
 
 
 def reduced_torque(drive: Drive) -> float:
@@ -25,13 +67,26 @@ def reduced_torque(drive: Drive) -> float:
     return held + SHARE * (drive.Ms - held)
 
 
+def reduced_torque_parameter(meaning: str, rule: Rule = "finite") -> Any:
+    """The reduced torque as a field of a controller."""
+    return parameter(
+        "N*m",
+        meaning,
+        "load torque plus 15 % of the accelerating torque",
+        value=lambda drive, p: reduced_torque(drive),
+        rule=rule,
+        multiples=(0.3, 4.0),
+    )
+
+
 def raise_parameter() -> Any:
     """`raise_at` as a field of a controller."""
     return parameter(
         "",
         "instant of stage 2 at which the torque is raised: its torque peak, [G](14), or its end, [G](15)",
-        RAISE_AT,
+        "peak",
         "text",
+        value="peak",
         choices=INSTANTS,
     )
 

@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
+from softstart.controller import CompiledController, Sensor
+from softstart.controller.compiled import size
 from softstart.drive import Drive
-from softstart_controllers.reduced import reduced_torque
-
-
-class Parameters:
-    """What the step is given."""
-
-    reduced: float
-    full: float
-
-
-PARAMETERS, COMMAND = record(Parameters), record(Answer)
-
-
-@compiled_step
-def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Reduced in stage 1; the stage number changes at the instant of contact."""
-    p = named(parameters, PARAMETERS)
-    y = named(command, COMMAND)
-    waiting = named(measured, MEASURED).stage < 2.0
-    y.torque = p.reduced if waiting else p.full
-    y.ask_again = math.inf if waiting else NEVER
+from softstart_controllers.reduced import PARAMETERS, STATE, reduced_torque_parameter, step_of_gap
+from softstart_controllers.sampled import full_torque_parameter
 
 
 @dataclass(frozen=True)
@@ -48,22 +28,13 @@ class ReducedFirstStage(CompiledController):
     summary: ClassVar[str] = "torque reduced while the gap is first open, Ms from contact on (method 1)"
     source: ClassVar[str] = "[G](17)"
     sensors: ClassVar[Sensor] = Sensor.STAGE
-    kernel: ClassVar[Any] = step
+    kernel: ClassVar[Any] = step_of_gap
+    state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
-    torque: float | None = parameter(
-        "N*m",
-        "reduced torque of stage 1",
-        "load torque plus 15 % of the accelerating torque",
-        multiples=(0.3, 4.0),
-    )
-    full_torque: float | None = parameter(
-        "N*m", "torque from contact on", "starting torque Ms", multiples=(0.4, 1.0)
-    )
+    torque: float | None = reduced_torque_parameter("reduced torque of stage 1")
+    full_torque: float | None = full_torque_parameter("torque from contact on")
 
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """Reduced torque from the drive's load and starting torque."""
-        return {"torque": reduced_torque(drive), "full_torque": drive.Ms}
-
-    def vector(self, drive: Drive) -> Vector:
-        """(torque, full torque)."""
-        return stack(self.torque, self.full_torque)
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """The torque is raised at once."""
+        return {"wait": 0.0}

@@ -2,49 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
+from softstart.controller import CompiledController, Sensor, parameter
+from softstart.controller.compiled import size
 from softstart.drive import Drive
-from softstart_controllers.reduced import RAISE_AT, delay_of, raise_parameter, reduced_torque
-from softstart_controllers.sampled import check
-
-
-class Parameters:
-    """What the step is given."""
-
-    reduced: float
-    full: float
-    patience: float
-
-
-class State:
-    """By when the torque is raised at the latest; 0 before contact."""
-
-    deadline: float
-
-
-PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
-
-
-@compiled_step
-def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Reduced until the gap opens again, or the deadline has passed."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    y = named(command, COMMAND)
-    y.deadline = named(state, STATE).deadline
-    if m.stage >= 2.0 and y.deadline == 0.0:
-        y.deadline = m.time + p.patience
-    waiting = m.stage < 2.0 or (m.stage < 3.0 and m.time < y.deadline)
-    y.torque = p.reduced if waiting else p.full
-    if waiting:
-        y.ask_again = y.deadline if y.deadline > m.time else math.inf
-    else:
-        y.ask_again = NEVER
+from softstart_controllers.reduced import (
+    PARAMETERS,
+    STATE,
+    delay_of,
+    raise_parameter,
+    reduced_torque_parameter,
+    step_of_gap,
+)
+from softstart_controllers.sampled import full_torque_parameter
 
 
 @dataclass(frozen=True)
@@ -73,39 +45,24 @@ class ReducedTwoStage(CompiledController):
     summary: ClassVar[str] = "torque reduced through the first gap and the first contact, then Ms (method 2)"
     source: ClassVar[str] = "[G](18)"
     sensors: ClassVar[Sensor] = Sensor.STAGE
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = 1
+    kernel: ClassVar[Any] = step_of_gap
+    state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
-    torque: float | None = parameter(
-        "N*m",
-        "reduced torque of stages 1 and 2",
-        "load torque plus 15 % of the accelerating torque",
-        multiples=(0.3, 4.0),
-    )
-    full_torque: float | None = parameter(
-        "N*m", "torque from stage 3 on", "starting torque Ms", multiples=(0.4, 1.0)
-    )
+    torque: float | None = reduced_torque_parameter("reduced torque of stages 1 and 2")
+    full_torque: float | None = full_torque_parameter("torque from stage 3 on")
     patience: float | None = parameter(
-        "s", "longest wait after contact", "two elastic periods; an undamped stage 2 lasts less than one"
+        "s",
+        "longest wait after contact",
+        "two elastic periods; an undamped stage 2 lasts less than one",
+        value=lambda drive, p: 2.0 * drive.elastic_period,
+        rule="finite",
     )
-
     raise_at: str | None = raise_parameter()
 
-    def __post_init__(self) -> None:
-        check(self)
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """Reduced torque from load and starting torque, patience from the elastic period."""
-        return {
-            "torque": reduced_torque(drive),
-            "full_torque": drive.Ms,
-            "patience": 2.0 * drive.elastic_period,
-            "raise_at": RAISE_AT,
-        }
-
-    def vector(self, drive: Drive) -> Vector:
-        """(torque, full torque, longest time from contact on)."""
-        longest: Any = self.patience
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """The wait: until the torque peak, or until the gap opens, at most `patience`."""
+        wait: Any = self.patience
         if self.raise_at == "peak":
-            longest = min(delay_of(drive, self.torque, "peak"), longest)
-        return stack(self.torque, self.full_torque, longest)
+            wait = min(delay_of(drive, self.torque, "peak"), wait)
+        return {"wait": wait}

@@ -1,29 +1,21 @@
-"""What the sampled controllers share: sample period, encoder, mean torque of an interval, checks."""
+"""What the sampled controllers share: parameters of many, encoder, mean torque of an interval."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Container
-from dataclasses import fields
+from typing import Any
 
-import numpy as np
 from numba import njit
 
-from softstart.controller import Controller
+from softstart.controller import parameter
+from softstart.controller.base import Rule
 from softstart.drive import Drive
-from softstart.errors import InputError
 from softstart.kernel.motor import COUNTS_PER_LINE
-from softstart.quantities import show
 
 LONGEST_PERIOD = 1e-3  # s
 SAMPLES_PER_ELASTIC_PERIOD = 32
-PERIOD_DEFAULT = "1 ms, or 1/32 of the elastic period where that is shorter"
 SHARE_OF_PATIENCE = 0.15
 PERIODS_OF_PATIENCE = 50.0
-PATIENCE_DEFAULT = (
-    "50 elastic periods and the time a drive without gap needs to its target speed on 15 % of its "
-    "accelerating torque"
-)
 
 
 def sample_period(drive: Drive) -> float:
@@ -33,6 +25,41 @@ def sample_period(drive: Drive) -> float:
     0.001
     """
     return min(LONGEST_PERIOD, drive.elastic_period / SAMPLES_PER_ELASTIC_PERIOD)
+
+
+def period_parameter() -> Any:
+    """`period` as a field of a controller."""
+    return parameter(
+        "s",
+        "sample period",
+        "1 ms, or 1/32 of the elastic period where that is shorter",
+        value=lambda drive, p: sample_period(drive),
+        rule="above 0",
+    )
+
+
+def patience_parameter(meaning: str = "latest instant for the feedback to act") -> Any:
+    """`patience` as a field of a controller."""
+    return parameter(
+        "s",
+        meaning,
+        "50 elastic periods and the time a drive without gap needs to its target speed on 15 % of its "
+        "accelerating torque",
+        value=lambda drive, p: patience(drive),
+        rule="0 or more",
+    )
+
+
+def full_torque_parameter(meaning: str, rule: Rule = "finite") -> Any:
+    """`full_torque` as a field of a controller."""
+    return parameter(
+        "N*m",
+        meaning,
+        "starting torque Ms",
+        value=lambda drive, p: drive.Ms,
+        rule=rule,
+        multiples=(0.4, 1.0),
+    )
 
 
 def encoder_count(drive: Drive) -> float:
@@ -85,32 +112,3 @@ def mean_torque(before: float, after: float, demand: float) -> float:
     if abs(b - a) <= 1e-6 * abs(b):
         return 0.5 * (before + after)
     return demand - (b - a) / math.log(b / a)
-
-
-def check(controller: Controller, above_zero: Container[str] = (), not_negative: Container[str] = ()) -> None:
-    """Refuse impossible parameters, all in one `InputError`; None stands for "derive it from the drive".
-
-    Parameters named in neither list only have to be finite; one with choices has to be one of these. Arrays
-    are checked element by element, when the controller is set up for each.
-    """
-    wrong = []
-    for field in fields(controller):
-        name, value = field.name, getattr(controller, field.name)
-        if value is None or isinstance(value, np.ndarray):
-            continue
-        if isinstance(value, str):
-            choices = field.metadata.get("choices", ())
-            if choices and value not in choices:
-                wrong.append(f"{name} = {show(value)}: write {' or '.join(map(show, choices))}.")
-            continue
-        good, rule = math.isfinite(value), "finite"
-        if name in above_zero:
-            good, rule = good and value > 0.0, "above 0"
-        elif name in not_negative:
-            good, rule = good and value >= 0.0, "0 or more"
-        if not good:
-            wrong.append(
-                f"{name} = {value:g}: the parameter of the controller {controller.name} must be {rule}."
-            )
-    if wrong:
-        raise InputError(wrong)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
 from enum import Enum, IntFlag
 from itertools import repeat
 from typing import Any, ClassVar, Literal, NamedTuple, Self
@@ -20,9 +20,20 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
 from softstart.drive.records import Records
+from softstart.errors import InputError
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+from softstart.quantities import show
 
 Kind = Literal["quantity", "text", "object"]
+Rule = Literal["finite", "above 0", "0 or more", "0 to 1"]
+Derived = Callable[[Drive, Any], Any]  # the value of a parameter, from the drive and the other parameters
+
+RULES: dict[str, Callable[[float], bool]] = {
+    "finite": math.isfinite,
+    "above 0": lambda value: 0.0 < value < math.inf,
+    "0 or more": lambda value: 0.0 <= value < math.inf,
+    "0 to 1": lambda value: 0.0 <= value <= 1.0,
+}
 
 
 class Sensor(IntFlag):
@@ -175,15 +186,19 @@ def parameter(
     default: str = "",
     kind: Kind = "quantity",
     *,
+    value: Derived | float | str | None = None,
+    rule: Rule | None = None,
     multiples: tuple[float, float] | None = None,
     between: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A parameter of a controller, for use as a dataclass field.
+    """A parameter of a controller, for use as a dataclass field: all that there is to say about it.
 
     `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
-    the drive when none is given. A `kind` other than a quantity is handed over as it is: a text (the path of
-    a file, say), or an object, which only Python can give. A text may be one of `choices` only.
+    the drive when none is given. `value` is that default: a constant, or a function of the drive and of the
+    other parameters, which it may name in any order. A `kind` other than a quantity is handed over as it is: a
+    text (the path of a file, say), or an object, which only Python can give. A text may be one of `choices`
+    only, and a number must obey the `rule`.
 
     Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
     the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first.
@@ -192,8 +207,8 @@ def parameter(
     return field(
         default=None,
         metadata={
-            "unit": unit, "meaning": meaning, "default": default, "kind": kind,
-            "multiples": multiples, "between": between, "choices": choices,
+            "unit": unit, "meaning": meaning, "default": default, "kind": kind, "value": value,
+            "rule": rule, "multiples": multiples, "between": between, "choices": choices,
         },
     )  # fmt: skip
 
@@ -235,9 +250,24 @@ class Controller:
     needs: ClassVar[tuple[str, ...]] = ()
     saturates: ClassVar[bool] = False
 
+    def __post_init__(self) -> None:
+        wrong = []
+        for one in fields(self):
+            value, rule, choices = getattr(self, one.name), one.metadata.get("rule"), one.metadata.get("choices")
+            if isinstance(value, str):
+                if choices and value not in choices:
+                    wrong.append(f"{one.name} = {show(value)}: write {' or '.join(map(show, choices))}.")
+            elif isinstance(value, float | int) and rule and not RULES[rule](value):
+                wrong.append(
+                    f"{one.name} = {value:g}: the parameter of the controller {self.name} must be {rule}."
+                )
+        if wrong:
+            raise InputError(wrong)
+
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Values of the parameters that were not given, derived from the drive (never from the answer)."""
-        return {}
+        values = Values(self, drive)
+        return {one.name: values.derived(one) for one in fields(self) if "value" in one.metadata}
 
     def fitted(self, drive: Drive) -> Self:
         """The same controller with every parameter a number."""
@@ -294,6 +324,25 @@ class Controller:
     def parameters(self) -> dict[str, Any]:
         """Parameter names and values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+class Values:
+    """The parameters of a controller as attributes: as given, or else derived when they are first asked for."""
+
+    def __init__(self, controller: Controller, drive: Drive) -> None:
+        self._controller, self._drive = controller, drive
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._controller, name)
+        if value is None:
+            value = self.derived(type(self._controller).__dataclass_fields__[name])
+        setattr(self, name, value)
+        return value
+
+    def derived(self, field: Field[Any]) -> Any:
+        """The default of a parameter."""
+        value = field.metadata["value"]
+        return value(self._drive, self) if callable(value) else value
 
 
 SetUp = tuple[Controller, Drive]  # a controller with every parameter a number, the drive of its numbers
@@ -354,7 +403,7 @@ def effort_of(controller: Controller) -> Effort:
 
 
 @dataclass(frozen=True)
-class CompiledController(Controller, ABC):
+class CompiledController(Controller):
     """A controller whose step is compiled: `kernel(parameters, measured, state, command)`.
 
     All four are float64 vectors: `parameters` is `vector(drive)`, `measured` holds the fields of
@@ -365,6 +414,8 @@ class CompiledController(Controller, ABC):
     ----------
     kernel : the step, compiled by `compiled_step`.
     state_size : how many numbers the state has.
+    record : the names of the numbers that the step is given, from `softstart.controller.compiled.record`. A
+        class without them defines `vector`.
 
     Examples
     --------
@@ -380,15 +431,30 @@ class CompiledController(Controller, ABC):
 
     kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]
     state_size: ClassVar[int] = 0
+    record: ClassVar[Any] = np.dtype([])
 
-    @abstractmethod
     def vector(self, drive: Drive) -> Vector:
         """The numbers the kernel needs; called on a fitted controller.
 
         Returns
         -------
-        Shape (n,), in SI units.
+        Shape (n,), in SI units: what `record` names, from `numbers` and the parameters of the same name.
         """
+        return np.array([*_in_order(self.record, self.numbers(drive), self)], dtype=np.float64)
+
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """What the kernel needs beside the parameters, by name; called on a fitted controller."""
+        return {}
+
+
+def _in_order(record: Any, numbers: Mapping[str, Any], controller: Controller | None) -> Iterator[float]:
+    """The numbers in the order of the record; a record within it has its own numbers."""
+    for name in record.names or ():
+        value = numbers[name] if name in numbers else getattr(controller, name)
+        if isinstance(value, Mapping):
+            yield from _in_order(record[name], value, None)
+        else:
+            yield value
 
 
 def numbers_of(set_ups: Iterable[SetUp]) -> tuple[CompiledController, Matrix] | list[SetUp]:
