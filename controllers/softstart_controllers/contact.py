@@ -1,15 +1,124 @@
-"""When the gap closed, told from how far the motor is behind a free one, and the shaft from then on."""
+"""Motor, shaft and load as a start sees them: told from motor angle and motor torque alone.
+
+*Free.* While the gap is open a Kalman filter follows phi1, w1 and 1/J1 of the free motor, some samples
+behind. Contact is seen when the encoder is behind the motion that this filter foretells for now by more than
+`certainty` standard deviations; since the filter stays behind, it has not yet seen the contact. The way lost
+grows with the cube of the time since contact, a c v s^3/6 with a = 1/J1: that tells the time s.
+
+*In contact.* An extended Kalman filter of (phi1, w1, z, w2, 1/J2) begins at that instant, z being the twist
+beyond the gap, and sees the samples since then, afterwards each new one. The gap is open again once z < 0 and
+the flanks part; then the free motor is followed again, from what is known of motor and load by now.
+
+`observe` does all of it in one call a sample; `watching` has its numbers for a drive.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from softstart.controller.compiled import compiled, inner
-from softstart_controllers.shaft_filter import Free, N, Shaft, move
+from softstart.controller import parameter
+from softstart.controller.compiled import Vector, compiled, inner, record
+from softstart.drive import Drive
+from softstart_controllers.sampled import encoder_count, mean_torque, pulling_load
+from softstart_controllers.shaft_filter import (
+    FREE,
+    SHAFT,
+    Free,
+    N,
+    Shaft,
+    copy,
+    free_predict,
+    free_update,
+    move,
+    shaft_predict,
+    shaft_update,
+)  # fmt: skip
 
 HALVINGS = 40
+WANDER = 0.02  # of J1/J2 of the drive, in the time 1/Omega: the model may be wrong
 SMALL = 1e-4  # for differences
 TIME_DEVIATION = 0.3  # of the time since contact, before the samples since then are looked at
+QUEUE = 32  # demands that are kept
+RING = 64  # samples of the free motor that are kept at most
+J1_CERTAINTY = 2.0  # standard deviations of 1/J1 that are no contact
+RATIO_DEVIATION = 0.1  # of J1/J2, beforehand
+RISE_PERIODS = 4.0  # of the motor on a held shaft, to raise the torque to Ms where nothing else can be done
+LEAST_RATIO, MOST_RATIO = 0.02, 4.0  # J1/J2
+J1_DEVIATION = 0.04
+TORQUE_DEVIATION = 0.002  # of Ms, of the torque measured while the motor is free
+SHAFT_DEVIATION = 0.003  # of Ms, while the shaft is in contact
+LOAD_DEVIATION = 0.01  # of Ms, of the load torque
+FLOOR = 1e-5  # of Ms/c: an ideal encoder is no better
+
+NOTHING, CONTACT, OPENED, PUSHED = 0, 1, 2, 3  # what a sample may show
+
+
+class Parameters:
+    """What `watching` gives; a = 1/J1 and b = 1/J2, with the variance of what is thought of them."""
+
+    period: float
+    Mc: float
+    reactive: float
+    load_speed: float
+    c: float
+    d: float
+    a: float
+    a_variance: float
+    b: float
+    b_variance: float
+    b_least: float
+    b_most: float
+    samples: float
+    rounding: float
+    certainty: float
+    free_noise: float
+    speed_noise: float
+    twist_noise: float
+    load_noise: float
+    b_noise: float
+    slew: float
+    rate: float
+    lag: float
+    queued: float
+    rest: float
+    wound: float
+    proving: float
+    released: float
+    raising: float
+
+
+class State:
+    """The filters; `now` is the free motor now, `free` is p.samples behind it.
+
+    The load had `load_speed` at `load_time`, the last instant at which it was known. `sent` are the last
+    demands, the newest first: those of the dead time are still to act.
+    """
+
+    realised: float
+    mean: float
+    load_speed: float
+    load_variance: float
+    load_time: float
+    b: float
+    b_variance: float
+    kept: float
+    begun: float
+    closed: float
+    held: float
+    free: Free
+    now: Free
+    shaft: Shaft
+    angles: Vector  # of the samples that `free` has not seen yet
+    means: Vector
+    leans: Vector
+    doubts: Vector
+    sent: Vector
+
+
+PARTS: Any = {"free": FREE, "now": FREE, "shaft": SHAFT}
+PARTS |= dict.fromkeys(("angles", "means", "leans", "doubts"), RING) | {"sent": QUEUE}
+PARAMETERS, STATE = record(Parameters), record(State, **PARTS)
 
 
 @compiled
@@ -151,3 +260,329 @@ def take_up(
                 x.P[0, k] += m.p01 * x.F[0, k]
                 x.P[k, 0] += m.p01 * x.F[0, k]
     x.phi1, x.w1, x.z, x.w2, x.b = since_contact(m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, reactive)
+
+
+@inner
+def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
+    """The filter of the free motor goes on a sample, p.samples behind; from there to now by the torque."""
+    h = p.period
+    kept = int(m.kept)
+    if kept == int(p.samples):
+        free_predict(m.free, m.means[0], m.leans[0], h, p.free_noise + m.doubts[0])
+        free_update(m.free, m.angles[0], p.rounding)
+        kept -= 1
+        for i in range(kept):
+            m.angles[i] = m.angles[i + 1]
+            m.means[i] = m.means[i + 1]
+            m.leans[i] = m.leans[i + 1]
+            m.doubts[i] = m.doubts[i + 1]
+    m.angles[kept] = angle
+    m.means[kept] = mean
+    m.leans[kept] = early
+    m.doubts[kept] = doubt
+    m.kept = kept + 1.0
+    free_after(p, m, kept + 1)
+
+
+@inner
+def free_after(p: Parameters, m: State, samples: int) -> None:
+    """The free motor so many samples after the filter."""
+    copy(m.free, m.now)
+    for i in range(samples):
+        noise = p.free_noise + m.doubts[i]
+        free_predict(m.now, m.means[i], m.leans[i], p.period, noise)
+
+
+@inner
+def surely(p: Parameters, m: State) -> float:
+    """Angle in rad by which the encoder must differ from the free motor to mean a contact."""
+    by_inertia = m.now.p02 * m.now.p02 / m.now.p22 if m.now.p22 > 0.0 else 0.0
+    rest = max(m.now.p00 - by_inertia, 0.0) + p.rounding
+    return p.certainty * math.sqrt(rest) + J1_CERTAINTY * math.sqrt(by_inertia)
+
+
+@inner
+def drift_since(p: Parameters, m: State, t: float) -> float:
+    """Impulse in N m s by which the load torque has slowed a load that it can move: w2 falls by it/J2."""
+    if p.reactive == 0.0:
+        return p.Mc * (t - m.load_time)
+    if m.load_speed > 0.0:
+        return min(p.Mc * (t - m.load_time), m.load_speed / m.b)
+    return 0.0
+
+
+@inner
+def follow(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
+    """The filter of the shaft goes on a sample."""
+    h, a = p.period, m.free.inverse
+    speed = a * h * p.speed_noise
+    twist = h * p.twist_noise * abs(m.shaft.w1 - m.shaft.w2)
+    load = m.shaft.b * h * p.load_noise
+    shaft_predict(
+        m.shaft,
+        mean,
+        early,
+        h,
+        a,
+        p.c,
+        p.d,
+        p.Mc,
+        p.reactive,
+        speed * speed + doubt,
+        twist * twist,
+        load * load,
+    )
+    m.shaft.P[4, 4] += p.b_noise
+    shaft_update(m.shaft, angle, p.rounding, p.b_least, p.b_most)
+
+
+@inner
+def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> None:
+    """Tell when the gap closed, begin the filter of the shaft then, and let it see the samples since."""
+    h = p.period
+    kept = int(m.kept)
+    if pulsing:  # what looked like another inertia may have been the contact
+        m.free.inverse = p.a
+    a, b = m.free.inverse, m.b
+    drift = drift_since(p, m, t)
+    w2 = m.load_speed - b * drift
+    V = m.now.speed - w2
+    u = 0.0
+    slope = 0.0
+    if pulsing:
+        recent = min(kept, 4)
+        for i in range(kept - recent, kept):
+            u += m.means[i] / recent
+        slope = a * u + (b * p.Mc if drift != 0.0 else 0.0)
+    s = time_since_contact(behind, V, slope, a, p.c, p.d, kept * h)
+    again = max(0, min(math.floor(s / h) - 1, kept - 1))
+    free_after(p, m, kept - again)
+    back = again * h if drift != 0.0 else 0.0
+    doubt = TIME_DEVIATION * s + 0.1 * h
+    take_up(
+        m.shaft, m.now, s - again * h, doubt * doubt, u, m.load_speed, m.load_variance,
+        drift - p.Mc * back, b, m.b_variance, a, p.c, p.d, p.Mc, p.reactive,
+    )  # fmt: skip
+    first = kept - again
+    shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
+    for i in range(first, kept):
+        follow(p, m, m.angles[i], m.means[i], m.leans[i], m.doubts[i])
+
+
+@inner
+def opened(m: State, t: float) -> None:
+    """The gap is open again: as at the start, with what is known of motor and load by now."""
+    P = m.shaft.P
+    m.load_speed = m.shaft.w2
+    m.load_variance = P[3, 3]
+    m.load_time = t
+    m.b = m.shaft.b
+    m.b_variance = max(P[4, 4], 0.01 * m.b * m.b)
+    m.free.angle, m.free.speed = m.shaft.phi1, m.shaft.w1
+    m.free.p00, m.free.p01, m.free.p11 = P[0, 0], P[0, 1], P[1, 1]
+    m.free.p02, m.free.p12 = 0.0, 0.0
+    m.kept = 0.0
+    copy(m.free, m.now)
+
+
+@inner
+def begin(p: Parameters, m: State, angle: float, speed: float) -> None:
+    """The first sample; a load that hangs in the wound-up shaft is in contact from then on."""
+    m.begun = 1.0
+    m.free.angle, m.free.speed, m.free.inverse = angle, speed, p.a
+    m.free.p00, m.free.p22 = p.rounding, p.a_variance
+    m.load_speed = p.load_speed
+    m.b, m.b_variance = p.b, p.b_variance
+    copy(m.free, m.now)
+    if p.wound > 0.0:
+        m.closed, m.held = 1.0, 1.0
+        m.shaft.phi1, m.shaft.z, m.shaft.b = angle, p.wound, p.b
+        m.shaft.P[4, 4] = p.b_variance
+
+
+@compiled
+def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: float, pulsing: float) -> int:
+    """See a sample: motor torque u, motor angle and, at first, its speed; what it shows.
+
+    `pulsing` is 1 while a motor torque acts on the free motor. A load that pushes the motor (PUSHED) is seen
+    as a motor that is ahead of the free one. While `held` the brake holds the motor of a hanging load.
+    """
+    if m.begun == 0.0:
+        begin(p, m, angle, speed)
+        return NOTHING if m.closed == 0.0 else CONTACT
+    if m.held != 0.0:
+        if t >= p.released and u >= p.proving:  # some time in this sample the brake let the motor go
+            m.held = 0.0
+            m.shaft.phi1 = angle
+            gained = p.a * p.period * (u - p.c * p.wound)
+            m.shaft.P[0, 0], m.shaft.P[1, 1] = p.rounding, gained * gained
+        return NOTHING
+    queued = int(p.queued)
+    newest = m.sent[queued]  # of those that act by now
+    before, share = m.realised, p.rest / p.period
+    m.mean = 0.0
+    if share > 0.0:  # until then the one before it went on
+        older = m.sent[queued + 1]
+        before = older + (before - older) * (math.exp(-p.rest / p.lag) if p.lag > 0.0 else 0.0)
+        m.mean = share * mean_torque(m.realised, before, older)
+    m.mean += (1.0 - share) * mean_torque(before, u, newest)
+    early = lean(before, u, newest, m.mean)
+    doubt = 0.0
+    if p.rate > 0.0:  # slewed, lagged or both: one sample does not tell, and the truth may lie outside
+        line = mean_of_ramp(m.realised, u, p.rate * p.period)
+        doubt = (2.0 * p.a * p.period * (m.mean - line)) ** 2
+        if p.slew > 0.0:
+            m.mean, early = line, lean_of_ramp(m.realised, u, p.rate * p.period)
+    if m.closed != 0.0:
+        follow(p, m, angle, m.mean, early, doubt)
+        if m.shaft.z < 0.0 and m.shaft.w1 < m.shaft.w2:
+            opened(m, t)
+            m.closed = 0.0
+            return OPENED
+        return NOTHING
+    free_motion(p, m, angle, m.mean, early, doubt)
+    behind = m.now.angle - angle
+    enough = surely(p, m)
+    if behind > enough:
+        contact(p, m, t, behind, pulsing != 0.0)
+        m.closed = 1.0
+        return CONTACT
+    return PUSHED if behind < -enough else NOTHING
+
+
+@inner
+def send(p: Parameters, m: State, demand: float, u: float) -> None:
+    """Keep the demand of this sample, and the torque that was measured."""
+    for i in range(int(p.queued) + 1, 0, -1):
+        m.sent[i] = m.sent[i - 1]
+    m.sent[0] = demand
+    m.realised = u
+
+
+@compiled
+def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float]:
+    """w1, z, w2 and motor torque when a demand made now begins to act; until then those sent before do."""
+    w1, z, w2 = m.shaft.w1, m.shaft.z, m.shaft.w2
+    length = p.rest
+    for i in range(int(p.queued), -1, -1):
+        if length > 0.0:
+            demand = m.sent[i]
+            left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
+            mean = demand + (u - demand) * (1.0 - left) * p.lag / length
+            u = demand + (u - demand) * left
+            _, w1, z, w2 = move(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.reactive)
+        length = p.period
+    return w1, z, w2, u
+
+
+@inner
+def raised(p: Parameters, m: State, full: float) -> float:
+    """The torque where the contact cannot be seen, or was waited for in vain: a ramp from the last one."""
+    return min(m.sent[0] + p.raising, full)
+
+
+def certainty_parameter() -> Any:
+    """`certainty` as a field of a controller."""
+    return parameter(
+        "1",
+        "standard deviations of the motor's angle that mean contact",
+        "7",
+        value=7.0,
+        rule="above 0",
+        between=(4.0, 12.0),
+    )
+
+
+def uncertainty_parameter() -> Any:
+    """`uncertainty` as a field of a controller."""
+    return parameter(
+        "1",
+        "unknown part of the twist in each sample",
+        "0.15",
+        value=0.15,
+        rule="0 or more",
+        between=(0.01, 0.5),
+    )
+
+
+def watching(
+    drive: Drive, p: Any, speed: float, inertia_ratio: float | None = None, deviation: float = RATIO_DEVIATION
+) -> dict[str, float]:
+    """The numbers of `Parameters`, for flanks that meet at `speed` in rad/s.
+
+    p has the parameters `period`, `certainty` and `uncertainty`. J2/J1 is thought to be `inertia_ratio`, or
+    that of the drive, with this standard deviation as a share. A drive whose load hangs in the wound-up shaft
+    is in contact from the first sample on, unless the inertia ratio is given.
+    """
+    wound, proving, released = hanging(drive) if inertia_ratio is None else (0.0, 0.0, 0.0)
+    period, certainty = p.period, p.certainty
+    a, rate = 1.0 / drive.J1, drive.torque_rate
+    queued = min(math.floor(drive.computing_delay / period + 1e-9), QUEUE - 2)
+    rest = min(max(drive.computing_delay - queued * period, 0.0), period)
+    ratio, noise = 1.0 / (inertia_ratio or drive.J2 / drive.J1), drive.torque_noise
+    free = a * period * math.hypot(TORQUE_DEVIATION * drive.Ms, noise)
+    delay, slewing = lateness(drive)
+    rounding = encoder_count(drive) ** 2 / 12.0 + (FLOOR * drive.Ms / drive.c) ** 2
+    return {
+        "period": period,
+        "Mc": drive.Mc,
+        "reactive": drive.Mc > 0.0 and drive.load_kind == "reactive",
+        "load_speed": drive.initial_load_speed,
+        "c": drive.c,
+        "d": drive.d,
+        "a": a,
+        "a_variance": (J1_DEVIATION * a) ** 2,
+        "b": ratio * a,
+        "b_variance": (deviation * ratio * a) ** 2,
+        "b_least": min(LEAST_RATIO, 0.3 * ratio) * a,
+        "b_most": max(MOST_RATIO, 3.0 * ratio) * a,
+        "samples": _samples(drive, speed, rounding, certainty, delay, period),
+        "rounding": rounding,
+        "certainty": certainty,
+        "free_noise": free**2,
+        "speed_noise": math.hypot(SHAFT_DEVIATION * drive.Ms, noise),
+        "twist_noise": p.uncertainty,
+        "load_noise": LOAD_DEVIATION * drive.Ms,
+        "b_noise": 0.0 if inertia_ratio else (WANDER * ratio * a) ** 2 * drive.Omega * period,
+        "slew": 0.5 / rate if slewing else 0.0,
+        "rate": rate if math.isfinite(rate) else 0.0,
+        "lag": drive.torque_lag,
+        "queued": queued,
+        "rest": rest,
+        "wound": wound,
+        "proving": proving,
+        "released": released,
+        "raising": drive.Ms * period * math.sqrt(drive.c * a) / (2.0 * math.pi * RISE_PERIODS),
+    }
+
+
+def hanging(drive: Drive) -> tuple[float, float, float]:
+    """Twist in rad beyond the gap at which a load hangs at first, or 0, and its brake.
+
+    That is the torque in N m that releases the motor by torque proving, or the instant in s at which it is
+    released.
+
+    >>> [round(x, 4) for x in hanging(Drive.load("hoist-15kw"))]
+    [0.0375, 120.0, 0.0]
+    """
+    if drive.start_position != "hanging":
+        return 0.0, 0.0, 0.0
+    T = pulling_load(drive)
+    if drive.brake != "none" and isinstance(drive.release, str):
+        return T / drive.c, T, 0.0
+    return T / drive.c, 0.0, drive.release_time
+
+
+def lateness(drive: Drive) -> tuple[float, bool]:
+    """Mean time in s by which the torque is late, and whether the rate limit makes the most of it."""
+    slew, late = drive.Ms / drive.torque_rate, drive.torque_lag + drive.computing_delay
+    slewing = 0.5 * slew > late
+    return (late if slewing else late + 0.5 * slew), slewing
+
+
+def _samples(drive: Drive, v: float, rounding: float, certainty: float, delay: float, period: float) -> int:
+    """How many samples the filter of the free motor stays behind."""
+    far = 2.0 * certainty * math.sqrt(rounding)
+    coasting = math.cbrt(6.0 * far * drive.J1 / (drive.c * v))
+    pulsing = (24.0 * far * drive.J1**2 / (drive.c * drive.Ms)) ** 0.25 + delay
+    return min(max(math.ceil(max(coasting, pulsing) / period) + 4, 6), RING)

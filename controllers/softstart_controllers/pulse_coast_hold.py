@@ -6,36 +6,193 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, parameter, stack
-from softstart.controller.compiled import Vector, size
+from softstart.controller import CompiledController, Effort, compiled_step, parameter
+from softstart.controller.compiled import MEASURED, Answer, Vector, inner, keep_state, named, record, size
 from softstart.drive import Drive
-from softstart_controllers.pulse_coast_hold_step import RING, STATE, step
-from softstart_controllers.sampled import (
-    PATIENCE_DEFAULT,
-    PERIOD_DEFAULT,
-    check,
-    encoder_count,
-    patience,
-    sample_period,
-)
+from softstart_controllers import contact
+from softstart_controllers.contact import CONTACT, NOTHING, OPENED, PUSHED, lateness, observe, send, watching
+from softstart_controllers.sampled import encoder_count, patience_parameter, period_parameter
+from softstart_controllers.shaft_filter import move
 
 SHARE_REACTIVE, SHARE_ACTIVE = 0.8, 0.7  # of the speed that makes the stuck load's shaft carry Ms
-HOLD_SHARE = 0.98
-DAMPING_RATIO = 0.9
-STIFFENING = 0.5
-CERTAINTY = 7.0
-UNCERTAINTY = 0.15
-INERTIA_RATIO = 3.0
-RATIO_DEVIATION = 0.6  # of J1/J2, beforehand
-LEAST_RATIO, MOST_RATIO = 0.02, 4.0  # J1/J2
-J1_DEVIATION = 0.04
-TORQUE_DEVIATION = 0.002  # of Ms, of the torque measured while the motor is free
-SHAFT_DEVIATION = 0.003  # of Ms, while the shaft is in contact
-LOAD_DEVIATION = 0.01  # of Ms, of the load torque
-FLOOR = 1e-5  # of Ms/c: an ideal encoder is no better
 COARSE = 0.04  # of Ms/c: with larger counts the contact is over before it is seen
-RISE_PERIODS = 4.0
+RATIO_DEVIATION = 0.6  # of J1/J2, beforehand
 SLOW = 1.3
+MOST_OPENINGS = 8  # of the gap, after which the torque is just raised
+SOFTEST = 0.1  # of the coast speed
+TELLING = 0.2  # of Ms: with less torque at its end the pulse does not tell the delay
+MOST_DELAY = 3.0  # times the delay told and a sample
+
+# phases, in this order
+PULSE, COAST, CATCH, HOLD, RAISE = 0.0, 1.0, 2.0, 3.0, 4.0
+
+
+class Parameters:
+    """What the step is given; `watch` is for the estimator (`contact`)."""
+
+    watch: contact.Parameters
+    Ms: float
+    coast_speed: float
+    hold_share: float
+    delay: float
+    damping_ratio: float
+    stiffening: float
+    patience: float
+    blind: float
+
+
+class State:
+    """The pulse and the hold."""
+
+    watch: contact.State
+    sample: float
+    phase: float
+    held_back: float
+    delay: float
+    push: float
+    level: float
+    peak: float
+    openings: float
+    raised: float
+
+
+PARAMETERS = record(Parameters, watch=contact.PARAMETERS)
+STATE = record(State, watch=contact.STATE)
+COMMAND = record(Answer, State, watch=contact.STATE)
+
+
+@inner
+def full_load(p: Parameters, ratio: float) -> float:
+    """Mean shaft torque in N m under Ms, [G](16), for J1/J2 = ratio."""
+    return (p.Ms + p.watch.Mc * ratio) / (1.0 + ratio)
+
+
+@inner
+def gentle_speed(p: Parameters, a: float, b: float) -> float:
+    """Relative speed in rad/s: the coast speed, or less where the drive, coasting in contact with it, would
+    swing to more than the share of the full load that may be held.
+
+    It swings about z0 = Mc b/Omega^2 to z0 + sqrt(z0^2 + v^2/Omega^2).
+    """
+    square = p.watch.c * (a + b)
+    z0 = p.watch.Mc * b / square
+    most = p.hold_share * full_load(p, b / a) / p.watch.c
+    v = square * most * (most - 2.0 * z0)
+    return min(p.coast_speed, max(math.sqrt(max(v, 0.0)), SOFTEST * p.coast_speed))
+
+
+@inner
+def held_back(p: Parameters, m: State, u: float) -> float:
+    """Impulse in N m s that is still to come when the demand goes to 0.
+
+    Under a lag, or a dead time, it is what the motor has not got of the impulse demanded so far; a torque
+    that slews falls as it rose.
+    """
+    return m.held_back if p.watch.slew == 0.0 else u * (p.delay + u * p.watch.slew)
+
+
+@inner
+def pulse(p: Parameters, m: State, b: float, u: float) -> float:
+    """Torque in N m of the next sample: what the motor needs to its speed, less what is still to come."""
+    a = m.watch.free.inverse
+    wanted = m.watch.load_speed + (gentle_speed(p, a, b) if m.openings > 0.0 else p.coast_speed)
+    missing = (wanted - m.watch.now.speed) / a - held_back(p, m, u)
+    return min(max(missing / p.watch.period, 0.0), p.Ms)
+
+
+@inner
+def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
+    """Torque in N m of the next sample in contact, from the state that the shaft will have when it acts."""
+    near, shaft, Ms = p.watch, m.watch.shaft, p.Ms
+    h, c, d, Mc, reactive = near.period, near.c, near.d, near.Mc, near.reactive
+    a, b = m.watch.free.inverse, shaft.b
+    w1, z, w2 = shaft.w1, shaft.z, shaft.w2
+    steps = int(m.delay / h) + 1
+    for _ in range(steps):
+        _, w1, z, w2 = move(w1, z, w2, b, u, m.delay / steps, a, c, d, Mc, reactive)
+    rate = w1 - w2
+    ratio = b / a
+    square = c * (a + b)
+    if catching:
+        if m.push != 0.0:
+            z0 = Mc * b / square
+            v = gentle_speed(p, a, b)
+            missing = v * v + square * (z0 * z0 - (z - z0) * (z - z0)) - rate * rate
+            push = min(missing / (2.0 * max(rate, 1e-9) * a * h), Ms) if missing > 0.0 else 0.0
+            if push < Ms:
+                m.push = 0.0
+            if push > 0.0:
+                return push
+        _, x1, _, x2 = move(w1, z, w2, b, 0.0, h, a, c, d, Mc, reactive)
+        return min(max((x2 - x1) / (a * h), 0.0), Ms)
+    full = full_load(p, ratio)
+    least = p.hold_share * full
+    if m.level < least:
+        rise = (least - m.peak) * h * math.sqrt(square) / (2.0 * math.pi)
+        m.level = min(m.level + max(rise, 0.0), least)
+    level = min(m.level, full)
+    demand = level * (1.0 + ratio) - Mc * ratio + p.stiffening * (level - c * z)
+    demand -= 2.0 * p.damping_ratio * math.sqrt(square) / a * rate
+    return min(max(demand, 0.0), Ms)
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Pulse, coast, hold: see `PulseCoastHold`."""
+    p = named(parameters, PARAMETERS)
+    m = named(command, COMMAND)
+    seen = named(measured, MEASURED)
+    keep_state(state, command)
+    watch, shaft = m.watch, m.watch.shaft
+    t, u = seen.time, seen.motor_torque
+    phase = m.phase
+    event = NOTHING
+    if phase != RAISE:
+        pulsing = 1.0 if phase == PULSE else 0.0
+        event = observe(p.watch, watch, t, u, seen.motor_angle, seen.motor_speed, pulsing)
+    if m.sample == 0.0:
+        phase = RAISE if p.blind != 0.0 else PULSE
+        m.delay = p.delay
+        m.held_back = -p.delay * u
+    elif phase != RAISE:
+        if phase < CATCH:
+            m.held_back += p.watch.period * (watch.sent[0] - watch.mean)
+        if event == CONTACT:
+            m.push = 1.0 if phase == PULSE else 0.0
+            m.level = 0.0
+            phase = CATCH
+        elif event == PUSHED:  # the load pushes the motor: there is no contact to wait for
+            phase = RAISE
+        elif event == OPENED:
+            m.openings += 1.0
+            m.held_back = -m.delay * u
+            phase = PULSE if m.openings <= MOST_OPENINGS else RAISE
+    if t >= p.patience and phase != RAISE:
+        phase = RAISE
+        m.raised = watch.sent[0]
+
+    demand = 0.0
+    if phase == PULSE:
+        demand = pulse(p, m, watch.b, u)
+        if demand < p.Ms:
+            phase = COAST
+            if u > TELLING * p.Ms:  # the mean time by which the torque is late, as it was in the pulse
+                m.delay = min(max(held_back(p, m, u) / u, 0.0), MOST_DELAY * (p.delay + p.watch.period))
+    elif CATCH <= phase < RAISE:
+        demand = hold(p, m, u, phase == CATCH)
+        if phase == CATCH:
+            m.level = max(m.level, p.watch.c * shaft.z)
+            if shaft.w1 < shaft.w2:
+                phase = HOLD
+                m.peak = m.level
+    elif phase == RAISE:
+        demand = m.raised = min(m.raised + p.watch.raising, p.Ms)
+
+    m.torque = demand
+    m.ask_again = (m.sample + 1.0) * p.watch.period
+    m.sample += 1.0
+    send(p.watch, watch, demand, u)
+    m.phase = phase
 
 
 @dataclass(frozen=True)
@@ -96,86 +253,69 @@ class PulseCoastHold(CompiledController):
     effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
     coast_speed: float | None = parameter(
         "rad/s",
         "speed relative to the load to which the pulse brings the motor",
         "0.8 Ms/sqrt(c J1) with a reactive load, 0.7 Ms/sqrt(c J1) with an active one",
+        value=lambda drive, p: (
+            (SHARE_ACTIVE if drive.load_kind == "active" else SHARE_REACTIVE)
+            * drive.Ms
+            / math.sqrt(drive.c * drive.J1)
+        ),
+        rule="above 0",
         multiples=(0.4, 1.6),
     )
     hold_share: float | None = parameter(
         "1",
         "share of M12avg to which the shaft torque is raised after the peak",
         "0.98",
+        value=0.98,
+        rule="0 or more",
         between=(0.6, 1.0),
     )
-    damping_ratio: float | None = parameter("1", "damping ratio of the hold", "0.9", between=(0.2, 1.5))
+    damping_ratio: float | None = parameter(
+        "1", "damping ratio of the hold", "0.9", value=0.9, rule="0 or more", between=(0.2, 1.5)
+    )
     stiffening: float | None = parameter(
-        "1", "motor torque per missing shaft torque in the hold", "0.5", between=(0.0, 2.0)
+        "1",
+        "motor torque per missing shaft torque in the hold",
+        "0.5",
+        value=0.5,
+        rule="0 or more",
+        between=(0.0, 2.0),
     )
     inertia_ratio: float | None = parameter(
-        "1", "J2/J1 as first guessed at contact", "3", multiples=(0.3, 4.0)
+        "1", "J2/J1 as first guessed at contact", "3", value=3.0, rule="above 0", multiples=(0.3, 4.0)
     )
     certainty: float | None = parameter(
-        "1", "standard deviations of the motor's angle that mean contact", "7", between=(4.0, 12.0)
+        "1",
+        "standard deviations of the motor's angle that mean contact",
+        "7",
+        value=7.0,
+        rule="above 0",
+        between=(4.0, 12.0),
     )
     uncertainty: float | None = parameter(
-        "1", "unknown part of the twist in each sample", "0.15", between=(0.01, 0.5)
+        "1",
+        "unknown part of the twist in each sample",
+        "0.15",
+        value=0.15,
+        rule="0 or more",
+        between=(0.01, 0.5),
     )
-    patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
-    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+    patience: float | None = patience_parameter()
+    period: float | None = period_parameter()
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            above_zero=("coast_speed", "inertia_ratio", "certainty", "period"),
-            not_negative=("hold_share", "damping_ratio", "stiffening", "uncertainty", "patience"),
-        )
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """From motor, stiffness and kind of load; J2 enters period and patience, the gap nothing."""
-        share = SHARE_ACTIVE if drive.load_kind == "active" else SHARE_REACTIVE
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """Estimator, delay of the torque, rise, and whether the contact can be seen in time at all."""
+        p: Any = self  # fitted: every parameter is a number
+        Omega1 = math.sqrt(drive.c / drive.J1)
+        late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
         return {
-            "coast_speed": share * drive.Ms / math.sqrt(drive.c * drive.J1),
-            "hold_share": HOLD_SHARE,
-            "damping_ratio": DAMPING_RATIO,
-            "stiffening": STIFFENING,
-            "inertia_ratio": INERTIA_RATIO,
-            "certainty": CERTAINTY,
-            "uncertainty": UNCERTAINTY,
-            "patience": patience(drive),
-            "period": sample_period(drive),
+            "watch": watching(drive, p, p.coast_speed, p.inertia_ratio, RATIO_DEVIATION),
+            "Ms": drive.Ms,
+            "delay": lateness(drive)[0],
+            "blind": encoder_count(drive) > COARSE * drive.Ms / drive.c or late * Omega1 > SLOW,
         }
-
-    def vector(self, drive: Drive) -> Vector:
-        """The numbers of `Parameters`."""
-        h: Any = self.period
-        inertia_ratio: Any = self.inertia_ratio
-        a, ratio, rate = 1.0 / drive.J1, 1.0 / inertia_ratio, drive.torque_rate
-        windup, count, noise = drive.Ms / drive.c, encoder_count(drive), drive.torque_noise
-        free = a * h * math.hypot(TORQUE_DEVIATION * drive.Ms, noise)
-        slew, late = drive.Ms / rate, drive.torque_lag + drive.computing_delay
-        slewing = 0.5 * slew > late
-        delay = late if slewing else late + 0.5 * slew
-        Omega1 = math.sqrt(drive.c * a)
-        friction = drive.Mc > 0.0 and drive.load_kind == "reactive"
-        rounding = count**2 / 12.0 + (FLOOR * windup) ** 2
-        return stack(
-            h, drive.Ms, drive.Mc, friction, drive.initial_load_speed, drive.c, drive.d, a,
-            (J1_DEVIATION * a) ** 2, ratio * a,
-            (RATIO_DEVIATION * ratio * a) ** 2, LEAST_RATIO * a, MOST_RATIO * a, self.coast_speed,
-            self.hold_share, delay, _samples(drive, self.coast_speed, rounding, self.certainty, delay, h),
-            rounding, self.certainty, free**2, math.hypot(SHAFT_DEVIATION * drive.Ms, noise),
-            self.uncertainty, LOAD_DEVIATION * drive.Ms, self.damping_ratio, self.stiffening,
-            h * Omega1 / (2.0 * math.pi * RISE_PERIODS), self.patience,
-            count > COARSE * windup or (0.5 * slew + late) * Omega1 > SLOW, 0.5 / rate if slewing else 0.0,
-            rate if math.isfinite(rate) else 0.0,
-        )  # fmt: skip
-
-
-def _samples(drive: Drive, v: Any, rounding: float, certainty: Any, delay: float, period: float) -> int:
-    """How many samples the filter of the free motor stays behind."""
-    far = 2.0 * certainty * math.sqrt(rounding)
-    coasting = math.cbrt(6.0 * far * drive.J1 / (drive.c * v))
-    pulsing = (24.0 * far * drive.J1**2 / (drive.c * drive.Ms)) ** 0.25 + delay
-    return min(max(math.ceil(max(coasting, pulsing) / period) + 4, 6), RING)

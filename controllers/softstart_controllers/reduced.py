@@ -42,7 +42,7 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 
 @compiled_step
 def step_of_gap(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Reduced until the wait after contact has passed, or the gap opens again; asked at the events of the gap."""
+    """Reduced until the wait after contact has passed or the gap opens again; asked at its events."""
     p = named(parameters, PARAMETERS)
     m = named(measured, MEASURED)
     y = named(command, COMMAND)

@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from softstart.controller.compiled import record
 from softstart.drive import Drive
 from softstart_controllers.sampled import encoder_count
 
@@ -36,24 +37,34 @@ FASTEST = (
 DECADES = 0.05  # designs are shared between drives whose index differs by less
 
 
+class Gains:
+    """By which the estimate is corrected: of phi1, 1; w1, 1/s; T, N m/rad; T', N m/(rad s)."""
+
+    angle: float
+    speed: float
+    torque: float
+    rate: float
+
+
+GAINS = record(Gains)
+
+
 class Design(NamedTuple):
-    """Gains without units, standard deviations in encoder units, lag of T' in samples."""
+    """Gains without units, standard deviation of T in encoder units, lag of T' in samples."""
 
     angle: float
     speed: float
     torque: float
     rate: float
     torque_deviation: float
-    rate_deviation: float
     rate_lag: float
 
 
 class Observer(NamedTuple):
-    """Gains for `observe`, and what the design promises, in SI units."""
+    """The gains by name, and what the design promises, in SI units."""
 
-    gains: tuple[float, float, float, float]  # of phi1, 1; w1, 1/s; T, N m/rad; T', N m/(rad s)
+    gains: dict[str, float]
     torque_deviation: float  # N m, standard deviation of the error of T
-    rate_deviation: float  # N m/s, of T'
     rate_lag: float  # s, lag of T' behind a T' that changes unforeseen
 
 
@@ -66,7 +77,7 @@ def design(steps: int) -> Design:
     in a measurement; so does the error that stays under a T'' of 1 that never ends, the lag of T'.
 
     >>> [round(number, 4) for number in design(-150)]
-    [0.2605, 0.0392, -0.0035, -0.0002, 0.011, 0.0008, 22.1507]
+    [0.2605, 0.0392, -0.0035, -0.0002, 0.011, 22.1507]
     """
     q = 10.0 ** (steps * DECADES)
     r = q**0.25
@@ -86,7 +97,7 @@ def design(steps: int) -> Design:
     P23 = -s * K1 * K3 - q / 6.0 - P33 / 2.0
     P13 = s * K0 * K3 + q / 24.0 + P23 / 2.0 + P33 / 6.0
     P22 = -s * K1 * K2 - q / 12.0 + P13 - 1.5 * P23 - 0.5 * P33
-    return Design(K0, K1, K2, K3, math.sqrt(P22), math.sqrt(P33), K2 / K3 - 0.5)
+    return Design(K0, K1, K2, K3, math.sqrt(P22), K2 / K3 - 0.5)
 
 
 def observer(drive: Drive, period: float, uncertainty: float) -> Observer:
@@ -99,7 +110,7 @@ def observer(drive: Drive, period: float, uncertainty: float) -> Observer:
     keeps it at 6 Omega. Nothing about the gap enters.
 
     >>> crane = observer(Drive.load("crane-4amtkf"), 0.001, 0.05)
-    >>> round(crane.gains[0], 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
+    >>> round(crane.gains["angle"], 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
     (0.66, 0.0059, True)
     """
     h, Omega, unit = period, drive.Omega, drive.J1 / period**2
@@ -110,35 +121,26 @@ def observer(drive: Drive, period: float, uncertainty: float) -> Observer:
     index = 2.0 * math.log10(noise / min(max(deviation, noise / fastest), noise / slowest))
     of = design(round(index / DECADES))
     return Observer(
-        (of.angle, of.speed / h, of.torque * unit, of.rate * unit / h),
+        {"angle": of.angle, "speed": of.speed / h, "torque": of.torque * unit, "rate": of.rate * unit / h},
         of.torque_deviation * unit * deviation,
-        of.rate_deviation * unit / h * deviation,
         of.rate_lag * h,
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def predict(
-    angle: float,
-    speed: float,
-    torque: float,
-    rate: float,
-    bend: float,
-    motor_torque: float,
-    J1: float,
-    h: float,
+    angle: float, speed: float, torque: float, rate: float, motor_torque: float, J1: float, h: float
 ) -> tuple[float, float, float, float]:
-    """phi1, w1, T and T' one sample on, under a constant motor torque and a constant T'' = bend.
+    """phi1, w1, T and T' one sample on, under a constant motor torque and a constant T'.
 
-    >>> predict(0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 1.0, 0.5)
+    >>> predict(0.0, 0.0, 0.0, 0.0, 2.0, 1.0, 0.5)
     (0.25, 1.0, 0.0, 0.0)
     """
     a = (motor_torque - torque) / J1
     jerk = rate / J1
-    snap = bend / J1
     return (
-        angle + h * (speed + h * (a / 2.0 - h * (jerk / 6.0 + h * snap / 24.0))),
-        speed + h * (a - h * (jerk / 2.0 + h * snap / 6.0)),
-        torque + h * (rate + h * bend / 2.0),
-        rate + h * bend,
+        angle + h * (speed + h * (a / 2.0 - h * jerk / 6.0)),
+        speed + h * (a - h * jerk / 2.0),
+        torque + h * rate,
+        rate,
     )

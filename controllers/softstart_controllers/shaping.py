@@ -20,8 +20,7 @@ error of frequency or damping is felt in the second order only, the idea of ZVD:
 
     D - sum t_i Delta_i exp(-lambda t_i) = 0,     D = dW/dlambda
 
-For a contact (z = 0, z' = v, steps counted from there) D = J1r v (1 + 2 lambda tau) + tau M_y. In time D goes
-on by D(t + s) = exp(lambda s) (D + s (W + M)), as its steps lie further back.
+For a state that was measured D = J1r v (1 + 2 lambda tau) + tau (M_y - T).
 
 *Levels.* The torque keeps the levels M_0 .. M_n-1, each for the time a, and M_f after that. With E =
 exp(-lambda a) and Q(x) = sum M_k x^k,
@@ -95,12 +94,6 @@ def sensitivity(
     """D = dW/dlambda of a shaft that carries `torque` and twists at the rate v; N m s."""
     pole = complex(sigma, omega)
     return inertia * v * (1.0 + 2.0 * pole * lag) + lag * (realised - torque)
-
-
-@inner
-def later(D: complex, W: complex, level: float, sigma: float, omega: float, s: float) -> complex:
-    """D after the time s under the demand `level`; W is that of the beginning."""
-    return cmath.exp(complex(sigma, omega) * s) * (D + s * (W + level))
 
 
 @compiled

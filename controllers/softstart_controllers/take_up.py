@@ -6,35 +6,24 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
 from softstart_controllers.sampled import (
-    PATIENCE_DEFAULT,
-    PERIOD_DEFAULT,
-    check,
+    full_torque_parameter,
     mean_torque,
-    patience,
+    patience_parameter,
+    period_parameter,
     pulling_load,
-    sample_period,
 )
-from softstart_controllers.shaft_observer import observer, predict
+from softstart_controllers.shaft_observer import GAINS, Gains, observer, predict
 
-SPEED_SHARE = 0.16  # of Ms/sqrt(c J1), the speed whose impact on a held load makes a shaft torque of Ms
-SLOWING = 2.0
 SLOWEST = 0.3  # of the take-up speed
-SPEED_LOOP_SHARE = 2.4  # of sqrt(c J1)
 CONTACT_SHARE = 0.56
-CONTACT_TIME = 0.16  # of the elastic period
-RISE = 0.72  # of the elastic period
-DAMPING_RATIO = 0.28
-RATE_DAMPING_RATIO = 0.23
 ALL_LEFT, NONE_LEFT = 0.5, 1.0  # rad that Omega turns in the delay: all of the damping by T', none of it
 LATE_RISE, LATE_SHARE = 1.5, 0.6  # rise in elastic periods and share of damping_ratio, with none of it
 FADING, NO_DAMPING = 1.5, 2.5  # rad likewise, from which on damping_ratio fades, and is gone
-CORNER = 0.073  # of Omega
 FOLLOWING = 0.7  # damping ratio of the follower
-UNCERTAINTY = 0.18
 CALM = 0.1  # of the uncertainty, once the load is met
 HELD = 4.0  # times the impulse that means the load gathers while a load holds the motor
 SLEWED_SHARE = 0.25  # of Ms
@@ -44,7 +33,7 @@ TAKING_UP, RISING, IMPATIENT = 0.0, 1.0, 2.0  # phases
 
 
 class Parameters:
-    """Speeds, gains and times of `TakeUp`, and the gains k, l of the observer before and after the load."""
+    """Speeds, gains and times of `TakeUp`, and the gains of the observer before and after the load."""
 
     period: float
     J1: float
@@ -52,27 +41,21 @@ class Parameters:
     Mc: float
     load_share: float
     load_speed: float
-    speed: float
+    take_up_speed: float
     slowest: float
-    slowing: float
+    falling: float
     speed_gain: float
     contact: float
     leak: float
-    full: float
+    full_torque: float
     Ms: float
     rise: float
-    damping: float
-    rate_damping: float
+    D1: float
+    D2: float
     corner: float
     patience: float
-    k_angle: float
-    k_speed: float
-    k_torque: float
-    k_rate: float
-    l_angle: float
-    l_speed: float
-    l_torque: float
-    l_rate: float
+    first: Gains
+    later: Gains
 
 
 class State:
@@ -94,7 +77,8 @@ class State:
     realised: float
 
 
-PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+PARAMETERS = record(Parameters, first=GAINS, later=GAINS)
+STATE, COMMAND = record(State), record(Answer, State)
 
 
 @compiled_step
@@ -112,23 +96,18 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         y.speed = m.motor_speed
     else:
         mean = mean_torque(x.realised, u, x.demand)
-        angle, speed, T, rate = predict(x.angle, x.speed, x.T, x.rate, 0.0, mean, p.J1, h)
+        gains = p.first if phase == TAKING_UP else p.later
+        angle, speed, T, rate = predict(x.angle, x.speed, x.T, x.rate, mean, p.J1, h)
         error = m.motor_angle - angle
-        if phase == TAKING_UP:
-            y.angle = angle + p.k_angle * error
-            y.speed = speed + p.k_speed * error
-            y.T = T + p.k_torque * error
-            y.rate = rate + p.k_rate * error
-        else:
-            y.angle = angle + p.l_angle * error
-            y.speed = speed + p.l_speed * error
-            y.T = T + p.l_torque * error
-            y.rate = rate + p.l_rate * error
+        y.angle = angle + gains.angle * error
+        y.speed = speed + gains.speed * error
+        y.T = T + gains.torque * error
+        y.rate = rate + gains.rate * error
 
     demand = 0.0
     if phase == TAKING_UP:
-        wanted = p.load_speed + max(p.speed - p.slowing * t, p.slowest)
-        demand = min(max(p.speed_gain * (wanted - y.speed), 0.0), p.full)
+        wanted = p.load_speed + max(p.take_up_speed - p.falling * t, p.slowest)
+        demand = min(max(p.speed_gain * (wanted - y.speed), 0.0), p.full_torque)
         y.impulse = max(x.impulse * p.leak + h * y.T, 0.0)
         if y.impulse > p.contact:
             phase = RISING
@@ -146,11 +125,11 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         y.low = x.demand
         y.progress = 0.0
     if phase == RISING:
-        demand = y.low + (p.full - y.low) * y.progress
-        demand -= p.damping * (y.speed - y.w2) + p.rate_damping * y.rate
+        demand = y.low + (p.full_torque - y.low) * y.progress
+        demand -= p.D1 * (y.speed - y.w2) + p.D2 * y.rate
     elif phase == IMPATIENT:
         y.progress = min(1.0, y.progress + p.rise)
-        demand = y.low + (p.full - y.low) * y.progress
+        demand = y.low + (p.full_torque - y.low) * y.progress
 
     y.torque = min(max(demand, 0.0), p.Ms)
     y.ask_again = (x.sample + 1.0) * h
@@ -158,6 +137,32 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     y.demand = y.torque
     y.realised = u
     y.phase = phase
+
+
+def delay(drive: Drive, p: Any) -> float:
+    """By how much in s the torque is late: lag, dead time, a sample, a quarter of the slewing time to Ms."""
+    slewing = SLEWED_SHARE * drive.Ms / drive.torque_rate
+    late: float = drive.torque_lag + drive.computing_delay + p.period + slewing
+    return late
+
+
+def share_left(drive: Drive, p: Any) -> float:
+    """Share of the damping by T' that a torque so late leaves, 1 to 0."""
+    return min(max((NONE_LEFT - drive.Omega * delay(drive, p)) / (NONE_LEFT - ALL_LEFT), 0.0), 1.0)
+
+
+def contact_share(drive: Drive, p: Any) -> float:
+    """At least as much as the rounding of a coarse encoder may feign."""
+    eyes = observer(drive, p.period, p.uncertainty)
+    feigned: float = CERTAINTY * eyes.torque_deviation * eyes.rate_lag / (drive.J1 * p.take_up_speed)
+    return max(CONTACT_SHARE, feigned)
+
+
+def damping_ratio(drive: Drive, p: Any) -> float:
+    """0.28 where the torque is quick, at most a loop gain of one at 1 rad of phase lag, 0 if later still."""
+    phase = drive.Omega * delay(drive, p)
+    damping = min(0.28 * (LATE_SHARE + (1.0 - LATE_SHARE) * share_left(drive, p)), 0.5 / phase)
+    return damping * min(max((NO_DAMPING - phase) / (NO_DAMPING - FADING), 0.0), 1.0)
 
 
 @dataclass(frozen=True)
@@ -213,143 +218,112 @@ class TakeUp(CompiledController):
     effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
+    record: ClassVar[Any] = PARAMETERS
 
     take_up_speed: float | None = parameter(
         "rad/s",
         "motor speed, over that of the load at first, at which the gaps are taken up",
         "0.16 Ms/sqrt(c J1)",
+        value=lambda drive, p: 0.16 * drive.Ms / math.sqrt(drive.c * drive.J1),
+        rule="above 0",
         multiples=(0.3, 3.0),
     )
     slowing: float | None = parameter(
         "1",
         "how far that speed is lowered, as a multiple of the speed at which an active load falls back",
         "2",
+        value=2.0,
+        rule="0 or more",
         between=(0.0, 8.0),
     )
     speed_gain: float | None = parameter(
         "N*m*s/rad",
         "motor torque per missing speed while the gaps are taken up",
         "2.4 sqrt(c J1), at most J1 over the delay",
+        value=lambda drive, p: min(2.4 * math.sqrt(drive.c * drive.J1), drive.J1 / delay(drive, p)),
+        rule="above 0",
         multiples=(0.3, 4.0),
     )
     contact_share: float | None = parameter(
         "1",
         "impulse of the shaft that means the load, as a share of J1 take_up_speed",
         "0.56, more for a coarse encoder",
+        value=contact_share,
+        rule="above 0",
         between=(0.1, 1.5),
     )
     contact_time: float | None = parameter(
         "s",
         "time in which that impulse is forgotten",
         "0.16 elastic periods, or longer, see the text",
+        value=lambda drive, p: max(
+            0.16 * drive.elastic_period, HELD * p.contact_share * drive.J1 / p.speed_gain
+        ),
+        rule="above 0",
         multiples=(0.2, 5.0),
     )
-    full_torque: float | None = parameter(
-        "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
-    )
+    full_torque: float | None = full_torque_parameter("torque after the rise", "above 0")
     rise: float | None = parameter(
         "s",
         "time in which the torque rises once the load is met",
         "0.72 elastic periods, 1.5 for a late torque",
+        value=lambda drive, p: (LATE_RISE + (0.72 - LATE_RISE) * share_left(drive, p)) * drive.elastic_period,
+        rule="0 or more",
         multiples=(0.3, 5.0),
     )
     damping_ratio: float | None = parameter(
         "1",
         "damping ratio added by w1 less the estimated speed of the load",
         "0.28, less for a late torque",
+        value=damping_ratio,
+        rule="0 or more",
         between=(0.0, 1.5),
     )
     rate_damping_ratio: float | None = parameter(
         "1",
         "damping ratio added by the estimated T'",
         "0.23, down to 0 for a late torque",
+        value=lambda drive, p: 0.23 * share_left(drive, p),
+        rule="0 or more",
         between=(0.0, 1.5),
     )
     corner: float | None = parameter(
         "rad/s",
         "bandwidth at which the estimated speed of the load follows the motor",
         "0.073 Omega",
+        value=lambda drive, p: 0.073 * drive.Omega,
+        rule="0 or more",
         multiples=(0.2, 5.0),
     )
     uncertainty: float | None = parameter(
         "1",
         "unknown part of T'' that the observer reckons with, as a share of Omega^2 Ms",
         "0.18",
+        value=0.18,
+        rule="above 0",
         multiples=(0.1, 10.0),
     )
-    patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
-    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+    patience: float | None = patience_parameter()
+    period: float | None = period_parameter()
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            above_zero=(
-                "take_up_speed",
-                "speed_gain",
-                "contact_share",
-                "contact_time",
-                "full_torque",
-                "uncertainty",
-                "period",
-            ),
-            not_negative=(
-                "slowing",
-                "rise",
-                "damping_ratio",
-                "rate_damping_ratio",
-                "corner",
-                "patience",
-            ),
-        )
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """From motor, load torque and the elastic period; neither gap nor start position enter."""
-        period = sample_period(drive) if self.period is None else self.period
-        Omega, elastic_period = drive.Omega, drive.elastic_period
-        impedance = math.sqrt(drive.c * drive.J1)
-        speed = SPEED_SHARE * drive.Ms / impedance if self.take_up_speed is None else self.take_up_speed
-        eyes = observer(drive, period, UNCERTAINTY if self.uncertainty is None else self.uncertainty)
-        delay = (
-            drive.torque_lag + drive.computing_delay + period + SLEWED_SHARE * drive.Ms / drive.torque_rate
-        )
-        most = drive.J1 / delay  # a loop gain of one at 1 rad of phase lag
-        gain = min(SPEED_LOOP_SHARE * impedance, most) if self.speed_gain is None else self.speed_gain
-        share = CERTAINTY * eyes.torque_deviation * eyes.rate_lag / (drive.J1 * speed)
-        share = max(CONTACT_SHARE, share) if self.contact_share is None else self.contact_share
-        held = HELD * share * drive.J1 / gain
-        left = min(max((NONE_LEFT - Omega * delay) / (NONE_LEFT - ALL_LEFT), 0.0), 1.0)
-        late = most / (2.0 * drive.J1 * Omega)  # the damping ratio that is a loop gain of one at 1 rad
-        damping = min(DAMPING_RATIO * (LATE_SHARE + (1.0 - LATE_SHARE) * left), late)
-        damping *= min(max((NO_DAMPING - Omega * delay) / (NO_DAMPING - FADING), 0.0), 1.0)
-        return {
-            "take_up_speed": speed,
-            "slowing": SLOWING,
-            "speed_gain": gain,
-            "contact_share": share,
-            "contact_time": max(CONTACT_TIME * elastic_period, held),
-            "full_torque": drive.Ms,
-            "rise": (LATE_RISE + (RISE - LATE_RISE) * left) * elastic_period,
-            "damping_ratio": damping,
-            "rate_damping_ratio": RATE_DAMPING_RATIO * left,
-            "corner": CORNER * Omega,
-            "uncertainty": UNCERTAINTY,
-            "patience": patience(drive),
-            "period": period,
-        }
-
-    def vector(self, drive: Drive) -> Vector:
-        """The numbers of `Parameters`."""
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """Gains and thresholds; neither gap nor start position enter."""
         p: Any = self  # fitted: every parameter is a number
-        period, speed = p.period, p.take_up_speed
-        first = observer(drive, period, p.uncertainty)
-        later = observer(drive, period, CALM * p.uncertainty)
-        unit = 2.0 * drive.J1 * drive.Omega
-        falling = pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0
-        return stack(
-            period, drive.J1, drive.c, drive.Mc, 1.0 / drive.J2, drive.initial_load_speed,
-            speed, SLOWEST * speed,
-            p.slowing * falling, p.speed_gain, p.contact_share * drive.J1 * speed,
-            math.exp(-period / p.contact_time), p.full_torque, drive.Ms,
-            period / max(p.rise, period), unit * p.damping_ratio,
-            unit * p.rate_damping_ratio / drive.c, p.corner, p.patience, *first.gains, *later.gains,
-        )  # fmt: skip
+        damping = 2.0 * drive.J1 * drive.Omega
+        return {
+            "J1": drive.J1,
+            "c": drive.c,
+            "Mc": drive.Mc,
+            "load_share": 1.0 / drive.J2,
+            "load_speed": drive.initial_load_speed,
+            "slowest": SLOWEST * p.take_up_speed,
+            "falling": p.slowing * pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0,
+            "contact": p.contact_share * drive.J1 * p.take_up_speed,
+            "leak": math.exp(-p.period / p.contact_time),
+            "Ms": drive.Ms,
+            "rise": p.period / max(p.rise, p.period),
+            "D1": damping * p.damping_ratio,
+            "D2": damping * p.rate_damping_ratio / drive.c,
+            "first": observer(drive, p.period, p.uncertainty).gains,
+            "later": observer(drive, p.period, CALM * p.uncertainty).gains,
+        }

@@ -172,7 +172,7 @@ def test_sample_period_follows_fast_drives(name: str) -> None:
         ("acceleration-delay", {"delay": math.inf}),
         ("current-limit-feedback", {"approach_speed": 0.0}),
         ("current-limit-feedback", {"damping_ratio": -1.0}),
-        ("current-limit-feedback", {"uncertainty": 0.0}),
+        ("current-limit-feedback", {"uncertainty": -0.1}),
     ],
 )
 def test_refuses_impossible_parameters_in_one_sentence(name: str, wrong: dict[str, float]) -> None:

@@ -1,4 +1,4 @@
-"""current-limit-feedback: what its observer sees, how soft it starts, and how little the drive matters.
+"""current-limit-feedback: how soft it starts, and how little the drive matters.
 
 The bounds are measured figures with a margin; the figures stand beside them.
 """
@@ -8,90 +8,18 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-import control
 import numpy as np
 import pytest
-from tests.controllers.starts import CRANE, index, random_drive, traced
+from tests.controllers.starts import CRANE
 
 from softstart import Drive, records, simulate
-from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
-from softstart_controllers.shaft_observer import design, predict
 
 CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
-
-CRANES_SHIPPED = ("crane-4amtkf", "crane-4amtkf-worn", "crane-4amtkf-light", "crane-4amtkf-light-worn")
 
 
 def crane(gap: float, J2: float, lag: float, kind: Any) -> Drive:
     return CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
-
-
-def test_gap_and_start_position_enter_nowhere() -> None:
-    for other in (CRANE.replace(gap=2.0), CRANE.replace(gap=0.0), CRANE.replace(start_position=-0.25)):
-        fitted = CurrentLimitFeedback().fitted(other)
-        assert fitted == CurrentLimitFeedback().fitted(CRANE)
-        assert np.array_equal(fitted.vector(other), fitted.vector(CRANE))
-
-
-# observer ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("steps", [-360, -200, -60, 0, 60])
-def test_gains_are_the_stationary_kalman_filter(steps: int) -> None:
-    """The same by iterating the Riccati equation of `predict` with h = J1 = 1; the observer is stable."""
-    A = np.array([predict(*unit, 0.0, 0.0, 1.0, 1.0) for unit in np.eye(4)]).T
-    G, C = np.array([predict(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0)]).T, np.eye(1, 4)
-    gains = design(steps)
-    K = np.array(gains[:4])[:, None]
-    Q = 10.0 ** (steps * 0.05) * G @ G.T
-    assert np.abs(np.linalg.eigvals((np.eye(4) - K @ C) @ A)).max() < 1.0
-    if steps >= -200:
-        P = np.eye(4)
-        for _ in range(3000):
-            P = A @ P @ A.T + Q
-            step_gain = P @ C.T / (C @ P @ C.T + 1.0)
-            P = (np.eye(4) - step_gain @ C) @ P
-        assert np.allclose(K, step_gain, rtol=1e-6, atol=1e-9)
-        deviations = gains.torque_deviation, gains.rate_deviation
-        assert deviations == pytest.approx(np.sqrt([P[2, 2], P[3, 3]]), rel=1e-6)
-        keep = np.eye(4) - K @ C
-        behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)  # under a T'' of 1 that never ends
-        assert gains.rate_lag == pytest.approx(behind[3, 0], rel=1e-9)
-    else:
-        L, _, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * 0.05)]]), np.eye(1))
-        assert np.allclose(A @ K, L, rtol=1e-9)
-
-
-@pytest.mark.parametrize(("gap", "J2", "lag", "kind"), CRANES)
-def test_estimates_stay_close(gap: float, J2: float, lag: float, kind: Any) -> None:
-    """In shares of M12avg_base, 4096-line encoder. Measured at the worst of the 16: T within 0.036 while the
-    gap is first open, rms 0.061, 0.47 just after an impact, when T' jumps; w1 within 1.1 rad/s; contact seen
-    in 4.6 ms.
-    """
-    drive = crane(gap, J2, lag, kind)
-    run, trace = traced(drive, CurrentLimitFeedback())
-    true = run.at(trace[:, 0])
-    error = (trace[:, 1 + index(clf.STATE, "T")] - true["T"]) / drive.mean_torque
-    first_gap = trace[:, 0] < run.first_contact
-    assert np.abs(error[first_gap]).max() < 0.05
-    assert np.sqrt(np.mean(error**2)) < 0.07
-    assert np.abs(error).max() < 0.55
-    assert np.abs(trace[:, 1 + index(clf.STATE, "speed")] - true["w1"]).max() < 1.3
-    closed = trace[trace[:, 1 + index(clf.STATE, "phase")] == clf.CLOSED, 0]
-    assert 0.0 < closed[0] - run.first_contact < 0.0065
-
-
-def test_rounding_alone_is_never_a_contact() -> None:
-    """Five standard deviations are enough for the encoder's rounding, at every phase and speed."""
-    rng = np.random.default_rng(6)
-    for _ in range(15):
-        drive = random_drive(rng, load_kind="reactive")
-        gap = 30 * drive.gap + 5 * drive.Ms / drive.c
-        wide = drive.replace(gap=gap, start_position=rng.uniform(0, 1e-3) * gap)
-        run, trace = traced(wide, CurrentLimitFeedback())
-        first_gap = trace[:, 0] < run.first_contact
-        assert np.all(trace[first_gap, 1 + index(clf.STATE, "phase")] == clf.GAP_OPEN), wide
 
 
 # the start -----------------------------------------------------------------------------------------------
@@ -147,17 +75,6 @@ def test_invariant_to_gap_and_inertia(kind: Any, most: float, spread: tuple[floa
     assert np.all(np.ptp(direct, axis=0) > 2.8)
 
 
-@pytest.mark.parametrize(
-    ("name", "lag"),
-    [("conveyor-11kw", 0.005), *((c, 0.0) for c in CRANES_SHIPPED), (CRANES_SHIPPED[0], 0.002)],
-)
-def test_the_computing_delay_is_counted(name: str, lag: float) -> None:
-    """K_dyn over that without delay: measured at most 0.050 more (0.177 were it left out of the design)."""
-    drive = Drive.load(name).replace(start_position="mid-gap", torque_lag=lag)
-    k_dyn = simulate(records(drive, computing_delay=[0.0, 0.002, 0.004, 0.006]), CurrentLimitFeedback()).k_dyn
-    assert max(k_dyn.values) < k_dyn.values[0] + 0.06
-
-
 def test_servo_drives() -> None:
     """Measured: 60 kW rig 1.044 (direct 1.235), small axis 1.349 (2.053); start times 2 and 8 % longer."""
     for name, most in (("nordin-servo-60kw", 1.08), ("servo-axis-small", 1.42)):
@@ -180,8 +97,6 @@ def test_damping_ratio_is_what_the_delays_allow() -> None:
     assert ratios[2] == 0.0
     damped = CRANE.replace(damping=2 * 0.3 * CRANE.c / CRANE.Omega)
     assert CurrentLimitFeedback().fitted(damped).damping_ratio == pytest.approx(0.4)
-    coarse = CRANE.replace(encoder_lines=8)
-    assert CurrentLimitFeedback().fitted(coarse).damping_ratio == 0.0
 
 
 def test_feedback_damps_the_closed_drive_as_asked() -> None:
@@ -197,7 +112,7 @@ def test_feedback_damps_the_closed_drive_as_asked() -> None:
 
 
 def test_gives_up_waiting() -> None:
-    blind = CurrentLimitFeedback(threshold=1e6, patience=0.3)
+    blind = CurrentLimitFeedback(certainty=1e6, patience=0.3)
     run = simulate(CRANE, blind)
     assert run.start_time > 0.3
     assert run.at([0.29, run.end_time])["u"][1] == 62.0

@@ -14,26 +14,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, way_lost
 from tests.controllers.starts import CRANE, index, random_drive, traced
 from tests.twin import plain
 
 from softstart import Drive, InputError, Records, records, simulate
-from softstart.kernel.records import size
 from softstart.optimal.optimize import optimize
 from softstart.start.batch import prepared
-from softstart_controllers import pulse_coast_hold_step as stepping
-from softstart_controllers import shaft_filter as sf
-from softstart_controllers.contact import (
-    deviation,
-    lean,
-    lean_of_ramp,
-    mean_of_ramp,
-    take_up,
-    time_since_contact,
-)
+from softstart_controllers import pulse_coast_hold as stepping
 from softstart_controllers.pulse_coast_hold import PulseCoastHold
-from softstart_controllers.sampled import mean_torque
 
 LAGGING = CRANE.replace(target_speed=60.0, torque_lag=0.002)
 J1, C = float(CRANE.J1), float(CRANE.c)
@@ -58,129 +46,6 @@ def started(batch: Records, nominal: Any, controller: PulseCoastHold | None = No
 def state(trace: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
     """A column of the state; the first column of a trace is the time."""
     return trace[:, 1 + index(stepping.STATE, name)]
-
-
-# the filters ---------------------------------------------------------------------------------------------
-
-
-def test_filter_of_the_free_motor_is_the_kalman_filter() -> None:
-    rng = np.random.default_rng(1)
-    h = 0.001
-    row = np.zeros(size(sf.FREE))
-    row[:3] = 0.1, 2.0, 28.0
-    m = row.view(sf.FREE)[0]
-    m.p00, m.p11, m.p22 = 1e-8, 1e-4, 1.0
-    other = FreeMotor(row[:3], np.diag([1e-8, 1e-4, 1.0]))
-    for _ in range(200):
-        u, early = rng.uniform(-10, 62), rng.uniform(-3, 3)
-        angle = other.x[0] + rng.normal() * 1e-4
-        sf.free_predict(m, u, early, h, 1e-5)
-        sf.free_update(m, angle, 1.2e-8)
-        other.predict(u, early, h, 1e-5)
-        other.update(angle, 1.2e-8)
-    assert row[:3] == pytest.approx(other.x, rel=1e-9)
-    assert row[3:] == pytest.approx(other.P[np.triu_indices(3)], rel=1e-7, abs=1e-18)
-
-
-@pytest.mark.parametrize("d", [0.0, 1.0])
-def test_filter_of_the_shaft_is_the_extended_kalman_filter(d: float) -> None:
-    """Against scipy: the state to Runge-Kutta's order, the covariance to the third order of its series."""
-    rng = np.random.default_rng(2)
-    a, Mc, h = 1.0 / J1, 7.16, 0.0005
-    first = np.array([0.3, 12.0, 0.05, 1.0, 10.0])
-    root = rng.normal(size=(5, 5)) * np.array([1e-4, 0.1, 1e-3, 0.1, 3.0])[:, None]
-    row = np.zeros(size(sf.SHAFT))
-    row[:5] = first
-    x = row.view(sf.SHAFT)[0]
-    x.P[:] = root @ root.T
-    other = Shaft(first, root @ root.T, a, C, d, Mc)
-    noises = (1e-6, 1e-8, 1e-5)
-    for _ in range(40):
-        u = rng.uniform(30, 62)
-        sf.shaft_predict(x, u, 0.0, h, a, C, d, Mc, 0.0, *noises)
-        other.predict(u, h, noises)
-        angle = other.x[0] + rng.normal() * 1e-4
-        sf.shaft_update(x, angle, 1.2e-8, 0.0, 1e3)
-        other.update(angle, 1.2e-8)
-    assert row[:5] == pytest.approx(other.x, rel=2e-5)
-    P = x.P
-    deviations = np.sqrt(np.diag(other.P))
-    assert np.abs(P - other.P).max() < 1e12  # finite
-    assert np.abs((P - other.P) / np.outer(deviations, deviations)).max() < 2e-3
-
-
-def test_reactive_load_stays_until_the_shaft_moves_it() -> None:
-    x = np.zeros(size(sf.SHAFT)).view(sf.SHAFT)[0]
-    x.w1, x.z, x.b = 10.0, 0.01, 5.0
-    x.P[4, 4] = 1.0
-    for _ in range(3):
-        sf.shaft_predict(x, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
-    assert x.w2 == 0.0
-    assert x.P[3, 4] == 0.0  # nothing is learnt of J2 before
-    for _ in range(100):
-        sf.shaft_predict(x, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
-    assert x.w2 > 0.1
-    assert x.P[3, 4] > 0.0
-
-
-@given(st.floats(-60, 60), st.floats(-60, 60), st.floats(1e-3, 5.0))
-def test_lean_of_a_lagging_torque(before: float, demand: float, ratio: float) -> None:
-    """x = h/lag: mean and double integral of the exponential, against sums."""
-    after = demand - (demand - before) * math.exp(-ratio)
-    if abs(demand - before) < 1e-3:
-        assert abs(lean(before, after, demand, mean_torque(before, after, demand))) < 1e-4
-        return
-    single, double = torque_moments(before, after, demand)
-    mean = mean_torque(before, after, demand)
-    size = abs(demand - before)
-    assert mean == pytest.approx(single, abs=1e-4 * size)
-    assert lean(before, after, demand, mean) == pytest.approx(double - 0.5 * single, abs=1e-5 * size)
-
-
-@given(st.floats(1e-4, 6e-3), st.floats(2.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
-@settings(max_examples=50, deadline=None)
-def test_time_since_contact_inverts_the_way_lost(s: float, V: float, share: float, d: float) -> None:
-    slope = share * V / s
-    behind = way_lost(s, V, slope, 1.0 / J1, C, d)
-    assert deviation(s, V, slope, 1.0 / J1, C, d) == pytest.approx(behind, rel=1e-6)
-    assert time_since_contact(behind, V, slope, 1.0 / J1, C, d, 0.01) == pytest.approx(s, rel=1e-4)
-
-
-@pytest.mark.parametrize("d", [0.0, 1.0])
-@pytest.mark.parametrize(("u", "drift", "reactive"), [(0.0, 0.2, 0.0), (40.0, 0.2, 0.0), (0.0, 0.0, 1.0)])
-def test_first_guess_in_contact_is_the_plant(d: float, u: float, drift: float, reactive: float) -> None:
-    """2 ms after contact: the state by scipy, what the errors do by differences."""
-    a, b, Mc, s = 1.0 / J1, 8.0, 7.16, 0.002
-    speed = 14.0  # of a free motor at that instant
-    w2 = -b * drift
-
-    def guess(s: float, b: float, speed: float, variances: tuple[float, float, float]) -> Any:
-        m = np.zeros(size(sf.FREE)).view(sf.FREE)[0]
-        m.angle, m.speed, m.inverse, m.p11 = 0.2, speed, a, variances[2]
-        row = np.zeros(size(sf.SHAFT))
-        x = row.view(sf.SHAFT)[0]
-        take_up(x, m, s, variances[0], u, 0.0, 0.0, drift, b, variances[1], a, C, d, Mc, reactive)
-        return row[:5], x.P
-
-    none = (0.0, 0.0, 0.0)
-    if reactive == 0.0:
-        at_contact = np.array(
-            [0.2 - s * speed + 0.5 * a * u * s * s, speed - a * u * s, 0.0, w2 + b * Mc * s, b]
-        )
-        other = Shaft(at_contact, np.eye(5), a, C, d, Mc)
-        assert guess(s, b, speed, none)[0] == pytest.approx(other.after(u, s), rel=1e-4, abs=1e-6)
-    variances = (1e-8, 9.0, 0.05**2)
-    P = guess(s, b, speed, variances)[1]
-    steps = (1e-7, 1e-4, 1e-4)
-    expected = np.zeros((5, 5))
-    for i, step in enumerate(steps):
-        shift = np.eye(3)[i] * step
-        up, down = (guess(*(np.array([s, b, speed]) + sign * shift), none)[0] for sign in (1.0, -1.0))
-        effect = (up - down) / (2.0 * step)
-        expected += variances[i] * np.outer(effect, effect)
-    scale = np.sqrt(np.diag(expected)) + 1e-6
-    assert np.abs((P - expected) / np.outer(scale, scale)).max() < 1e-4
-    assert np.abs(P - P.T).max() < 1e-15
 
 
 # what it knows -------------------------------------------------------------------------------------------
@@ -209,7 +74,7 @@ def test_the_pulse_tells_motor_inertia_and_delay() -> None:
     assert twin.numbers == numbers
     _, trace = traced_as(drive, nominal)
     coasting = state(trace, "phase") == stepping.COAST
-    assert state(trace, "free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)
+    assert state(trace, "watch.free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)
     assert state(trace, "delay")[coasting][-1] == pytest.approx(0.002, rel=0.01)
 
 
@@ -239,7 +104,7 @@ def test_no_contact_is_seen_before_there_is_one(kind: Any, gap: float) -> None:
             kind, gap, 2.0, encoder_phase=phase, motor_inertia=J * J1, torque_lag=lag, computing_delay=dead
         )
         run, trace = traced_as(drive, told(kind))
-        contact = trace[state(trace, "phase") >= stepping.CONTACT, 0]
+        contact = trace[state(trace, "phase") >= stepping.CATCH, 0]
         assert contact[0] > run.first_contact
         assert contact[0] - run.first_contact < 0.0075
         assert run.contacts == 1
@@ -346,19 +211,6 @@ def test_a_slew_limit_does_not_look_like_a_contact() -> None:
         assert float(starts.k_dyn.median()) < 1.0
 
 
-@pytest.mark.parametrize("long", [0.1, 0.5, 0.99, 1.0, 1.7, 3.0])
-def test_moments_of_a_slewing_torque(long: float) -> None:
-    """It slews from 40 N m towards 20 and takes `long` samples for it."""
-    t = (np.arange(200_000) + 0.5) / 200_000  # of the sample
-    u = np.maximum(40.0 - 20.0 * t / long, 20.0)
-    after, reach = max(40.0 - 20.0 / long, 20.0), 20.0 / long
-    mean = float(np.mean(u))
-    assert mean_of_ramp(40.0, after, reach) == pytest.approx(mean, rel=1e-9)
-    assert lean_of_ramp(40.0, after, reach) == pytest.approx(
-        float(np.mean((1.0 - t) * u)) - mean / 2.0, abs=1e-7
-    )
-
-
 # every other drive ---------------------------------------------------------------------------------------
 
 
@@ -432,7 +284,7 @@ def test_raises_the_torque_where_it_cannot_see() -> None:
     ):
         _, trace = traced(blind, PulseCoastHold())
         assert np.all(state(trace, "phase") == stepping.RAISE)
-        demand = state(trace, "demand")
+        demand = state(trace, "raised")
         assert np.all(np.diff(demand) >= 0.0)
         assert demand[-1] == 62.0
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from tests import twin
@@ -21,6 +23,7 @@ from tests.controllers.several_gaps import (
 from softstart import Drive, InputError, compare, simulate
 from softstart.controller import make_controller
 from softstart.drive import library
+from softstart_controllers.shaft_observer import design, predict
 
 FIT = NOMINAL.design_drive
 
@@ -160,3 +163,28 @@ def test_compare_recommends_it_on_a_chain():
     assert found.recommended is not None
     assert found.recommended.name == "take-up"
     assert "take-up" in {row.name for row in compare(chain, names).recommendation.best}
+
+
+@pytest.mark.parametrize("steps", [-360, -200, -60, 0, 60])
+def test_gains_are_the_stationary_kalman_filter(steps: int) -> None:
+    """The same by iterating the Riccati equation of `predict` with h = J1 = 1; the observer is stable."""
+    A = np.array([predict(*unit, 0.0, 1.0, 1.0) for unit in np.eye(4)]).T
+    G, C = np.array([[-1.0 / 24.0, -1.0 / 6.0, 0.5, 1.0]]).T, np.eye(1, 4)  # of a constant T''
+    gains = design(steps)
+    K = np.array(gains[:4])[:, None]
+    Q = 10.0 ** (steps * 0.05) * G @ G.T
+    assert np.abs(np.linalg.eigvals((np.eye(4) - K @ C) @ A)).max() < 1.0
+    if steps >= -200:
+        P = np.eye(4)
+        for _ in range(3000):
+            P = A @ P @ A.T + Q
+            step_gain = P @ C.T / (C @ P @ C.T + 1.0)
+            P = (np.eye(4) - step_gain @ C) @ P
+        assert np.allclose(K, step_gain, rtol=1e-6, atol=1e-9)
+        assert gains.torque_deviation == pytest.approx(math.sqrt(P[2, 2]), rel=1e-6)
+        keep = np.eye(4) - K @ C
+        behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)  # under a T'' of 1 that never ends
+        assert gains.rate_lag == pytest.approx(behind[3, 0], rel=1e-9)
+    else:
+        L, _, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * 0.05)]]), np.eye(1))
+        assert np.allclose(A @ K, L, rtol=1e-9)

@@ -196,8 +196,8 @@ def parameter(
 
     `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
     the drive when none is given. `value` is that default: a constant, or a function of the drive and of the
-    other parameters, which it may name in any order. A `kind` other than a quantity is handed over as it is: a
-    text (the path of a file, say), or an object, which only Python can give. A text may be one of `choices`
+    other parameters, which it may name in any order. A `kind` other than a quantity is handed over as it is:
+    a text (the path of a file, say), or an object, which only Python can give. A text may be one of `choices`
     only, and a number must obey the `rule`.
 
     Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
@@ -253,7 +253,11 @@ class Controller:
     def __post_init__(self) -> None:
         wrong = []
         for one in fields(self):
-            value, rule, choices = getattr(self, one.name), one.metadata.get("rule"), one.metadata.get("choices")
+            value, rule, choices = (
+                getattr(self, one.name),
+                one.metadata.get("rule"),
+                one.metadata.get("choices"),
+            )
             if isinstance(value, str):
                 if choices and value not in choices:
                     wrong.append(f"{one.name} = {show(value)}: write {' or '.join(map(show, choices))}.")
@@ -327,7 +331,7 @@ class Controller:
 
 
 class Values:
-    """The parameters of a controller as attributes: as given, or else derived when they are first asked for."""
+    """The parameters of a controller as attributes: as given, or derived when they are first asked for."""
 
     def __init__(self, controller: Controller, drive: Drive) -> None:
         self._controller, self._drive = controller, drive
