@@ -103,8 +103,8 @@ class CurrentLimitFeedback(CompiledController):
     kept there by zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). A drive whose torque is too slow for its
     elastic frequency so gets no feedback, but the soft approach and the rise all the same.
 
-    An encoder count above a tenth of Ms/c shows the contact too late: then the torque is raised in a ramp, and
-    so it is after `patience`.
+    An encoder count above a tenth of Ms/c shows the contact too late: then the torque is raised in a ramp,
+    and so it is after `patience`.
 
     Source: [G], conclusions ("regulators acting on the current-limit level or as a flexible feedback").
 

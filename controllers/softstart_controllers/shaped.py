@@ -143,11 +143,11 @@ class Shaped(CompiledController):
     *Hanging.* Where the drive that it is set up for starts with its load hanging in the wound-up shaft, the
     steps begin from that twist, once the brake has let the motor go.
 
-    *Limits.* The steps are played without looking: inertias, load torque and elastic `frequency` are those of
-    the nominal drive (J2 as far as it has shown until then). A first-order lag of the torque commutes with the
-    shaper, and is allowed for, and so is a dead time. A limited torque rate is not. An encoder count above a
-    tenth of Ms/c shows the contact too late: then the torque is raised in a ramp, and so it is after
-    `patience`.
+    *Limits.* The steps are played without looking: inertias, load torque and elastic `frequency` are those
+    of the nominal drive (J2 as far as it has shown until then). A first-order lag of the torque commutes
+    with the shaper, and is allowed for, and so is a dead time. A limited torque rate is not. An encoder
+    count above a tenth of Ms/c shows the contact too late: then the torque is raised in a ramp, and so it
+    is after `patience`.
 
     Source: posicast of Smith (1957), ZV and ZVD of Singer and Seering (1990), with the state at contact.
 

@@ -121,8 +121,8 @@ class StateFeedback(CompiledController):
     reference until the brake has let the motor go. Else the start position is nowhere among its numbers.
 
     *Limits.* Designs are made for groups without units on a grid (`regulator`), so neighbouring weights may
-    give the same start. Where the flanks part again, the gap is closed again. An encoder count above a tenth of
-    Ms/c shows the contact too late: then the torque is raised in a ramp, and so it is after `patience`.
+    give the same start. Where the flanks part again, the gap is closed again. An encoder count above a tenth
+    of Ms/c shows the contact too late: then the torque is raised in a ramp, and so it is after `patience`.
 
     Source: linear-quadratic-Gaussian control as in the manual of python-control; landing as `shaped`.
 

@@ -115,7 +115,7 @@ def test_a_start_that_cannot_last_is_told_once() -> None:
 
 
 def test_the_hoist_of_the_issue() -> None:
-    """Held, as hoists are, the order of the strategies turns round; digits of the requirement."""
+    """Held, as hoists are, an S-curve is enough."""
     shipped = Drive.load("hoist-15kw")  # its motor is held until the torque has reached that of the load
     assert (shipped.start_position, shipped.brake, shipped.release) == ("hanging", "motor", "torque")
     for drive in (HOIST, shipped):
@@ -123,7 +123,7 @@ def test_the_hoist_of_the_issue() -> None:
             where: [round(simulate(drive.replace(start_position=where), one).k_dyn, 3) for one in STRATEGIES]
             for where in ("hanging", "mid-gap")
         }
-        assert found == {"hanging": [1.180, 1.001, 1.386], "mid-gap": [2.537, 2.129, 1.826]}
+        assert found == {"hanging": [1.180, 1.001, 1.013], "mid-gap": [2.537, 2.129, 1.821]}
 
 
 @pytest.mark.parametrize("where", ["hanging", "mid-gap"])
