@@ -39,7 +39,7 @@ HALVINGS = 40
 WANDER = 0.02  # of J1/J2 of the drive, in the time 1/Omega: the model may be wrong
 SMALL = 1e-4  # for differences
 TIME_DEVIATION = 0.3  # of the time since contact, before the samples since then are looked at
-QUEUE = 32  # demands that are kept
+QUEUE = 18  # demands that are kept: the plant has 16 on their way at most
 RING = 64  # samples of the free motor that are kept at most
 J1_CERTAINTY = 2.0  # standard deviations of 1/J1 that are no contact
 RATIO_DEVIATION = 0.1  # of J1/J2, beforehand
@@ -571,6 +571,19 @@ def hanging(drive: Drive) -> tuple[float, float, float]:
     if drive.brake != "none" and isinstance(drive.release, str):
         return T / drive.c, T, 0.0
     return T / drive.c, 0.0, drive.release_time
+
+
+def blind(drive: Drive, coarse: float, slow: float) -> bool:
+    """Whether a contact cannot be answered in time.
+
+    The encoder's count is above the share `coarse` of Ms/c, or the torque (dead time, lag, half the slewing
+    time to Ms) later than `slow` sqrt(J1/c).
+
+    >>> blind(Drive.load("crane-4amtkf"), 0.04, 1.3), blind(Drive.load("crane-4amtkf"), 0.002, 1.3)
+    (False, True)
+    """
+    late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
+    return encoder_count(drive) > coarse * drive.Ms / drive.c or late * math.sqrt(drive.c / drive.J1) > slow
 
 
 def lateness(drive: Drive) -> tuple[float, bool]:

@@ -18,9 +18,10 @@ from softstart.controller.compiled import inner, record
 from softstart.drive import Drive
 from softstart_controllers import contact
 from softstart_controllers.reduced import load_drift
-from softstart_controllers.sampled import encoder_count, pulling_load
+from softstart_controllers.sampled import pulling_load
 
 COARSE = 0.1  # of Ms/c: with larger counts the contact is over before it is seen
+SLOW = 2.0  # sqrt(J1/c): with a torque later than this no feedback comes in time
 LOW_TORQUE_SHARE = 0.5  # of the accelerating torque
 
 
@@ -68,7 +69,7 @@ def landing_numbers(drive: Drive, p: Any) -> dict[str, float]:
         "approach": p.approach_speed,
         "horizon": horizon(drive, p.period),
         "drift": load_drift(drive),
-        "blind": encoder_count(drive) > COARSE * drive.Ms / drive.c,
+        "blind": contact.blind(drive, COARSE, SLOW),
     }
 
 

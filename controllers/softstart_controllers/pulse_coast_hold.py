@@ -10,14 +10,24 @@ from softstart.controller import CompiledController, Effort, compiled_step, para
 from softstart.controller.compiled import MEASURED, Answer, Vector, inner, keep_state, named, record, size
 from softstart.drive import Drive
 from softstart_controllers import contact
-from softstart_controllers.contact import CONTACT, NOTHING, OPENED, PUSHED, lateness, observe, send, watching
-from softstart_controllers.sampled import encoder_count, patience_parameter, period_parameter
+from softstart_controllers.contact import (
+    CONTACT,
+    NOTHING,
+    OPENED,
+    PUSHED,
+    blind,
+    lateness,
+    observe,
+    send,
+    watching,
+)
+from softstart_controllers.sampled import patience_parameter, period_parameter
 from softstart_controllers.shaft_filter import move
 
 SHARE_REACTIVE, SHARE_ACTIVE = 0.8, 0.7  # of the speed that makes the stuck load's shaft carry Ms
 COARSE = 0.04  # of Ms/c: with larger counts the contact is over before it is seen
+SLOW = 1.3  # sqrt(J1/c): with a torque later than this the peak is over
 RATIO_DEVIATION = 0.6  # of J1/J2, beforehand
-SLOW = 1.3
 MOST_OPENINGS = 8  # of the gap, after which the torque is just raised
 SOFTEST = 0.1  # of the coast speed
 TELLING = 0.2  # of Ms: with less torque at its end the pulse does not tell the delay
@@ -311,11 +321,9 @@ class PulseCoastHold(CompiledController):
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Estimator, delay of the torque, rise, and whether the contact can be seen in time at all."""
         p: Any = self  # fitted: every parameter is a number
-        Omega1 = math.sqrt(drive.c / drive.J1)
-        late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
         return {
             "watch": watching(drive, p, p.coast_speed, p.inertia_ratio, RATIO_DEVIATION),
             "Ms": drive.Ms,
             "delay": lateness(drive)[0],
-            "blind": encoder_count(drive) > COARSE * drive.Ms / drive.c or late * Omega1 > SLOW,
+            "blind": blind(drive, COARSE, SLOW),
         }
