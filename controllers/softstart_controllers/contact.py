@@ -111,25 +111,25 @@ class State:
     shaft: Shaft
     angles: Vector  # of the samples that `free` has not seen yet
     means: Vector
-    leans: Vector
+    leads: Vector
     doubts: Vector
     sent: Vector
 
 
 PARTS: Any = {"free": FREE, "now": FREE, "shaft": SHAFT}
-PARTS |= dict.fromkeys(("angles", "means", "leans", "doubts"), RING) | {"sent": QUEUE}
+PARTS |= dict.fromkeys(("angles", "means", "leads", "doubts"), RING) | {"sent": QUEUE}
 PARAMETERS, STATE = record(Parameters), record(State, **PARTS)
 
 
 @compiled
-def lean(before: float, after: float, demand: float, mean: float) -> float:
+def lead(before: float, after: float, demand: float, mean: float) -> float:
     """How much earlier than its mean the torque of a sample acts: (int int u)/h^2 - mean/2, in N m.
 
     `before` and `after` are the torques measured at its ends, `demand` the constant demand in it, which the
     torque follows exponentially. With x = ln(b/a), b = demand - before, a = demand - after it is
     int int u = h^2 (demand/2 - b/x + (b - a)/x^2). A fast torque has none: it is at its demand.
 
-    >>> lean(0.0, 0.0, 0.0, 0.0), round(lean(10.0, 9.99, 0.0, 9.995), 6), round(0.01 / 12, 6)
+    >>> lead(0.0, 0.0, 0.0, 0.0), round(lead(10.0, 9.99, 0.0, 9.995), 6), round(0.01 / 12, 6)
     (0.0, 0.000833, 0.000833)
     """
     b = demand - before
@@ -156,10 +156,10 @@ def mean_of_ramp(before: float, after: float, reach: float) -> float:
 
 
 @compiled
-def lean_of_ramp(before: float, after: float, reach: float) -> float:
-    """How much earlier than its mean that torque acts, as `lean`, in N m.
+def lead_of_ramp(before: float, after: float, reach: float) -> float:
+    """How much earlier than its mean that torque acts, as `lead`, in N m.
 
-    >>> round(lean_of_ramp(40.0, 20.0, 20.0) * 12.0, 9), round(lean_of_ramp(10.0, 0.0, 20.0) * 12.0, 9)
+    >>> round(lead_of_ramp(40.0, 20.0, 20.0) * 12.0, 9), round(lead_of_ramp(10.0, 0.0, 20.0) * 12.0, 9)
     (20.0, 10.0)
     """
     change = after - before
@@ -204,7 +204,7 @@ def time_since_contact(
 
 
 @inner
-def since_contact(
+def state_after_contact(
     angle: float, s: float, speed: float, w2: float, b: float, drift: float, u: float, a: float, c: float,
     d: float, Mc: float, reactive: float,
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
@@ -221,7 +221,7 @@ def since_contact(
 
 
 @compiled
-def take_up(
+def begin_shaft(
     x: Shaft, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
     drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, reactive: float,
 ) -> None:  # fmt: skip
@@ -244,10 +244,10 @@ def take_up(
         variance = (s_variance, m.p11, w2_variance, b_variance)[cause]
         if step <= 0.0:
             continue
-        up = since_contact(
+        up = state_after_contact(
             m.angle, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, a, c, d, Mc, reactive
         )
-        down = since_contact(
+        down = state_after_contact(
             m.angle, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, a, c, d, Mc, reactive
         )
         for k in range(N):
@@ -259,7 +259,9 @@ def take_up(
             for k in range(N):
                 x.P[0, k] += m.p01 * x.F[0, k]
                 x.P[k, 0] += m.p01 * x.F[0, k]
-    x.phi1, x.w1, x.z, x.w2, x.b = since_contact(m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, reactive)
+    x.phi1, x.w1, x.z, x.w2, x.b = state_after_contact(
+        m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, reactive
+    )
 
 
 @inner
@@ -268,17 +270,17 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float
     h = p.period
     kept = int(m.kept)
     if kept == int(p.samples):
-        free_predict(m.free, m.means[0], m.leans[0], h, p.free_noise + m.doubts[0])
+        free_predict(m.free, m.means[0], m.leads[0], h, p.free_noise + m.doubts[0])
         free_update(m.free, m.angles[0], p.rounding)
         kept -= 1
         for i in range(kept):
             m.angles[i] = m.angles[i + 1]
             m.means[i] = m.means[i + 1]
-            m.leans[i] = m.leans[i + 1]
+            m.leads[i] = m.leads[i + 1]
             m.doubts[i] = m.doubts[i + 1]
     m.angles[kept] = angle
     m.means[kept] = mean
-    m.leans[kept] = early
+    m.leads[kept] = early
     m.doubts[kept] = doubt
     m.kept = kept + 1.0
     free_after(p, m, kept + 1)
@@ -290,11 +292,11 @@ def free_after(p: Parameters, m: State, samples: int) -> None:
     copy(m.free, m.now)
     for i in range(samples):
         noise = p.free_noise + m.doubts[i]
-        free_predict(m.now, m.means[i], m.leans[i], p.period, noise)
+        free_predict(m.now, m.means[i], m.leads[i], p.period, noise)
 
 
 @inner
-def surely(p: Parameters, m: State) -> float:
+def margin(p: Parameters, m: State) -> float:
     """Angle in rad by which the encoder must differ from the free motor to mean a contact."""
     by_inertia = m.now.p02 * m.now.p02 / m.now.p22 if m.now.p22 > 0.0 else 0.0
     rest = max(m.now.p00 - by_inertia, 0.0) + p.rounding
@@ -359,14 +361,14 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     free_after(p, m, kept - again)
     back = again * h if drift != 0.0 else 0.0
     doubt = TIME_DEVIATION * s + 0.1 * h
-    take_up(
+    begin_shaft(
         m.shaft, m.now, s - again * h, doubt * doubt, u, m.load_speed, m.load_variance,
         drift - p.Mc * back, b, m.b_variance, a, p.c, p.d, p.Mc, p.reactive,
     )  # fmt: skip
     first = kept - again
     shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
     for i in range(first, kept):
-        follow(p, m, m.angles[i], m.means[i], m.leans[i], m.doubts[i])
+        follow(p, m, m.angles[i], m.means[i], m.leads[i], m.doubts[i])
 
 
 @inner
@@ -426,13 +428,13 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
         before = older + (before - older) * (math.exp(-p.rest / p.lag) if p.lag > 0.0 else 0.0)
         m.mean = share * mean_torque(m.realised, before, older)
     m.mean += (1.0 - share) * mean_torque(before, u, newest)
-    early = lean(before, u, newest, m.mean)
+    early = lead(before, u, newest, m.mean)
     doubt = 0.0
     if p.rate > 0.0:  # slewed, lagged or both: one sample does not tell, and the truth may lie outside
         line = mean_of_ramp(m.realised, u, p.rate * p.period)
         doubt = (2.0 * p.a * p.period * (m.mean - line)) ** 2
         if p.slew > 0.0:
-            m.mean, early = line, lean_of_ramp(m.realised, u, p.rate * p.period)
+            m.mean, early = line, lead_of_ramp(m.realised, u, p.rate * p.period)
     if m.closed != 0.0:
         follow(p, m, angle, m.mean, early, doubt)
         if m.shaft.z < 0.0 and m.shaft.w1 < m.shaft.w2:
@@ -442,7 +444,7 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
         return NOTHING
     free_motion(p, m, angle, m.mean, early, doubt)
     behind = m.now.angle - angle
-    enough = surely(p, m)
+    enough = margin(p, m)
     if behind > enough:
         contact(p, m, t, behind, pulsing != 0.0)
         m.closed = 1.0

@@ -50,7 +50,7 @@ FREE, SHAFT = record(Free), record(Shaft, P=(N, N), F=(N, N), G=(N, N))
 
 @compiled
 def free_predict(m: Free, u: float, early: float, h: float, noise: float) -> None:
-    """The free motor h later: w1' = u/J1, under the mean torque u, which acts `early` (see `contact.lean`).
+    """The free motor h later: w1' = u/J1, under the mean torque u, which acts `early` (see `contact.lead`).
 
     1/J1 is an unknown of its own, which the pulse reveals; `noise` (rad^2/s^2) is what the torque measured
     may be wrong by, as variance of w1.

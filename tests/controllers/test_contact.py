@@ -23,10 +23,10 @@ from softstart_controllers import contact, current_limit_feedback, shaped, state
 from softstart_controllers import shaft_filter as sf
 from softstart_controllers.contact import (
     deviation,
-    lean,
-    lean_of_ramp,
+    lead,
+    lead_of_ramp,
     mean_of_ramp,
-    take_up,
+    begin_shaft,
     time_since_contact,
 )
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
@@ -112,17 +112,17 @@ def test_reactive_load_stays_until_the_shaft_moves_it() -> None:
 
 
 @given(st.floats(-60, 60), st.floats(-60, 60), st.floats(1e-3, 5.0))
-def test_lean_of_a_lagging_torque(before: float, demand: float, ratio: float) -> None:
+def test_lead_of_a_lagging_torque(before: float, demand: float, ratio: float) -> None:
     """x = h/lag: mean and double integral of the exponential, against sums."""
     after = demand - (demand - before) * math.exp(-ratio)
     if abs(demand - before) < 1e-3:
-        assert abs(lean(before, after, demand, mean_torque(before, after, demand))) < 1e-4
+        assert abs(lead(before, after, demand, mean_torque(before, after, demand))) < 1e-4
         return
     single, double = torque_moments(before, after, demand)
     mean = mean_torque(before, after, demand)
     size = abs(demand - before)
     assert mean == pytest.approx(single, abs=1e-4 * size)
-    assert lean(before, after, demand, mean) == pytest.approx(double - 0.5 * single, abs=1e-5 * size)
+    assert lead(before, after, demand, mean) == pytest.approx(double - 0.5 * single, abs=1e-5 * size)
 
 
 @given(st.floats(1e-4, 6e-3), st.floats(2.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
@@ -147,7 +147,7 @@ def test_first_guess_in_contact_is_the_plant(d: float, u: float, drift: float, r
         m.angle, m.speed, m.inverse, m.p11 = 0.2, speed, a, variances[2]
         row = np.zeros(size(sf.SHAFT))
         x = row.view(sf.SHAFT)[0]
-        take_up(x, m, s, variances[0], u, 0.0, 0.0, drift, b, variances[1], a, C, d, Mc, reactive)
+        begin_shaft(x, m, s, variances[0], u, 0.0, 0.0, drift, b, variances[1], a, C, d, Mc, reactive)
         return row[:5], x.P
 
     none = (0.0, 0.0, 0.0)
@@ -179,7 +179,7 @@ def test_moments_of_a_slewing_torque(long: float) -> None:
     after, reach = max(40.0 - 20.0 / long, 20.0), 20.0 / long
     mean = float(np.mean(u))
     assert mean_of_ramp(40.0, after, reach) == pytest.approx(mean, rel=1e-9)
-    assert lean_of_ramp(40.0, after, reach) == pytest.approx(
+    assert lead_of_ramp(40.0, after, reach) == pytest.approx(
         float(np.mean((1.0 - t) * u)) - mean / 2.0, abs=1e-7
     )
 
