@@ -22,11 +22,11 @@ from softstart.kernel.records import size
 from softstart_controllers import contact, current_limit_feedback, shaped, state_feedback
 from softstart_controllers import shaft_filter as sf
 from softstart_controllers.contact import (
+    begin_shaft,
     deviation,
     lead,
     lead_of_ramp,
     mean_of_ramp,
-    begin_shaft,
     time_since_contact,
 )
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
