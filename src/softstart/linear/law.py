@@ -6,11 +6,11 @@ the shaft torque is steady. Several samples along the contact are tried. At each
 
     x+ = A x + B y,   demand = C x + D y        small changes of its state x and of what is measured, y
 
-and the law is compared with the exact plant under the controller itself: each body is pushed a little, both
-ways, and the responses of shaft torque and demand over a few samples are compared with those of the linear
-loop. The steady instant is taken if the prediction is good there, otherwise
-the instant with the best prediction: a controller whose demand lies exactly on a limit has no linear law at
-that point, but it has one before it gets there.
+and the law is compared with the exact plant under the controller itself: each speed and twist is displaced
+slightly, both ways, and the responses of shaft torque and demand over a few samples are compared with those
+of the linear loop. The steady instant is taken if the prediction is good there, otherwise the instant with
+the best prediction: a controller whose demand lies exactly on a limit has no linear law at that point, but it
+has one before it gets there.
 
 The derivative is taken by differences. Each component is displaced both ways by a step and by half of it,
 with ever smaller steps until both sides agree. Richardson's extrapolation of the central difference is then
@@ -445,32 +445,54 @@ def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
 def _mismatch(
     start: SampledStart, sample: Sample, period: float, plant: Plant, held: SampledPlant, law: System
 ) -> float:
-    """The linear loop against the exact plant under the controller, as each body is pushed a little."""
-    sizes = sizes_of(start.machine)
+    """The linear loop against the exact plant under the controller, after small displacements both ways."""
+    base = sizes_of(start.machine).base
     loop, _, read = closed(held, law)
     until = sample.time + (WINDOW - 0.5) * period
     worst = 0.0
-    for index in sorted(set(plant.speeds)):
-        body = [mass for mass, own in enumerate(plant.speeds) if own == index]
-        if not np.isfinite(start.rows.masses.view(at.MASS)[0, body, 0]["J"]).all():
-            continue  # the ground
-        state = np.zeros(loop.shape[0])
-        state[index] = sizes.speed
-        predicted = np.zeros((WINDOW, 2))
+    for first, changes in _displacements(start, plant, loop.shape[0]):
+        predicted, state = np.zeros((WINDOW, 2)), first
         for k in range(WINDOW):
             predicted[k], state = read @ state, loop @ state
         responses = []
         for by in (STEP, -STEP):
-            pushed = sample.copied()
-            pushed.plant["w"][body] += by * sizes.speed
-            played = list(start.samples(until, begin=pushed))
+            displaced = sample.copied()
+            for name, change in changes.items():
+                displaced.plant[name] += by * change
+            played = list(start.samples(until, begin=displaced))
             if len(played) != WINDOW or not all(one.pressing for one in played):
                 return math.inf
             responses.append([(one.shaft_torque, one.demand) for one in played])
         response = (np.array(responses[0]) - responses[1]) / (2.0 * STEP)
-        size = max(float(np.max(np.abs(response))), 1e-3 * sizes.base)
+        size = max(float(np.max(np.abs(response))), 1e-3 * base)
         worst = max(worst, float(np.max(np.abs(response - predicted))) / size)
     return worst
+
+
+def _displacements(start: SampledStart, plant: Plant, order: int) -> Iterator[tuple[Vector, dict[str, Any]]]:
+    """Of the whole machine, each body's speed, each twist: the loop's state, and the changes of the start."""
+    sizes, load, motor = sizes_of(start.machine), int(start.rows.machine.load), int(start.rows.machine.motor)
+    speeds, masses = np.array(plant.speeds), np.arange(start.rows.count)
+
+    def filled(values: Any, size: float) -> Vector:
+        return np.asarray(size * np.pad(1.0 * values, (0, at.MOST_MASSES - len(values))))
+
+    angle = sizes.windup
+    yield angle * np.eye(1, order)[0], {"phi": angle, "angle": filled(np.ones(masses.size), angle)}
+    for index in np.unique(speeds):
+        if np.isfinite(start.rows.masses.view(at.MASS)[0, speeds == index, 0]["J"]).all():  # not the ground
+            yield sizes.speed * np.eye(1, order, index)[0], {"w": filled(speeds == index, sizes.speed)}
+    for spring, shaft in enumerate(np.flatnonzero(np.diff(speeds)), start=1):
+        # the motor stays, and what lies on the other side of the shaft turns; `phi` is the angle of the load
+        turned = -1.0 * (masses > shaft) if motor <= shaft else 1.0 * (masses <= shaft)
+        yield (
+            angle * np.eye(1, order, spring)[0],
+            {
+                "theta": filled(masses == shaft, angle),
+                "phi": angle * turned[load],
+                "angle": filled(turned, angle),
+            },
+        )
 
 
 def closed(plant: SampledPlant, law: System) -> tuple[Matrix, Vector, Matrix]:

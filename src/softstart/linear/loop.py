@@ -40,10 +40,12 @@ from softstart.linear.systems import (
 )
 
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
-FRACTIONS = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 9)[:-1])  # of a sample, close near a whole one
+FRACTIONS = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 49)[:-1])  # of a sample, close near a whole one
+MANY = 20  # samples: a long delay
 COARSEST = 1e-5  # tolerance for what shows in the closed loop
 SLOW = 1e-4  # of the elastic frequency: slower poles are the rotation as a whole, but for rounding
 ROTATION = 1e-3  # the same, of poles of a loop that has not been reduced to what shows
+ROUNDING = 1e-10  # of the largest pole
 ON_THE_CIRCLE = 1e-9  # poles this near to the unit circle do not count as stable
 
 
@@ -163,34 +165,34 @@ class Loop:
         A dead time of n samples and a fraction f of one turns the phase of L_f by n samples:
         L(z) = z^-n L_f(z). Where |L_f| = 1 its phase says how many samples it takes to be at -1. From there
         on the spectral radius of the closed loop is looked at for some fractions of every sample, and the
-        first rise above 1 is located by bisection; it is 0 for an unstable loop. A torque without lag,
+        first rise above 1 is located by bracketing; it is 0 for an unstable loop. A torque without lag,
         measured just before a sample, is a different one as soon as the delay is a whole sample, and a pole
         can leave the circle at once there.
         """
+        from scipy import optimize
+
         whole = math.inf
-        for fraction in FRACTIONS * self.period:
+        for fraction in FRACTIONS[::6] * self.period:
             for one in _gain_crossovers(minimal(self.broken_delayed(fraction)), self.period):
                 whole = min(whole, one.margin % (2.0 * math.pi) / (one.frequency * self.period))
-        size, frequency = self._largest_pole(0.0)
-        if size > 1.0 + ON_THE_CIRCLE:
-            return 0.0, frequency
+        if not self.stable or self._excess(0.0) > 0.0:
+            return 0.0, self._largest_pole(0.0)[1]
         if math.isinf(whole):
             return math.inf, math.nan
-        last = 0.0
-        first = max(int(whole) - 1, 0)
-        for delay in (np.arange(first, first + 4)[:, None] + FRACTIONS).ravel()[1:] * self.period:
-            if self._largest_pole(delay)[0] > 1.0:
+        last, first = 0.0, max(int(whole) - 1, 0)
+        fractions = FRACTIONS if first < MANY else FRACTIONS[::6]  # of a long delay a fraction is little
+        for delay in (np.arange(first, first + 4)[:, None] + fractions).ravel()[1:] * self.period:
+            if self._excess(delay) > 0.0:
                 break
             last = delay
         else:
             return math.inf, math.nan
-        while delay - last > 1e-13 * delay:
-            middle = 0.5 * (last + delay)
-            if self._largest_pole(middle)[0] > 1.0:
-                delay = middle
-            else:
-                last = middle
-        return float(delay), self._largest_pole(delay)[1]
+        found = float(optimize.brentq(self._excess, last, delay, xtol=1e-13 * delay, rtol=1e-14))
+        return found, self._largest_pole(found)[1]
+
+    def _excess(self, delay: float) -> float:
+        """By how much the largest pole is outside of the unit circle with a further dead time."""
+        return self._largest_pole(delay)[0] - 1.0 - ROUNDING
 
     def _largest_pole(self, delay: float) -> tuple[float, float]:
         """Size and frequency in rad/s of the largest pole, but for the rotation, with a further dead time."""
