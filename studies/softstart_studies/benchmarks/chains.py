@@ -32,9 +32,8 @@ DUELS = (
     *(Duel(one, "lsoda-tight", 1, "run", 1, once=True) for one in (DIRECT, RAMP, LONG)),
     Duel(DIRECT, "lsoda-restarted", 3, "kernel", 225, goal=AT_ONCE),
     Duel(RAMP, "lsoda-sampled", 3, "kernel", 225, goal=SAMPLED),
-    Duel(Problem("damped direct", CHAIN), "lsoda-restarted", 3, "kernel", 225, goal=AT_ONCE),
+    Duel(Problem("damped direct", CHAIN), "", 1, "kernel", 225, goal=AT_ONCE),
     Duel(Problem("damped take-up", CHAIN), "", 1, "kernel", 225, goal=SAMPLED),
-    Duel(DIRECT, "lsoda-restarted", 3, "batch", 225),
 )
 
 

@@ -49,16 +49,10 @@ def formula(problem: Problem, count: int) -> Solve:
 
 
 def batch(problem: Problem, count: int) -> Solve:
-    """`simulate` of records, or of chains: the same kernel, and its figures as an xarray.Dataset."""
-    controller, (one,) = problem.controller(), problem.machines()
-    many = records(one, gap=gaps(count)) if problem.on_drive else problem.machines(count)
-    names = ["peak_torque"] if problem.on_drive else [f"peak_torque_{k + 1}" for k in range(len(one.shafts))]
-
-    def solve() -> Any:
-        found = cast(Any, simulate(many, controller, fitted_to=one.design_drive, workers=1))
-        return np.array([found[name].values for name in names]).T
-
-    return solve
+    """`simulate` of records: the same kernel, and its figures as an xarray.Dataset."""
+    controller, (drive,) = problem.controller(), problem.machines()
+    many = records(drive, gap=gaps(count))
+    return lambda: cast(Any, simulate(many, controller)).peak_torque.values[:, None]
 
 
 def run(problem: Problem, count: int) -> Solve:
