@@ -3,17 +3,14 @@
 import numpy as np
 import pytest
 
+from softstart import simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.study import Verdict
-from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
-from softstart_studies.benchmarks.chains.study import (
-    BatchCase,
-    BenchmarkChains,
-    Case,
-    batch_cases,
-    cases,
-    long_chain,
-)
+from softstart_studies.benchmarks import lsoda
+from softstart_studies.benchmarks.chains import DUELS, BenchmarkChains, long_chain
+from softstart_studies.benchmarks.contest import Duel
+from softstart_studies.benchmarks.problem import Problem
+from softstart_studies.benchmarks.process import Here
 
 SHORT = Chain(
     [Mass(0.03), Mass(0.01), Mass(0.1, torque=5.0)],
@@ -23,35 +20,40 @@ SHORT = Chain(
 )
 
 
-@pytest.mark.parametrize("ramp", [0.0, 0.02])
-def test_lsoda_comes_to_the_same_peaks_as_its_tolerance_shrinks(ramp):
-    case = Case(SHORT, ramp)
-    ours = case.ours()
-    coarse, tight = (lsoda_start(case.problem(), tolerance) for tolerance in (1e-6, 1e-12))
-    apart = [np.abs(one.peaks / ours.peak_torques - 1).max() for one in (coarse, tight)]
-    assert apart[1] < 1e-8
-    assert apart[1] < 0.1 * apart[0]
-    assert tight.start_time == pytest.approx(ours.start_time, rel=1e-9)
+@pytest.mark.parametrize("problem", [
+    Problem("direct", SHORT), Problem("ramp", SHORT, ramp_time=0.02), Problem("damped direct", SHORT),
+])  # fmt: skip
+def test_lsoda_comes_to_the_same_peaks_as_its_tolerance_shrinks(problem):
+    (chain,) = problem.machines()
+    ours = simulate(chain, problem.controller(), fitted_to=chain.design_drive)
+    found = [lsoda.start(problem.line(), tolerance) for tolerance in (1e-6, 1e-12)]
+    coarse, tight = (np.abs(peaks / ours.peak_torques - 1).max() for peaks, _ in found)
+    assert tight < 1e-8
+    assert tight < 0.1 * coarse
+    assert found[1][1] == pytest.approx(ours.start_time, rel=1e-9)
 
 
 def test_the_torque_is_held_between_samples():
-    problem = Problem(SHORT, 40.0, 0.1, ramp=0.02)
-    assert problem.demand(0.0105) == (pytest.approx(20.0), pytest.approx(0.011))
-    assert problem.demand(0.02) == (40.0, float("inf"))
+    line = Problem("ramp", SHORT, ramp_time=0.02).line()
+    half = line.initial + 0.5 * (40.0 - line.initial)
+    assert line.demand(0.0105, 1) == (pytest.approx(half), pytest.approx(0.011))
+    assert line.demand(0.02, 1) == (40.0, float("inf"))
 
 
 def test_the_study_measures_and_judges():
-    batches = (BatchCase(side=2), BatchCase(damped=True, feedback="take-up", side=2))
-    result = BenchmarkChains((Case(SHORT),), 1, batches).run(None, lambda text: None)
-    row = result.tables[0].rows[0]
-    assert row[1:4] == (3, 2, "direct")
-    assert row[9] < 1e-7
-    assert result.claims[1].verdict is Verdict.CONFIRMED
-    alone, fed_back = result.tables[1].rows
-    assert alone[1:3] == ("direct", 4)
-    assert alone[8] < 0.02  # LSODA at 1e-8; 70 undamped contacts let its errors grow
-    assert fed_back[1:4] == ("take-up", 4, "")
-    assert all(float(row[4]) > 0.0 and float(row[6]) > 0.0 for row in (alone, fed_back))
-    assert [case.goal for case in batch_cases()] == [2000.0, 300.0, 2000.0, 300.0]
-    assert [case.strategy for case in cases()] == ["direct", "ramp, 1 kHz", "direct"]
+    duels = (
+        Duel(Problem("direct", SHORT), "lsoda-tight", 1, "run", 1),
+        Duel(Problem("direct", SHORT), "lsoda-tight", 2, "kernel", 4, goal=1e-9),
+        Duel(Problem("damped take-up", "crane-4-mass"), "", 1, "kernel", 4, goal=1e-9),
+    )
+    result = BenchmarkChains(duels, 1, Here).run(None, lambda text: None)
+    single, batch, fed_back = (
+        dict(zip(result.tables[0].columns, row, strict=True)) for row in result.tables[0].rows
+    )
+    assert single["K_dyn diff."] < 1e-7
+    assert batch["K_dyn diff."] < 1e-7
+    assert (fed_back["peer 1/s"], fed_back["ratio"], fed_back["K_dyn diff."]) == (None, None, None)
+    assert batch["ours 1/s"] > 0.0 < fed_back["ours 1/s"]
+    assert [claim.verdict for claim in result.claims] == [Verdict.CONFIRMED] * 2
+    assert [duel.goal for duel in DUELS if duel.goal] == [2000.0, 300.0, 2000.0, 300.0]
     assert float(long_chain().at_motor_shaft().gap.sum()) == pytest.approx(0.35)

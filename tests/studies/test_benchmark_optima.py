@@ -8,8 +8,9 @@ import pytest
 
 from softstart import simulate
 from softstart.study import Verdict, find_study
+from softstart_studies.benchmarks.contest import MISSING
 from softstart_studies.benchmarks.optima import entries, worker
-from softstart_studies.benchmarks.optima.entries import ENTRIES, MISSING, count_lines, lines_of_code
+from softstart_studies.benchmarks.optima.entries import ENTRIES, count_lines, lines_of_code
 from softstart_studies.benchmarks.optima.judge import Judged, judge
 from softstart_studies.benchmarks.optima.study import BenchmarkOptima, optima_figure
 from softstart_studies.benchmarks.optima.task import START_TIMES, Answer, crane, crane_task, steps

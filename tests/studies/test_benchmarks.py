@@ -4,23 +4,20 @@ import pytest
 
 from softstart import SimulationError, simulate
 from softstart.study import Verdict, find_study
-from softstart_studies.benchmarks import contenders
-from softstart_studies.benchmarks.contest import Duel, Outcome, fight
-from softstart_studies.benchmarks.host import Child, Here
-from softstart_studies.benchmarks.lsoda import sampled_plan
-from softstart_studies.benchmarks.problem import DAMPED, RAMP_TIME, STRATEGIES, crane, crane_problem, gaps
-from softstart_studies.benchmarks.starts import DUELS, MISSING, BenchmarkStarts, claims, ratio_figure
+from softstart_studies.benchmarks import contest
+from softstart_studies.benchmarks.chains import DUELS as OF_CHAINS
+from softstart_studies.benchmarks.contest import MISSING, Duel, Outcome, fight, prepare, ratio_figure, timed
+from softstart_studies.benchmarks.problem import RAMP_TIME, Problem, gaps
+from softstart_studies.benchmarks.process import Apart, Here, memory
+from softstart_studies.benchmarks.starts import DUELS, BenchmarkStarts
 
-needs_diffrax = pytest.mark.skipif(
-    contenders.version_of("diffrax") is None, reason="diffrax: extra `benchmark`"
-)
+needs_diffrax = pytest.mark.skipif(contest.version_of("diffrax") is None, reason="diffrax: extra `benchmark`")
+CRANE = Problem("direct").machines()[0]
 
 
 def difference(strategy: str, peer: str, ours: str = "kernel", starts: int = 4) -> float:
     here = Here()
-    return fight(
-        Duel(strategy, peer, starts, ours, starts), crane_problem(strategy), here, here, 1
-    ).k_dyn_difference
+    return fight(Duel(Problem(strategy), peer, starts, ours, starts), here, here, 1).k_dyn_difference
 
 
 @pytest.mark.parametrize("strategy", ["direct", "reduced-first-stage", "reduced-two-stage"])
@@ -54,10 +51,9 @@ def test_python_control_as_it_comes_is_the_same_start_but_coarse():
 @needs_diffrax
 def test_diffrax_and_softstart_agree():
     # in a process of its own: it switches jax to 64 bits for good
-    here, child = Here(), Child()
+    child = Apart()
     try:
-        problem = crane_problem("reduced-two-stage")
-        outcome = fight(Duel(problem.strategy, "diffrax", 5, "kernel", 5), problem, child, here, 1)
+        outcome = fight(Duel(Problem("reduced-two-stage"), "diffrax", 5, "kernel", 5), child, Here(), 1)
         assert outcome.k_dyn_difference < 1e-6
     finally:
         child.close()
@@ -65,21 +61,21 @@ def test_diffrax_and_softstart_agree():
 
 @pytest.mark.parametrize("ours", ["kernel", "batch", "run", "run-traces"])
 def test_every_way_of_using_softstart_gives_the_same(ours):
-    here, problem = Here(), crane_problem("direct")
-    here.prepare(ours, problem, 3)
-    peaks = here.timed(ours, problem, 3).peaks
-    assert peaks.tolist() == [simulate(crane(float(gap)), "direct").peak_torque for gap in gaps(3)]
+    problem = Problem("direct")
+    prepare(ours, problem, 3)
+    peaks = timed(ours, 3).peaks[:, 0]
+    assert peaks.tolist() == [simulate(one, "direct").peak_torque for one in problem.machines(3)]
 
 
 def test_the_problem_is_that_of_the_drive():
-    problem = crane_problem("reduced-two-stage")
-    drive = crane(0.5)
-    assert (problem.J1, problem.J2, problem.c, problem.Mc) == (drive.J1, drive.J2, drive.c, drive.Mc)
-    first, second, later = problem.stage_torques
-    assert first == second < later == drive.Ms
-    assert crane_problem("reduced-first-stage").stage_torques == (first, later, later)
-    assert drive.d == 0.0
-    assert drive.load_kind == "active"
+    line = Problem("reduced-two-stage").line()
+    assert line.J.tolist() == [CRANE.J1, CRANE.J2]
+    assert (line.c, line.d, line.Mc[1], line.Mc[0]) == (CRANE.c, CRANE.d, CRANE.Mc, 0.0)
+    first, second, later = line.stage_torques
+    assert first == second < later == CRANE.Ms
+    assert Problem("reduced-first-stage").line().stage_torques == (first, later, later)
+    assert CRANE.d == 0.0
+    assert CRANE.load_kind == "active"
 
 
 def test_few_and_many_gaps_have_the_same_mean():
@@ -87,41 +83,37 @@ def test_few_and_many_gaps_have_the_same_mean():
 
 
 def test_the_ramp_of_the_peer_is_that_of_the_controller():
-    problem = crane_problem("ramp")
-    plan = sampled_plan(problem)
-    run = simulate(crane(0.5), "ramp", parameters={"time": RAMP_TIME})
+    line = Problem("ramp").line()
+    run = simulate(CRANE, "ramp", parameters={"time": RAMP_TIME})
     for t in (0.0, 0.0005, 0.2504, 0.4999, 0.5):
-        assert plan(t, 1)[0] == pytest.approx(float(run.at([t])["u"][0]), rel=1e-12)
+        assert line.demand(t, 1)[0] == pytest.approx(float(run.at([t])["u"][0]), rel=1e-12)
 
 
 def test_peers_refuse_what_they_cannot_do():
-    with pytest.raises(ValueError, match="ramp"):
-        contenders.make("control", crane_problem("ramp"))
-    with pytest.raises(ValueError, match="direct"):
-        sampled_plan(crane_problem("direct"))
+    for peer in ("control", "lsoda"):
+        with pytest.raises(ValueError, match="ramp"):
+            contest.ready(peer, Problem("ramp"), 1)()
 
 
 def test_a_process_of_its_own_gives_the_same_and_weighs_itself():
-    problem = crane_problem("direct")
-    here, child = Here(), Child()
+    problem = Problem("direct")
+    child = Apart()
     try:
-        for host in (here, child):
-            host.prepare("lsoda", problem, 2)
-        assert (
-            child.timed("lsoda", problem, 2).peaks.tolist() == here.timed("lsoda", problem, 2).peaks.tolist()
-        )
-        memory = child.memory()
-        assert memory is None or 20 < memory < 2000
+        for host in (Here(), child):
+            host(prepare, "lsoda", problem, 2)
+        assert child(timed, "lsoda", 2).peaks.tolist() == timed("lsoda", 2).peaks.tolist()
+        used = child(memory)
+        assert used is None or 20 < used < 2000
     finally:
         child.close()
     assert not child.worker.alive
 
 
 def test_a_process_that_fails_is_one_sentence():
-    child = Child()
+    child = Apart()
     try:
         with pytest.raises(SimulationError, match=r"a contender failed: KeyError: 'nobody'") as caught:
-            child.prepare("nobody", crane_problem("direct"), 1)
+            child(prepare, "nobody", Problem("direct"), 1)
         assert "\n" not in str(caught.value)
     finally:
         child.close()
@@ -130,16 +122,16 @@ def test_a_process_that_fails_is_one_sentence():
 @pytest.fixture(scope="module")
 def result():
     duels = (
-        Duel("direct", "lsoda", 2, "kernel", 3, 150.0),
-        Duel("ramp", "lsoda-sampled", 1, "kernel", 2, 100.0),
-        Duel("direct", "lsoda", 2, "run", 2, 1e-9),
-        Duel("direct", "control", 1, "run-traces", 2),
-        Duel("direct", "diffrax", 2, "kernel", 2),
+        Duel(Problem("direct"), "lsoda", 2, "kernel", 3, 150.0),
+        Duel(Problem("ramp"), "lsoda-sampled", 1, "kernel", 2, 100.0),
+        Duel(Problem("direct"), "lsoda", 2, "run", 2, 1e-9),
+        Duel(Problem("direct"), "control", 1, "run-traces", 2),
+        Duel(Problem("direct"), "diffrax", 2, "kernel", 2),
     )
     said = []
     with pytest.MonkeyPatch.context() as patch:
-        known = contenders.version_of
-        patch.setattr(contenders, "version_of", lambda name: None if name == "diffrax" else known(name))
+        known = contest.version_of
+        patch.setattr(contest, "version_of", lambda name: None if name == "diffrax" else known(name))
         found = BenchmarkStarts(duels, passes=1, host=Here).run(None, said.append)
     return found, said
 
@@ -156,21 +148,23 @@ def test_rows_columns_and_progress(result):
     assert [row[0].split()[0] for row in processes.rows] == ["scipy", "softstart", "control"]
     versions = dict(conditions.rows)
     assert versions["processors and threads used"] == "one, one"
-    assert versions["scipy"] == contenders.version_of("scipy")
+    assert versions["scipy"] == contest.version_of("scipy")
     assert versions["diffrax"] == "not installed"
 
 
 def test_a_missing_peer_is_a_row_that_says_so(result):
     found, said = result
-    assert found.tables[0].rows[-1] == ("direct", "diffrax", "kernel", None, None, None, None, None)
+    assert found.tables[0].rows[-1] == ("direct", "diffrax", "kernel", *[None] * 6)
     assert found.tables[1].rows[-1] == ("diffrax", "diffrax", MISSING)
     assert "softstart[benchmark]" in said[-1]
 
 
 def test_claims_are_judged_by_the_ratios():
     def outcome(ratio, rate=2e6, strategy="direct", peer="lsoda", ours="kernel", wanted=150.0, apart=1e-8):
-        return Outcome(Duel(strategy, peer, 1, ours, 1, wanted), rate / ratio, rate, ratio, ratio, apart, 0.1)
+        duel = Duel(Problem(strategy), peer, 1, ours, 1, wanted)
+        return Outcome(duel, rate / ratio, rate, ratio, ratio, apart, 0.1)
 
+    claims = BenchmarkStarts().claims
     fast, slow = outcome(400.0), outcome(60.0, 0.9e4, "reduced-first-stage")
     assert [claim.verdict for claim in claims([fast])] == [Verdict.CONFIRMED] * 2
     assert [claim.verdict for claim in claims([slow])] == [Verdict.REFUTED, Verdict.CONFIRMED]
@@ -197,5 +191,4 @@ def test_the_study_is_registered_with_all_its_duels():
     study = find_study("benchmark-starts")
     assert isinstance(study, BenchmarkStarts)
     assert study.duels == DUELS
-    assert {duel.strategy.removeprefix(DAMPED) for duel in DUELS} == set(STRATEGIES)
-    assert {duel.peer for duel in DUELS} | {duel.ours for duel in DUELS} == set(contenders.ENTRIES)
+    assert {duel.peer for duel in DUELS + OF_CHAINS} | {duel.ours for duel in DUELS} == {*contest.ENTRIES, ""}

@@ -1,5 +1,7 @@
 """Limit cycles through the gap: predicted by its describing function, and tried on the exact plant.
 
+"Where does the describing function of backlash come from?" From the first harmonic of a dead zone, as here:
+
 The describing function treats the shaft as a spring that is softer the less the twist leaves the gap. For a
 twist B + A sin(wt) the dead zone of half width h = gap/2 transmits the torque
 
@@ -42,7 +44,9 @@ its amplitude, should diverge from it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -50,11 +54,10 @@ from softstart.arrays import Complex, Vector
 from softstart.drive import Drive
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
-from softstart.linear.operating_point import OperatingPoint
-from softstart.linear.sampled_plant import SampledPlant, motor_alone, sampled
-from softstart.linear.sampled_start import Part, Sample, SampledStart
-from softstart.linear.systems import System, at_points, zeros_of
-from softstart.start.recorded import FIRST_ROWS
+from softstart.linear.law import OperatingPoint, Sample, SampledRun, SampledStart
+from softstart.linear.plant import in_contact, sampled
+from softstart.linear.systems import zeros_of
+from softstart.start.recorded import Recorder
 
 FREQUENCIES = 4000  # of the grid
 LARGEST = 100.0  # amplitude, in half gaps and mean windups
@@ -119,28 +122,13 @@ def _g(x: float) -> float:
     return 2.0 / math.pi * (x * math.asin(x) + math.sqrt(1.0 - x * x))
 
 
-def free_vibration(drive: Drive, amplitudes: Vector) -> tuple[Vector, Vector]:
-    """Frequency in rad/s of the unbiased free vibration of two masses through the gap: exact, and by N(A).
-
-    `amplitudes` of the twist, rad, above gap/2. Exact: the masses cross the gap at the speed v and turn round
-    in half an elastic period, T = 2 pi/Omega + 2 gap/v, v = Omega (A - gap/2). By the describing function:
-    w^2 = N(A) (J1 + J2)/(J1 J2). Undamped, no load torque.
-
-    >>> exact, described = free_vibration(Drive.load("crane-4amtkf"), np.array([0.3, 0.5, 50.0]))
-    >>> (described / exact).round(3).tolist()
-    [1.18, 1.023, 1.0]
-    """
-    A = np.asarray(amplitudes, dtype=np.float64)
-    gap, Omega = float(drive.gap), float(drive.Omega)
-    with np.errstate(divide="ignore"):
-        exact = 2.0 * math.pi / (2.0 * math.pi / Omega + 2.0 * gap / (Omega * (A - 0.5 * gap)))
-    described = Omega * np.sqrt([share(float(one), 0.5 * gap) for one in A])
-    return exact, described
-
-
 @dataclass(frozen=True)
 class Cycle:
-    """A predicted limit cycle: frequency in rad/s, twist amplitude and bias in rad, torques in N m."""
+    """A predicted limit cycle, and what the exact plant does when it is started there.
+
+    Frequencies in rad/s, twist amplitudes and bias in rad, torques in N m. `beyond_limits` is true if its
+    demand exceeds what the motor can deliver; the measured figures are NaN where no vibration remains.
+    """
 
     frequency: float
     amplitude: float
@@ -148,64 +136,65 @@ class Cycle:
     mean_torque: float
     demand_amplitude: float
     stable: bool
+    beyond_limits: bool = False
+    measured_frequency: float = math.nan
+    measured_amplitude: float = math.nan
+    confirmed: bool = False
+    verdict: str = ""
 
 
 class Outside:
     """Everything but the shaft: from the shaft torque to twist, demand and the measured quantities."""
 
-    def __init__(
-        self, drive: Drive, law: System, inputs: tuple[int, ...], plant: SampledPlant, differencing: bool
-    ) -> None:
-        self.drive, self.law, self.inputs = drive, law, inputs
-        self.period = plant.period
+    def __init__(self, start: SampledStart, point: OperatingPoint) -> None:
+        self.start, self.point, self.period = start, point, point.period
+        self.drive: Drive = start.machine.design_drive
+        drive = self.drive
         self.delay = float(drive.computing_delay)
-        self.lag = float(drive.torque_lag)
         # the rates at which viscous friction takes the speeds of motor and load
         _, b1, b2 = drive.frictions
         self.decays = float(b1 / drive.J1), float(b2 / drive.J2)
-        self.differencing = differencing
-        self.motor = sampled(motor_alone(drive), self.period, self.delay, inputs, differencing).system
+        motor = in_contact(drive, masses=range(1))
+        self.motor = sampled(motor, self.period, self.delay, start.inputs, start.differencing).system
+
+    def speeds(self, s: Any) -> tuple[Any, Any]:
+        """Speed of the motor over a torque on it, and of the load over one on it."""
+        b1, b2 = self.decays
+        return 1.0 / (float(self.drive.J1) * (s + b1)), 1.0 / (float(self.drive.J2) * (s + b2))
 
     def measured_per_torque(self, w: Vector) -> Complex:
         """Measured quantities at the samples under T = sin wt without any demand: shape (inputs, points)."""
-        J1, J2 = float(self.drive.J1), float(self.drive.J2)
         s = 1j * w
-        b1, b2 = self.decays
-        angle = -1.0 / (J1 * (s * (s + b1)))
-        speed = (1.0 - np.exp(-s * self.period)) / self.period * angle if self.differencing else s * angle
+        motor, load = self.speeds(s)
+        differenced = (1.0 - np.exp(-s * self.period)) / (s * self.period)
         quantities = {
-            exchange.M_MOTOR_ANGLE: angle,
-            exchange.M_MOTOR_SPEED: speed,
+            exchange.M_MOTOR_ANGLE: -motor / s,
+            exchange.M_MOTOR_SPEED: -motor * differenced if self.start.differencing else -motor,
             exchange.M_MOTOR_TORQUE: 0.0 * s,
             exchange.M_SHAFT_TORQUE: 1.0 + 0.0 * s,
-            exchange.M_LOAD_SPEED: 1.0 / (J2 * (s + b2)),
+            exchange.M_LOAD_SPEED: load,
         }
-        return np.array([quantities[index] for index in self.inputs])
+        return np.array([quantities[index] for index in self.start.inputs])
 
     def demand_per_torque(self, w: Vector) -> Complex:
         """The controller's demand over the shaft torque, at the samples; exact, with aliases."""
         z = np.exp(1j * w * self.period)
-        law = at_points(self.law, z)[:, 0, :]
-        motor = at_points(self.motor, z)[:, :, 0]
+        law, motor = self.point.law.response(z)[:, 0, :], self.motor.response(z)[:, :, 0]
         given = self.measured_per_torque(w).T
-        demand: Complex = np.sum(law * given, axis=1) / (1.0 - np.sum(law * motor, axis=1))
-        return demand
+        return np.asarray(np.sum(law * given, axis=1) / (1.0 - np.sum(law * motor, axis=1)))
 
     def motor_torque_per_demand(self, w: Vector) -> Complex:
         """First harmonic of the motor torque: demand held over a period, delayed, lagged."""
         s = 1j * w
         held = (1.0 - np.exp(-s * self.period)) / (s * self.period)
-        return np.asarray(held * np.exp(-s * self.delay) / (1.0 + s * self.lag))
+        return np.asarray(held * np.exp(-s * self.delay) / (1.0 + s * float(self.drive.torque_lag)))
 
     def twist(self, w: Vector) -> Complex:
         """G(jw): twist over -T, rad/(N m)."""
-        J1, J2 = float(self.drive.J1), float(self.drive.J2)
-        b1, b2 = self.decays
         s = 1j * w
+        motor, load = self.speeds(s)
         u = self.motor_torque_per_demand(w) * self.demand_per_torque(w)
-        if b1 == b2 == 0.0:
-            return np.asarray(((u - 1.0) / J1 - 1.0 / J2) / w**2)
-        return np.asarray(-((u - 1.0) / (J1 * (s + b1)) - 1.0 / (J2 * (s + b2))) / s)
+        return np.asarray(((1.0 - u) * motor + load) / s)
 
     def contact(self, w: Vector) -> Complex:
         """M(jw) = (c + jw d) G(jw)."""
@@ -216,41 +205,53 @@ class Outside:
         w = np.array([1e-4 * math.pi / self.period])
         return bool(abs(self.demand_per_torque(w)[0] - 1.0) < 0.1)
 
+    def grid(self) -> Vector:
+        """Frequencies from a hundredth of the elastic one to just below half the sample rate."""
+        lowest = min(0.01 * float(self.drive.Omega), 1e-3 * math.pi / self.period)
+        return np.geomspace(lowest, math.pi / self.period * (1.0 - 1e-9), FREQUENCIES)
 
-def frequency_grid(outside: Outside) -> Vector:
-    """From a hundredth of the elastic frequency to just below half the sample rate."""
-    lowest = min(0.01 * float(outside.drive.Omega), 1e-3 * math.pi / outside.period)
-    return np.geomspace(lowest, math.pi / outside.period * (1.0 - 1e-9), FREQUENCIES)
+
+def limit_cycles(outside: Outside, run: SampledRun) -> tuple[Cycle, ...]:
+    """All limit cycles, predicted about the mean torque of the start, and checked on the exact plant.
+
+    A loop that holds its speed carries the load torque in the mean, another one the torque of its start.
+    """
+    drive, start = outside.drive, outside.start
+    if not drive.gap:
+        return ()
+    holds = outside.holds_speed()
+    base = start.kept(len(run.samples) - 1 if holds else run.contact[-1])
+    back = max(1, round(float(drive.elastic_period) / run.period))
+    recent = [run.samples[index] for index in run.contact[-1 - back :]]
+    w1, w2 = base.plant["w"][:2].tolist()
+    if holds:
+        mean = float(drive.Mc + drive.load_viscous_friction * w2)
+        demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w1)
+    else:
+        mean, demand = np.mean([(one.shaft_torque, one.demand) for one in recent], axis=0).tolist()
+    room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
+    found = [checked(outside, base, cycle) for cycle in predicted(outside, mean)]
+    return tuple(replace(one, beyond_limits=one.demand_amplitude > room) for one in found)
 
 
-def cycles(outside: Outside, mean_torque: float) -> tuple[Cycle, ...]:
-    """All limit cycles in order of frequency and amplitude; none without a gap."""
-    drive = outside.drive
-    half = 0.5 * float(drive.gap)
+def predicted(outside: Outside, mean_torque: float) -> tuple[Cycle, ...]:
+    """All limit cycles of the harmonic balance in order of frequency and amplitude; none without a gap."""
+    half, c = 0.5 * float(outside.drive.gap), float(outside.drive.c)
     if half == 0.0:
         return ()
-    grid = frequency_grid(outside)
+    wound = abs(mean_torque) / c
+    amplitudes = (wound or half) + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
     found = []
-    for w in zeros_of(lambda v: np.sin(np.angle(outside.contact(v))), grid, largest=1e-6):
-        value = complex(outside.contact(np.array([w]))[0])
-        if value.real < -1.0:
-            found += [
-                _cycle(outside, w, amplitude, mean_torque)
-                for amplitude in _amplitudes(-1.0 / value.real, half, float(drive.c), mean_torque)
-            ]
+    for w in zeros_of(lambda v: np.sin(np.angle(outside.contact(v))), outside.grid()):
+        M = float(outside.contact(np.array([w]))[0].real)
+        if M < -1.0:
+            excess = partial(_excess, -1.0 / M, half, c, mean_torque)
+            found += [_cycle(outside, w, one, mean_torque) for one in zeros_of(excess, amplitudes)]
     return tuple(sorted(found, key=lambda one: (one.frequency, one.amplitude)))
 
 
-def _amplitudes(wanted: float, half: float, c: float, mean_torque: float) -> list[float]:
-    """All amplitudes at which n is the wanted one."""
-    wound = abs(mean_torque) / c
-    first = max(wound, 0.0) if wound > 0.0 else half
-    amplitudes = first + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
-
-    def n_less(values: Vector) -> Vector:
-        return np.array([n_at(float(a), half, c, mean_torque) for a in values]) - wanted
-
-    return zeros_of(n_less, amplitudes, largest=1e-6)
+def _excess(wanted: float, half: float, c: float, mean_torque: float, amplitudes: Vector) -> Vector:
+    return np.array([n_at(float(one), half, c, mean_torque) for one in amplitudes]) - wanted
 
 
 def n_at(amplitude: float, half: float, c: float, mean_torque: float) -> float:
@@ -259,132 +260,95 @@ def n_at(amplitude: float, half: float, c: float, mean_torque: float) -> float:
 
 
 def _cycle(outside: Outside, w: float, amplitude: float, mean_torque: float) -> Cycle:
-    drive = outside.drive
-    half, c = 0.5 * float(drive.gap), float(drive.c)
-    step_w, step_a = 1e-5 * w, 1e-5 * amplitude
-    M = outside.contact(np.array([w - step_w, w, w + step_w]))
-    n = [n_at(amplitude + by, half, c, mean_torque) for by in (-step_a, 0.0, step_a)]
-    F_A = complex((n[2] - n[0]) / (2.0 * step_a) * M[1])
-    F_w = complex(n[1] * (M[2] - M[0]) / (2.0 * step_w))
+    half, c = 0.5 * float(outside.drive.gap), float(outside.drive.c)
+    around = np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5])
+    M = outside.contact(w * around)
+    n = np.array([n_at(float(one), half, c, mean_torque) for one in amplitude * around])
+    # F = 1 + n M, and its derivatives times amplitude and frequency
+    F_A, F_w = complex((n[2] - n[0]) * M[1]), complex(n[1] * (M[2] - M[0]))
     point = np.array([w])
-    torque = amplitude / abs(complex(outside.twist(point)[0]))
-    return Cycle(
-        w, amplitude, bias_for(mean_torque, amplitude, half, c), mean_torque,
-        torque * abs(complex(outside.demand_per_torque(point)[0])),
-        F_A.real * F_w.imag - F_A.imag * F_w.real > 0.0,
-    )  # fmt: skip
+    demand = amplitude * abs(complex((outside.demand_per_torque(point) / outside.twist(point))[0]))
+    stable = F_A.real * F_w.imag - F_A.imag * F_w.real > 0.0
+    return Cycle(w, amplitude, bias_for(mean_torque, amplitude, half, c), mean_torque, demand, stable)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Frequency in rad/s and amplitude in rad on the exact plant (NaN: none), and what that means."""
-
-    frequency: float
-    amplitude: float
-    confirmed: bool
-    sentence: str
-
-
-def check_cycle(
-    start: SampledStart, point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle
-) -> Verdict:
-    """The check of a cycle on the exact plant, started from the sample `base`."""
+def checked(outside: Outside, base: Sample, cycle: Cycle) -> Cycle:
+    """The cycle with what the exact plant does, started on it from the sample `base`."""
     if cycle.stable:
-        frequency, amplitude = _after(start, point, base, outside, cycle, 1.0)
+        frequency, amplitude = _after(outside, base, cycle, 1.0)
         if math.isnan(frequency) or amplitude < STILL * cycle.amplitude:
-            return Verdict(math.nan, amplitude, False, "not confirmed: the vibration decays")
+            return replace(cycle, measured_amplitude=amplitude, verdict="not confirmed: the vibration decays")
         off_w, off_a = frequency / cycle.frequency - 1.0, amplitude / cycle.amplitude - 1.0
         confirmed = max(abs(off_w), abs(off_a)) <= AGREED
         verdict = "confirmed" if confirmed else "there is a limit cycle, further off"
-        return Verdict(
-            frequency, amplitude, confirmed,
-            f"{verdict}: frequency {100.0 * off_w:+.1f} %, amplitude {100.0 * off_a:+.1f} % from predicted",
+        return replace(
+            cycle, measured_frequency=frequency, measured_amplitude=amplitude, confirmed=confirmed,
+            verdict=f"{verdict}: frequency {100.0 * off_w:+.1f} %, amplitude {100.0 * off_a:+.1f} % from "
+            "predicted",
         )  # fmt: skip
-    ends = [_after(start, point, base, outside, cycle, factor) for factor in (BELOW, ABOVE)]
+    ends = [_after(outside, base, cycle, factor) for factor in (BELOW, ABOVE)]
     lower, upper = (0.0 if math.isnan(w) or a < GONE * cycle.amplitude else a for w, a in ends)
     confirmed = lower < BELOW * cycle.amplitude and upper > cycle.amplitude
     verdict = "confirmed as a boundary" if confirmed else "not confirmed as a boundary"
-    return Verdict(
-        math.nan, math.nan, confirmed,
-        f"{verdict}: from {BELOW:g} and {ABOVE:g} times its amplitude the vibration ends at {lower:.2g} and "
-        f"{upper:.2g} rad",
+    return replace(
+        cycle, confirmed=confirmed,
+        verdict=f"{verdict}: from {BELOW:g} and {ABOVE:g} times its amplitude the vibration ends at "
+        f"{lower:.2g} and {upper:.2g} rad",
     )  # fmt: skip
 
 
-def _after(
-    start: SampledStart, point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle, factor: float
-) -> tuple[float, float]:
-    """Frequency and amplitude after many periods; NaN and the amplitude if it no longer oscillates."""
-    first = _on_the_cycle(start, point, base, outside, cycle, factor)
+def _after(outside: Outside, base: Sample, cycle: Cycle, factor: float) -> tuple[float, float]:
+    """Frequency and amplitude after many periods; NaN and the amplitude if it no longer oscillates.
+
+    The frequency is the mean between upward crossings of the mid value, the amplitude half the range.
+    """
     period = 2.0 * math.pi / cycle.frequency
-    end = first.time + (SETTLING + MEASURED) * period
-    recorder = start.begun(end, room=FIRST_ROWS)
-    for _ in start.from_sample(first, end, recorder):
+    end = base.time + (SETTLING + MEASURED) * period
+    recorder = Recorder(outside.start.rows, outside.start.sees | exchange.SEES_SHAFT_TORQUE)
+    begin = _on_the_cycle(outside, base, cycle, factor * cycle.amplitude)
+    for _ in outside.start.samples(end, begin=begin, recorder=recorder):
         pass
     times = np.linspace(end - MEASURED * period, end * (1.0 - 1e-12), MEASURED * POINTS)
-    return _read(times, recorder.finished().at(times)["twist"][:, 0])
-
-
-def _read(times: Vector, twist: Vector) -> tuple[float, float]:
-    """Mean frequency between upward crossings of the mid value, and half the range."""
-    low, high = float(twist.min()), float(twist.max())
-    beyond = twist - 0.5 * (low + high)
+    twist = recorder.finished().at(times)["twist"][:, 0]
+    beyond = twist - 0.5 * (twist.min() + twist.max())
     up = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
-    amplitude = 0.5 * (high - low)
+    amplitude = 0.5 * float(np.ptp(twist))
     if up.size < 3:
         return math.nan, amplitude
-    step = beyond[up] / (beyond[up] - beyond[up + 1])
-    instants = times[up] + step * (times[up + 1] - times[up])
-    return 2.0 * math.pi * (up.size - 1) / float(instants[-1] - instants[0]), amplitude
+    crossed = times[up] + beyond[up] / (beyond[up] - beyond[up + 1]) * (times[1] - times[0])
+    return 2.0 * math.pi * (up.size - 1) / float(crossed[-1] - crossed[0]), amplitude
 
 
-def _on_the_cycle(
-    start: SampledStart, point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle, factor: float
-) -> Sample:
+def _on_the_cycle(outside: Outside, base: Sample, cycle: Cycle, amplitude: float) -> Sample:
     """A sample with the gap open, in the middle of the part of it that the twist crosses, going up."""
-    half = 0.5 * float(outside.drive.gap)
-    amplitude, bias = factor * cycle.amplitude, cycle.bias
+    half, bias = 0.5 * float(outside.drive.gap), cycle.bias
     low, high = max(-half, bias - amplitude), min(half, bias + amplitude)
     if low >= high:  # this vibration does not leave the flank: start just off it
         low, high = half * (1.0 - 1e-3), half
     twist = 0.5 * (low + high)
     sine = min(max((twist - bias) / amplitude, -1.0), 1.0)
     turn = amplitude * complex(math.sqrt(1.0 - sine * sine), sine)  # twist = bias + Im(turn e^jwt)
-    w = np.array([cycle.frequency])
-    s = 1j * cycle.frequency
-    torque = -turn / complex(outside.twist(w)[0])
-    demand = torque * complex(outside.demand_per_torque(w)[0])
+    w, s = np.array([cycle.frequency]), 1j * cycle.frequency
+    z = np.exp(s * outside.period)
+    motor, load = outside.speeds(s)
+    T = -turn / complex(outside.twist(w)[0])
+    demand = T * complex(outside.demand_per_torque(w)[0])
     u = demand * complex(outside.motor_torque_per_demand(w)[0])
-    J1, J2 = float(outside.drive.J1), float(outside.drive.J2)
-    b1, b2 = outside.decays
-    phi1, w2 = (u - torque) / (J1 * (s * (s + b1))), torque / (J2 * (s + b2))
-    plant = base.plant
-    (w1, load_speed), (theta, _) = plant["w"], plant["theta"]
-    changes: dict[Part, float] = {
-        ("theta", 0): twist - theta,
-        ("phi", 0): phi1.imag - twist + theta,  # of the load
-        ("w", 0): load_speed - w1 + (w2 + s * turn).imag,
-        ("w", 1): w2.imag,
-        ("mode", 0): at.OPEN - plant["mode"][0],
-        ("stage", 0): 1.0 - plant["stage"] % 2.0,  # the gap is open: an odd stage
-        ("sample_angle", 0): (phi1 * np.exp(-s * outside.period)).imag,
-    }
-    if outside.lag > 0.0:
-        changes["u", 0] = u.imag
-    return base.displaced(changes, _state(point, base, outside, cycle, torque, demand))
-
-
-def _state(
-    point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle, torque: complex, demand: complex
-) -> Vector:
-    """The controller's state: as at the base, and those in the loop on the cycle."""
-    w = np.array([cycle.frequency])
-    z = complex(np.exp(1j * cycle.frequency * outside.period))
-    measured = outside.measured_per_torque(w)[:, 0] * torque
-    measured = measured + at_points(outside.motor, np.array([z]))[0, :, 0] * demand
-    state = base.state.copy()
-    law = point.law
-    if point.states:
-        inside = np.linalg.solve(z * np.eye(len(point.states)) - law.A, law.B @ measured)
-        state[list(point.states)] += inside.imag
-    return state
+    phi1 = (u - T) * motor / s
+    begin = base.copied()
+    plant = begin.plant
+    theta = float(plant["theta"][0])
+    plant["phi"] += phi1.imag - twist + theta  # of the load
+    plant["theta"][0] = twist
+    plant["w"][1] += (T * load).imag
+    plant["w"][0] = plant["w"][1] + (s * turn).imag
+    plant["sample_angle"] += (phi1 / z).imag
+    if float(outside.drive.torque_lag) > 0.0:
+        plant["u"] += u.imag
+    plant["mode"][0] = at.OPEN
+    plant["stage"] += 1.0 - plant["stage"] % 2.0  # the gap is open: an odd stage
+    measured = outside.measured_per_torque(w)[:, 0] * T
+    measured = measured + outside.motor.response(np.array([z]))[0, :, 0] * demand
+    law, states = outside.point.law, list(outside.point.states)
+    begin.state[states] += np.linalg.solve(z * np.eye(len(states)) - law.A, law.B @ measured).imag
+    return begin

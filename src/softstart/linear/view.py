@@ -1,13 +1,22 @@
-"""The linear view of a controller that runs: `linear_view`."""
+"""The linear view of a controller that runs: `linear_view`.
+
+The loop in contact with its margins, for example at which delay it becomes unstable (`delay_margin`, computed
+in `loop`); its modes; and the limit cycles that backlash causes (`limit_cycles`). The room:
+
+    law            the start on the exact plant, sample by sample; the derivative of the controller's step
+    plant          the machine in contact at the sample instants
+    loop           law and plant joined: margins, delay margin, modes
+    limit_cycles   the describing function of backlash; cycles predicted and tried on the exact plant
+    systems        linear sampled systems: response, modes, minimal part
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
@@ -16,18 +25,18 @@ from softstart.controller.finding import make_controller
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
-from softstart.linear.limit_cycles import Cycle, Outside, Verdict, check_cycle, cycles
-from softstart.linear.loop import Loop, Margins
-from softstart.linear.operating_point import (
-    GOOD,
+from softstart.linear.law import (
     OperatingPoint,
     SampledRun,
-    operating_points,
+    SampledStart,
+    operating_point,
     run_until_steady,
 )
-from softstart.linear.sampled_plant import single, sizes_of
-from softstart.linear.sampled_start import SampledStart
-from softstart.linear.systems import Mode
+from softstart.linear.limit_cycles import Cycle, Outside
+from softstart.linear.limit_cycles import limit_cycles as cycles_of
+from softstart.linear.loop import Loop, Margins
+from softstart.linear.plant import single, sizes_of
+from softstart.linear.systems import Mode, minimal
 
 if TYPE_CHECKING:
     import control
@@ -42,26 +51,6 @@ NAMES = {
     exchange.M_SHAFT_TORQUE: "shaft_torque",
     exchange.M_LOAD_SPEED: "load_speed",
 }
-
-
-@dataclass(frozen=True)
-class Variation:
-    """The loop of the same controller on a drive that it was not set up for, or with all gaps open."""
-
-    name: str
-    drive: Machine = field(repr=False)
-    stable: bool
-    margins: Margins
-    least_damping: float
-
-
-@dataclass(frozen=True)
-class PredictedCycle:
-    """A limit cycle by the describing function, and the result of the check on the exact plant."""
-
-    cycle: Cycle
-    verdict: Verdict
-    beyond_limits: bool  # its torque demand exceeds what the motor can deliver
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,15 +74,9 @@ class LinearView:
         The loop on this drive.
     outside : Outside, optional
         Everything but the shaft, for limit cycles; None of a chain.
-    margins : Margins, optional
-        Margins and crossings of the loop: rad, s, rad/s.
-    modes : tuple of Mode
-        Modes of the closed loop, by frequency.
-    stable : bool, optional
-        Whether the closed loop in contact is stable.
-    variations : tuple of Variation
-        The same controller on other drives.
-    cycles : tuple of PredictedCycle
+    variations : tuple of Loop
+        The same controller on other machines; of a chain also with all gaps open.
+    cycles : tuple of Cycle
         Limit cycles through the gap, predicted and checked; none of a chain, which has several gaps.
 
     Examples
@@ -116,11 +99,8 @@ class LinearView:
     point: OperatingPoint | None = None
     own_loop: Loop | None = None
     outside: Outside | None = None
-    margins: Margins | None = None
-    modes: tuple[Mode, ...] = ()
-    stable: bool | None = None
-    variations: tuple[Variation, ...] = ()
-    cycles: tuple[PredictedCycle, ...] = ()
+    variations: tuple[Loop, ...] = ()
+    cycles: tuple[Cycle, ...] = ()
 
     def __repr__(self) -> str:
         """One line with the conclusion."""
@@ -134,31 +114,22 @@ class LinearView:
     @property
     def period(self) -> float:
         """Sample period in s; NaN without a loop."""
-        return math.nan if self.point is None else self.point.plant.period
+        return math.nan if self.point is None else self.point.period
 
     @property
-    def loop(self) -> control.StateSpace:
-        """L(z), minimal: the negative of the demand in response to a demand fed in; -1 is critical."""
-        return self._loop().control_system("demand", "minus_answer")
+    def margins(self) -> Margins | None:
+        """Margins and crossings of the loop: rad, s, rad/s."""
+        return None if self.own_loop is None else self.own_loop.margins
 
     @property
-    def controller_system(self) -> control.StateSpace:
-        """The controller's law, minimal: from the measured quantities to the demand in N m."""
-        import control
-
-        point = self._point()
-        law = self._loop().minimal_law
-        return control.StateSpace(
-            *law, self.period, inputs=[NAMES[i] for i in point.derivative.inputs], outputs=["demand"],
-            name=_word(self.name),
-        )  # fmt: skip
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes of the closed loop, by frequency."""
+        return () if self.own_loop is None else self.own_loop.modes
 
     @property
-    def elastic_mode(self) -> Mode | None:
-        """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
-        swinging = [mode for mode in self.modes if mode.damping_ratio < 1.0 and mode.value.imag > 0.0]
-        Omega = sizes_of(self.drive).Omega
-        return min(swinging, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
+    def stable(self) -> bool | None:
+        """Whether the closed loop in contact is stable."""
+        return None if self.own_loop is None else self.own_loop.stable
 
     @property
     def gain_margin(self) -> float | None:
@@ -172,7 +143,7 @@ class LinearView:
 
     @property
     def delay_margin(self) -> float | None:
-        """Least further dead time that makes the loop unstable, s."""
+        """Least further dead time that makes the loop unstable, s; 0 for an unstable one."""
         return None if self.margins is None else self.margins.delay_margin
 
     @property
@@ -181,12 +152,37 @@ class LinearView:
         return None if self.margins is None else self.margins.modulus_margin
 
     @property
+    def elastic_mode(self) -> Mode | None:
+        """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
+        swinging = [mode for mode in self.modes if mode.damping_ratio < 1.0 and mode.value.imag > 0.0]
+        Omega = sizes_of(self.drive).Omega
+        return min(swinging, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
+
+    @property
+    def loop(self) -> control.StateSpace:
+        """L(z), minimal: the negative of the demand in response to a demand fed in; -1 is critical."""
+        import control
+
+        loop = self._loop()
+        return control.StateSpace(*loop.broken, loop.period, inputs=["demand"], outputs=["minus_answer"])
+
+    @property
+    def controller_system(self) -> control.StateSpace:
+        """The controller's law, minimal: from the measured quantities to the demand in N m."""
+        import control
+
+        loop = self._loop()
+        return control.StateSpace(
+            *minimal(loop.point.law), loop.period, inputs=[NAMES[i] for i in loop.start.inputs],
+            outputs=["demand"], name=re.sub(r"\W", "_", self.name) or "controller",
+        )  # fmt: skip
+
+    @property
     def conclusion(self) -> str:
         """One sentence."""
         from softstart.views import linear as views
 
-        sentence: str = views.conclusion(self)
-        return sentence
+        return views.conclusion(self)
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
@@ -198,10 +194,9 @@ class LinearView:
             "conclusion": self.conclusion,
             "notes": list(self.notes),
         }
-        if self.margins is None or self.point is None or self.own_loop is None:
+        if self.own_loop is None:
             return found
-        point = self.point
-        elastic = self.elastic_mode
+        own, point, elastic = self.own_loop, self.own_loop.point, self.elastic_mode
         return found | {
             "stable": self.stable,
             "period": self.period,
@@ -212,40 +207,18 @@ class LinearView:
                 "states": list(point.states),
                 "mismatch": point.mismatch,
             },
-            "order_of_loop": self.own_loop.broken.A.shape[0],
-            "order_of_controller": self.own_loop.minimal_law.A.shape[0],
-            **_margin_figures(self.margins),
-            "elastic_frequency": elastic.frequency if elastic else None,
-            "elastic_damping_ratio": elastic.damping_ratio if elastic else None,
-            "modes": [
-                {
-                    "frequency": mode.frequency,
-                    "damping_ratio": mode.damping_ratio,
-                    "real": mode.value.real,
-                    "imag": mode.value.imag,
-                }
-                for mode in self.modes
-            ],
+            "order_of_loop": own.broken.A.shape[0],
+            "order_of_controller": minimal(point.law).A.shape[0],
+            **_margin_figures(own.margins),
+            "elastic_frequency": elastic and elastic.frequency,
+            "elastic_damping_ratio": elastic and elastic.damping_ratio,
+            "modes": [asdict(mode) for mode in self.modes],
             "variations": [
-                {
-                    "name": one.name,
-                    "stable": one.stable,
-                    "least_damping": one.least_damping,
-                    **_margin_figures(one.margins),
-                }
+                {"name": one.name, "stable": one.stable, "least_damping": one.least_damping}
+                | _margin_figures(one.margins)
                 for one in self.variations
             ],
-            "limit_cycles": [
-                {
-                    **asdict(one.cycle),
-                    "beyond_limits": one.beyond_limits,
-                    "measured_frequency": one.verdict.frequency,
-                    "measured_amplitude": one.verdict.amplitude,
-                    "confirmed": one.verdict.confirmed,
-                    "verdict": one.verdict.sentence,
-                }
-                for one in self.cycles
-            ],
+            "limit_cycles": [asdict(one) for one in self.cycles],
         }
 
     def _repr_html_(self) -> Any:
@@ -266,11 +239,6 @@ class LinearView:
         if self.own_loop is None:
             raise InputError(f'controller = "{self.name}": {self.notes[0]}')
         return self.own_loop
-
-    def _point(self) -> OperatingPoint:
-        self._loop()
-        assert self.point is not None
-        return self.point
 
 
 def linear_view(
@@ -336,63 +304,50 @@ def linear_view(
     start = SampledStart.of(single(drive), made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
-    points = operating_points(start, run)
-    if not points:
-        return LinearView(drive, start.controller, *_no_samples(name, run))
-    point = _chosen(points)
-    if not _feeds_back(point):
+    point = operating_point(start, run)
+    if point is None:
+        return LinearView(drive, start.controller, "events", (_no_samples(name, run),))
+    if not point.feeds_back:
         sentence = (
             f"{name} acts open loop: in contact nothing it measures changes its torque demand; "
             "margins do not apply."
         )
         return LinearView(drive, start.controller, "open loop", (sentence,), point)
-    if np.any(point.derivative.rates[:, list(point.states)]) or _timed_by(point):
+    if not point.is_sampled:
         sentence = (
             f"{name} has no linear loop of this kind: what it measures changes the slope of its demand or "
             "the instant of its next sample; margins do not apply."
         )
         return LinearView(drive, start.controller, "events", (sentence,), point)
-    own = Loop(drive, point, start.differencing)
-    modes = own.modes()
-    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := drive.knob(key))]
-    varied = [(f"J2 x {k:g}", {"load_inertia": k * own_values[0]}) for k in inertias]
-    varied += [(f"c x {k:g}", {"stiffness": k * own_values[1]}) for k in stiffnesses]
-    variations = [_varied(name, Loop(start.drive.with_values(change), point, start.differencing))
-                  for name, change in varied]  # fmt: skip
+    own = Loop(start, point, drive)
+    machine, variations = start.machine, []
+    for symbol, key, factors in (("J2", "load_inertia", inertias), ("c", "stiffness", stiffnesses)):
+        for factor in factors:
+            varied = machine.with_values({key: factor * machine.knob(key).value})
+            variations.append(Loop(start, point, varied, f"{symbol} x {factor:g}"))
     outside: Outside | None = None
-    cycled: tuple[PredictedCycle, ...] = ()
+    cycles: tuple[Cycle, ...] = ()
     if len(drive.shaft_names) > 1:
-        variations.append(_varied("all gaps open", Loop(start.drive, point, start.differencing, open=True)))
+        variations.append(Loop(start, point, machine, "all gaps open", open=True))
     else:
-        outside = Outside(
-            drive.design_drive, point.law, point.derivative.inputs, point.plant, start.differencing
-        )
-        cycled = _cycles(start, run, point, outside) if limit_cycles else ()
+        outside = Outside(start, point)
+        cycles = cycles_of(outside, run) if limit_cycles else ()
     return LinearView(
-        drive, start.controller, "loop", _notes(name, run, point, own), point, own, outside, own.margins(),
-        modes, own.stable, tuple(variations), cycled,
-    )  # fmt: skip
+        drive,
+        start.controller,
+        "loop",
+        _notes(name, run, own),
+        point,
+        own,
+        outside,
+        tuple(variations),
+        cycles,
+    )
 
 
 def _margin_figures(m: Margins) -> dict[str, Any]:
     """The margins: angles in rad, delays in s, frequencies in rad/s."""
     return {**asdict(m), "sensitivity_peak": m.sensitivity_peak}
-
-
-def _feeds_back(point: OperatingPoint) -> bool:
-    return bool(point.states) or bool(np.any(point.law.D))
-
-
-def _chosen(points: Sequence[OperatingPoint]) -> OperatingPoint:
-    """The steady one if its law is good and feeds back; else the best that feeds back; else the best."""
-    good = [one for one in points if one.mismatch < GOOD]
-    feeding = [one for one in good if _feeds_back(one)]
-    steady = [one for one in feeding if one.steady]
-    return (steady or feeding or good or [one for one in points if _feeds_back(one)] or list(points))[0]
-
-
-def _timed_by(point: OperatingPoint) -> bool:
-    return bool(np.any(point.derivative.rates[:, point.derivative.A.shape[0] :]))
 
 
 def _check(drive: Any, fitted_to: Any, factors: Mapping[str, Sequence[float]]) -> None:
@@ -414,20 +369,20 @@ def _check(drive: Any, fitted_to: Any, factors: Mapping[str, Sequence[float]]) -
         raise InputError(wrong)
 
 
-def _no_samples(name: str, run: SampledRun) -> tuple[str, tuple[str, ...]]:
-    if any(one.pressing for one in run.samples) and any(math.isfinite(one.ask_again) for one in run.samples):
-        return "events", (
+def _no_samples(name: str, run: SampledRun) -> str:
+    if any(one.pressing for one in run.samples) and any(one.ask_again < math.inf for one in run.samples):
+        return (
             f"{name} does not keep one sample period throughout a contact of its start: it has no sampled "
-            "loop there, and margins do not apply.",
+            "loop there, and margins do not apply."
         )
-    return "events", (
+    return (
         f"{name} acts at events, not at samples: in contact its torque demand is fixed beforehand, and "
-        "margins do not apply.",
+        "margins do not apply."
     )
 
 
-def _notes(name: str, run: SampledRun, point: OperatingPoint, own: Loop) -> tuple[str, ...]:
-    notes = []
+def _notes(name: str, run: SampledRun, own: Loop) -> tuple[str, ...]:
+    notes, point = [], own.point
     if not point.steady:
         why = "the start does not become steady in contact"
         if run.steady:
@@ -445,32 +400,3 @@ def _notes(name: str, run: SampledRun, point: OperatingPoint, own: Loop) -> tupl
     if not own.stable:
         notes.append("The closed loop is unstable in contact: the margins are crossings, not reserves.")
     return tuple(notes)
-
-
-def _varied(name: str, loop: Loop) -> Variation:
-    least = min((mode.damping_ratio for mode in loop.modes()), default=math.nan)
-    return Variation(name, loop.drive, loop.stable, loop.margins(), least)
-
-
-def _cycles(
-    start: SampledStart, run: SampledRun, point: OperatingPoint, outside: Outside
-) -> tuple[PredictedCycle, ...]:
-    drive = outside.drive
-    holds = outside.holds_speed()
-    rest = run.samples[run.last if not holds else -1]
-    back = max(1, round(float(drive.elastic_period) / run.period))
-    recent = run.samples[max(run.first, run.last - back) : run.last + 1]
-    w1, w2 = rest.plant["w"]
-    against = float(drive.Mc + drive.load_viscous_friction * w2)
-    mean = against if holds else float(np.mean([start.shaft_torque(one) for one in recent]))
-    takes = float(drive.motor_friction + drive.motor_viscous_friction * w1)
-    demand = mean + takes if holds else float(np.mean([one.demand for one in recent]))
-    room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
-    return tuple(
-        PredictedCycle(cycle, check_cycle(start, point, rest, outside, cycle), cycle.demand_amplitude > room)
-        for cycle in cycles(outside, mean)
-    )
-
-
-def _word(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name) or "controller"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.linear.limit_cycles import Outside, frequency_grid
-from softstart.linear.sampled_plant import sizes_of
-from softstart.linear.systems import at_points, frequencies, poles
+from softstart.linear.limit_cycles import Outside
+from softstart.linear.plant import sizes_of
+from softstart.linear.systems import frequencies
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, column_of, number
 from softstart.views.sheet import Sheet, rows_file
@@ -75,7 +75,7 @@ def margin_rows(view: LinearView, m: Margins) -> list[tuple[str, str]]:
 def tables(view: LinearView) -> list[Table]:
     """Modes of the closed loop, where a pair counts once, other drives, and limit cycles."""
     modes = [mode for mode in view.modes if mode.value.imag >= 0.0][:SHOWN_MODES]
-    found, others = [one.cycle for one in view.cycles], view.variations
+    found, others = view.cycles, view.variations
 
     def each(read: str, scale: float, decimals: int) -> list[str]:
         values = (getattr(one.margins, read) for one in others)
@@ -105,7 +105,7 @@ def tables(view: LinearView) -> list[Table]:
         "bias\nrad": [number(one.bias, 4) for one in found],
         "demand\n+- N m": [number(one.demand_amplitude, 1) for one in found],
         "predicted": ["stable" if one.stable else "unstable" for one in found],
-        "on the exact plant": [one.verdict.sentence + beyond * one.beyond_limits for one in view.cycles],
+        "on the exact plant": [one.verdict + beyond * one.beyond_limits for one in found],
     }
     cycles = "Limit cycles predicted by the describing function of the gap"
     return [
@@ -124,7 +124,7 @@ def notes(view: LinearView) -> list[str]:
             "not predicted: simulate shows them."
         )
     elif view.cycles:
-        mean = view.cycles[0].cycle.mean_torque
+        mean = view.cycles[0].mean_torque
         found = f"The mean shaft torque of the limit cycles is {mean:.4g} N m."
     return [found, *view.notes]
 
@@ -151,12 +151,12 @@ def linear_sheet(view: LinearView) -> Sheet:
 def _loop(view: LinearView, w: Any) -> Any:
     """L at these frequencies."""
     assert view.own_loop is not None
-    return at_points(view.own_loop.broken, np.exp(1j * w * view.period))[:, 0, 0]
+    return view.own_loop.broken.at(w, view.period)
 
 
 def _frequencies_of(view: LinearView) -> Any:
     assert view.own_loop is not None
-    return frequencies(view.period, poles(view.own_loop.broken))
+    return frequencies(view.period, view.own_loop.broken)
 
 
 def response(view: LinearView, m: Margins) -> tuple[tuple[str, ...], list[list[float]]]:
@@ -235,18 +235,18 @@ def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
 
 
 def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
-    M = outside.contact(frequency_grid(outside))
+    M = outside.contact(outside.grid())
     # -1/n where the harmonic balance holds
-    found = [float(outside.contact(np.array([one.cycle.frequency]))[0].real) for one in view.cycles]
+    found = [float(outside.contact(np.array([one.frequency]))[0].real) for one in view.cycles]
     reach = max([WIDEST, *(-1.5 * at for at in found)])
     shown = np.where(np.abs(M) < 3.0 * reach, M, math.nan)
     axes.plot(shown.real, shown.imag, color=COLOURS[0], label="M = (c + jwd) G")
     axes.plot([-3.0 * reach, -1.0], [0.0, 0.0], color=COLOURS[3], lw=1.6, label="-1/n of the gap")
     axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])
     for at, one in zip(found, view.cycles, strict=True):
-        face = COLOURS[1] if one.cycle.stable else "none"
+        face = COLOURS[1] if one.stable else "none"
         axes.plot([at], [0.0], "o", ms=6, mfc=face, color=COLOURS[1])
-        axes.annotate(f"{one.cycle.frequency:.3g} rad/s", (at, 0.0), xytext=(0, 8),
+        axes.annotate(f"{one.frequency:.3g} rad/s", (at, 0.0), xytext=(0, 8),
                       textcoords="offset points", ha="center")  # fmt: skip
     axes.set(xlim=(-reach, 0.4 * reach), ylim=(-0.7 * reach, 0.7 * reach))
     axes.legend(loc="lower left")

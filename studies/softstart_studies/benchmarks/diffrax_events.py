@@ -13,36 +13,28 @@ from typing import Any
 
 import numpy as np
 
-from softstart.arrays import Vector
-from softstart_studies.benchmarks.problem import Problem
+from softstart_studies.benchmarks.problem import Line, Problem, Solve
 
 TOLERANCE = 1e-8
 T_MAX = 10.0  # s, never reached
 
 
-class Diffrax:
-    """All starts at once; compiled when made ready for a number of starts."""
-
-    def __init__(self, problem: Problem) -> None:
-        jax = import_module("jax")  # optional, so it is imported by name: mypy must not need it
-        jax.config.update("jax_enable_x64", True)
-        self.solved: Any = jax.jit(jax.vmap(one_start(problem)))
-
-    def ready(self, gaps: Vector) -> Any:
-        """The gaps on the device."""
-        return import_module("jax.numpy").asarray(gaps)
-
-    def solve(self, work: Any) -> Vector:
-        """Peak torques, N m."""
-        return np.asarray(self.solved(work))
+def batch(problem: Problem, count: int) -> Solve:
+    """All starts at once; compiled in the first pass."""
+    jax = import_module("jax")  # optional, so it is imported by name: mypy must not need it
+    jax.config.update("jax_enable_x64", True)
+    lines = problem.lines(count)
+    solved = jax.jit(jax.vmap(one_start(lines[0])))
+    gaps = import_module("jax.numpy").asarray([float(line.gap[0]) for line in lines])
+    return lambda: np.asarray(solved(gaps))[:, None]
 
 
-def one_start(problem: Problem) -> Any:
+def one_start(line: Line) -> Any:
     """The function gap -> peak torque, to be vmapped and jitted. Torque by stage only."""
     dfx, optx = import_module("diffrax"), import_module("optimistix")
     lax, jnp = import_module("jax.lax"), import_module("jax.numpy")
-    J1, J2, c, Mc = problem.J1, problem.J2, problem.c, problem.Mc
-    torques = jnp.array(problem.stage_torques)
+    (J1, J2), (c,), Mc = line.J.tolist(), line.c.tolist(), float(line.Mc[1])
+    torques = jnp.array(line.stages())
 
     def rates(t: Any, y: Any, args: Any) -> Any:
         """theta, v, w2; `side` 0 is the open gap, else the flank in contact."""
@@ -58,9 +50,7 @@ def one_start(problem: Problem) -> Any:
         turn = jnp.where(contact, side, -origin) * y[1]
         after = jnp.where(contact, side * y[0] - half, half - origin * y[0])
         far = jnp.where(contact | ~inward, 1.0, half + origin * y[0])
-        return jnp.stack(
-            [jnp.where(inward, turn, after), far, jnp.where(reached, 1.0, problem.target - y[2])]
-        )
+        return jnp.stack([jnp.where(inward, turn, after), far, jnp.where(reached, 1.0, line.target - y[2])])
 
     event = dfx.Event(
         lambda t, y, args, **_: jnp.min(guards(y, args)), optx.Newton(1e-12, 1e-12), direction=False
@@ -92,7 +82,7 @@ def one_start(problem: Problem) -> Any:
         opened = (which == 0) & ~inward & contact
         closed = ((which == 0) & ~inward & ~contact) | (which == 1)
         flank = jnp.where(which == 1, -origin, origin)
-        end = jnp.where(which == 2, t + problem.elastic_period, end)
+        end = jnp.where(which == 2, t + line.tail, end)
         # the state exactly on the surface that was met
         theta = jnp.where(opened, side * half, jnp.where(closed, flank * half, y[0]))
         y = y.at[0].set(theta).at[1].set(jnp.where(turned, 0.0, y[1]))

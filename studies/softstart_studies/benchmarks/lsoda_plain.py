@@ -13,16 +13,19 @@ from scipy.integrate import solve_ivp
 
 from softstart.arrays import Vector
 from softstart_studies.benchmarks.lsoda import T_MAX, TOLERANCE
-from softstart_studies.benchmarks.problem import Problem
+from softstart_studies.benchmarks.problem import Line, Problem, Solve
 
 
-def peak_torque(problem: Problem, gap: float) -> float:
-    """Largest |T| of one start, N m; four states: phi1, w1, phi2, w2."""
-    J1, J2, c, Mc = problem.J1, problem.J2, problem.c, problem.Mc
-    half, target = 0.5 * gap, problem.target
-    torques = problem.stage_torques
-    if torques is None:
-        raise ValueError(f"{problem.strategy} has no torque of its own for each stage.")
+def one_call(problem: Problem, count: int) -> Solve:
+    """All starts, one after the other."""
+    lines = problem.lines(count)
+    return lambda: np.array([[peak_torque(line)] for line in lines])
+
+
+def peak_torque(line: Line) -> float:
+    """Largest |T| of one undamped start, N m; four states: phi1, w1, phi2, w2."""
+    J1, J2, c, Mc = (float(value) for value in (*line.J, line.c[0], line.Mc[1]))
+    half, target, torques = 0.5 * float(line.gap[0]), line.target, line.stages()
 
     def shaft(y: Any) -> float:
         theta = float(y[0]) - float(y[2])
@@ -69,23 +72,8 @@ def peak_torque(problem: Problem, gap: float) -> float:
         # a hair beyond the flank: brentq inside solve_ivp may fail on a start with an event function of zero
         y[0] = y[2] + half + (1e-12 if stage == 1 else -1e-12)
         stage += 1
-    end = t + problem.elastic_period
+    end = t + line.tail
     found = solve_ivp(
         rates, (t, end), y, method="LSODA", events=[upper, lower, turns], rtol=TOLERANCE, atol=TOLERANCE
     )
     return max([peak, abs(shaft(found.y[:, -1])), *(abs(shaft(state)) for state in found.y_events[2])])
-
-
-class LsodaPlain:
-    """All starts, one after the other."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-
-    def ready(self, gaps: Vector) -> list[float]:
-        """The gaps as plain floats."""
-        return [float(gap) for gap in gaps]
-
-    def solve(self, work: list[float]) -> Vector:
-        """Peak torques, N m."""
-        return np.array([peak_torque(self.problem, gap) for gap in work])

@@ -13,7 +13,7 @@ from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI, loop_of
 
 from softstart import Command, PlainController
 from softstart.linear.loop import margins
-from softstart.linear.systems import System, at_points
+from softstart.linear.systems import System
 
 
 def closed_poles(loop):
@@ -76,10 +76,10 @@ def test_the_gain_margin_puts_a_pole_on_the_circle(views):
     for view in views:
         own = view.own_loop
         crossings = [one for one in view.margins.phase_crossovers if one.margin == view.gain_margin]
-        loop = own.broken_with_gain(view.gain_margin)
+        L = own.broken
+        loop = L._replace(B=view.gain_margin * L.B)
         assert off_the_circle(loop, crossings[0].frequency, view.period) < 1e-8
-        below = closed_poles(own.broken_with_gain(0.98 * view.gain_margin))
-        above = closed_poles(own.broken_with_gain(1.02 * view.gain_margin))
+        below, above = (closed_poles(loop._replace(B=factor * loop.B)) for factor in (0.98, 1.02))
         assert np.max(np.abs(below)) < 1.0 < np.max(np.abs(above))
 
 
@@ -87,8 +87,8 @@ def test_the_delay_margin_puts_a_pole_on_the_circle(views):
     for view in views:
         own, m = view.own_loop, view.margins
         assert off_the_circle(own.broken_delayed(m.delay_margin), m.delay_frequency, view.period) < 1e-8
-        point = np.array([np.exp(1j * m.delay_frequency * view.period)])
-        assert abs(at_points(own.broken_delayed(m.delay_margin), point)[0, 0, 0] + 1.0) < 1e-7
+        L = own.broken_delayed(m.delay_margin).at(np.array([m.delay_frequency]), view.period)
+        assert abs(L[0] + 1.0) < 1e-7
         for share in (*np.linspace(0.0, 0.98, 40 if m.delay_margin < 0.02 else 6), 0.999):
             assert np.max(np.abs(closed_poles(own.broken_delayed(share * m.delay_margin)))) < 1.0
         assert np.max(np.abs(closed_poles(own.broken_delayed(1.001 * m.delay_margin)))) > 1.0
@@ -97,7 +97,7 @@ def test_the_delay_margin_puts_a_pole_on_the_circle(views):
 def test_the_modulus_margin_is_the_least_distance(views):
     for view in views:
         w = np.geomspace(0.01 * view.drive.Omega, math.pi / view.period, 5_000)
-        L = at_points(view.own_loop.broken, np.exp(1j * w * view.period))[:, 0, 0]
+        L = view.own_loop.broken.at(w, view.period)
         nearest = float(np.min(np.abs(1.0 + L)))
         assert view.modulus_margin <= nearest * (1.0 + 1e-9)
         assert view.modulus_margin == pytest.approx(nearest, rel=1e-3)

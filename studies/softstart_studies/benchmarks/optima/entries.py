@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from softstart_studies.benchmarks.contenders import version_of
+from softstart_studies.benchmarks.contest import version_of
 from softstart_studies.benchmarks.optima.task import Answer, Task
 
 HOME = "softstart_studies.benchmarks.optima"
@@ -20,7 +20,6 @@ OURS = "softstart"
 SILENT = {
     tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER,
 }  # fmt: skip
-MISSING = "not installed: pip install 'softstart[benchmark]'"
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from softstart.study import Progress, Study, StudyResult, Table
 from softstart.views.drawing import COLOURS, drawing, new_figure
-from softstart_studies.benchmarks.contenders import condition_table
-from softstart_studies.benchmarks.contest import rounded
+from softstart_studies.benchmarks.contest import MISSING, condition_table, rounded
 from softstart_studies.benchmarks.optima import entries
-from softstart_studies.benchmarks.optima.entries import ENTRIES, MISSING, lines_of_code
+from softstart_studies.benchmarks.optima.entries import ENTRIES, lines_of_code
 from softstart_studies.benchmarks.optima.judge import judge
 from softstart_studies.benchmarks.optima.task import START_TIMES, Task, crane_task
 from softstart_studies.benchmarks.optima.verdicts import Outcome, claims, fastest

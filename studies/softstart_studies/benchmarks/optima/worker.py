@@ -12,9 +12,9 @@ from importlib import import_module
 from typing import Any
 
 from softstart.parallel import DiedError, Worker
-from softstart_studies.benchmarks.host import bind_to_one_processor
 from softstart_studies.benchmarks.optima.entries import ENTRIES, solve
 from softstart_studies.benchmarks.optima.task import Answer, Task
+from softstart_studies.benchmarks.process import bind_to_one_processor
 
 PATIENCE = 600.0  # s, for all of a contender's work on one task
 ENOUGH = 20.0  # s, after which no further repetition is begun

@@ -14,9 +14,8 @@ import numpy as np
 from softstart.errors import SimulationError
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.sweeping.summary import plan_of
-from softstart_studies.benchmarks.contenders import condition_table, version_of
-from softstart_studies.benchmarks.contest import rounded
-from softstart_studies.benchmarks.lsoda import peak_torque, sampled_plan
+from softstart_studies.benchmarks import lsoda
+from softstart_studies.benchmarks.contest import condition_table, rounded, version_of
 from softstart_studies.benchmarks.sweeps import process
 from softstart_studies.benchmarks.sweeps.process import Ended, cluster
 from softstart_studies.benchmarks.sweeps.task import Task, sample
@@ -134,6 +133,8 @@ class BenchmarkSweeps(Study):
             return self._run(Path(home), progress)
 
     def _run(self, home: Path, progress: Progress) -> StudyResult:
+        import xarray
+
         local = ("--workers", str(self.workers))
         progress(f"{self.task.size:,} starts on {self.workers} processes")
         whole = process.run(self._arguments(home / "whole", *local))
@@ -212,17 +213,11 @@ class BenchmarkSweeps(Study):
 
 def _by_lsoda(results: xarray.Dataset, count: int) -> Peer:
     """A plain loop over some of the starts."""
-    from softstart.drive import Drive
-
     chosen = list(sample(results, count))
     begin = time.process_time()
-    peaks = [peak_torque(problem, sampled_plan(problem), gap) for problem, gap, _ in chosen]
+    peaks = [float(lsoda.start(line)[0][0]) for line, _, _ in chosen]
     cpu = time.process_time() - begin
-    apart = 0.0
-    crane = Drive.load("crane-4amtkf")
-    for peak, (problem, gap, k_dyn) in zip(peaks, chosen, strict=True):
-        own = crane.replace(gap=gap, load_inertia=problem.J2, stiffness=problem.c)
-        apart = max(apart, abs(float(peak) / own.mean_torque - k_dyn))
+    apart = max(abs(peak / base - k_dyn) for peak, (_, base, k_dyn) in zip(peaks, chosen, strict=True))
     return Peer(len(chosen), cpu, apart)
 
 

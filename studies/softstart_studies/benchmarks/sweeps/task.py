@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softstart.drive import Drive
-from softstart_studies.benchmarks.problem import DRIVE, Problem
+from softstart_studies.benchmarks.problem import DRIVE, Line, Problem
 
 if TYPE_CHECKING:
     import xarray
@@ -58,29 +58,13 @@ class Task:
         return ["sweep", DRIVE, "--controller", CONTROLLER, "--param", f"period={PERIOD}", *given]
 
 
-def sample(results: xarray.Dataset, count: int) -> Iterator[tuple[Problem, float, float]]:
-    """Starts spread at random over the grid: problem and gap for the peer, and the K_dyn that was found."""
+def sample(results: xarray.Dataset, count: int) -> Iterator[tuple[Line, float, float]]:
+    """Starts spread at random over the grid: each for the peer, its mean torque, and the K_dyn found."""
     drive = Drive.load(DRIVE)
     rng = np.random.default_rng(1)
     for flat in rng.choice(results.k_dyn.size, size=min(count, results.k_dyn.size), replace=False):
         index = np.unravel_index(int(flat), results.k_dyn.shape)
         one = results.k_dyn[tuple(int(i) for i in index)]
-        yield _problem(drive, one), float(one.gap), float(one)
-
-
-def _problem(drive: Drive, one: Any) -> Problem:
-    own = drive.replace(load_inertia=float(one.load_inertia), stiffness=float(one.stiffness))
-    return Problem(
-        strategy=CONTROLLER,
-        J1=float(own.J1),
-        J2=float(own.J2),
-        c=float(own.c),
-        Mc=float(own.Mc),
-        target=float(own.target_speed),
-        elastic_period=float(own.elastic_period),
-        stage_torques=None,
-        initial=float(own.Mc),
-        full=float(own.Ms),
-        time=float(one.controller_time),
-        period=PERIOD,
-    )
+        own = drive.replace(**{name: float(one[name]) for name in ("gap", "load_inertia", "stiffness")})
+        line = Problem(CONTROLLER, ramp_time=float(one.controller_time)).line(own)
+        yield line, float(own.mean_torque), float(one)

@@ -1,0 +1,509 @@
+"""The linear law of a controller: the derivative of its step at an instant of its own start.
+
+The start runs on the exact plant (`SampledStart`), with an infinitely fine encoder and without noise, until
+the shaft torque is steady. Several samples along the contact are tried. At each, the step, a function
+(measured, state) -> (demand, new state), is differentiated:
+
+    x+ = A x + B y,   demand = C x + D y        small changes of its state x and of what is measured, y
+
+and the law is compared with the exact plant under the controller itself: each speed and twist is displaced
+slightly, both ways, and the responses of shaft torque and demand over a few samples are compared with those
+of the linear loop. The steady instant is taken if the prediction is good there, otherwise the instant with
+the best prediction: a controller whose demand lies exactly on a limit has no linear law at that point, but it
+has one before it gets there.
+
+The derivative is taken by differences. Each component is displaced both ways by a step and by half of it,
+with ever smaller steps until both sides agree. Richardson's extrapolation of the central difference is then
+taken (error of fourth order). Where the sides never agree: if only one side is linear, as at a switch that
+lies exactly at the sample, that side is taken; if each is linear but they differ (a corner: the demand on a
+limit), the steeper; if neither is (a jump: the number of a mode), none. All these cases are reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import Machine
+from softstart.controller.base import CompiledController, Controller, PlainController, Sensor, label_of
+from softstart.errors import InputError, SimulationError
+from softstart.kernel import motor as exchange
+from softstart.kernel import records as at
+from softstart.linear.plant import Plant, SampledPlant, in_contact, sampled, sizes_of
+from softstart.linear.systems import System, moved
+from softstart.start.engine import plain_answer
+from softstart.start.recorded import Recorder
+from softstart.start.rows import Rows, rows_of
+
+FAR = 1e9  # in target speeds: never reached
+CLOSED = (at.CONTACT, at.JOINED, at.PRESSED, at.WELDED)
+LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
+MOST_SAMPLES = 20_000
+STEADY = 1e-6  # of M12avg_base: spread of shaft torque and demand over two elastic periods
+WINDOW = 16  # samples over which the linear loop is compared with the exact plant
+LEAST = 0.01  # of a state: its smallest scale, for rounding's sake
+GOOD = 1e-3  # relative mismatch up to which a linear law counts as good
+STEP = 2.0**-13  # of a component's scale
+STEPS = (STEP, 2.0**-17, 2.0**-21)
+SAME = 1e-4  # of a column's largest entry, in scales: the two sides agree, or the two step sizes do
+NOTHING = 1e-10  # an entry below this, in scales, is rounding
+
+NONE = np.zeros(0)
+
+Answer = tuple[float, float, float, Vector]  # demand N m, next sample s, slope N m/s, new state
+Step = Callable[[Vector, Vector], Answer]
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One sample of a start: what is measured, the controller's state and its answer."""
+
+    pressing: bool  # all flanks press and all masses move: the plant is linear
+    shaft_torque: float  # of the shaft beside the motor, N m
+    measured: Vector
+    state: Vector
+    demand: float
+    ask_again: float
+    slope: float
+    work: Vector  # of the kernel just before; empty if it was not to be kept
+
+    @property
+    def time(self) -> float:
+        """Instant, s."""
+        return float(self.measured[exchange.M_TIME])
+
+    @property
+    def period(self) -> float:
+        """The time to the next sample, s; NaN if there is none or the plant is not linear."""
+        return self.ask_again - self.time if self.pressing and self.ask_again < math.inf else math.nan
+
+    @property
+    def plant(self) -> Any:
+        """The plant by names, as `softstart.kernel.records` has them; only of a kept sample."""
+        return self.work.view(at.WORK)[0]
+
+    def copied(self) -> Sample:
+        """A kept sample whose plant and state may be changed."""
+        copy = replace(self, work=self.work.copy(), state=self.state.copy())
+        copy.plant["zeros"][:] = copy.plant["passed"][:] = 0  # what has just happened no longer applies
+        return copy
+
+
+@dataclass(frozen=True, eq=False)
+class SampledStart:
+    """A machine as the kernel has it, and a controller that is set up for it.
+
+    `differencing` says whether the speed is the difference of two encoder angles.
+    """
+
+    machine: Any
+    controller: Controller
+    step: Step
+    rows: Rows
+    first_state: Vector
+    differencing: bool
+
+    @classmethod
+    def of(cls, machine: Machine, controller: Controller, fitted_to: Machine | None = None) -> SampledStart:
+        """The controller set up for this (or that) machine; no rounding or noise, the target speed far."""
+        fitted, own = controller.set_up((fitted_to or machine).design_drive)
+        rows = rows_of(machine)
+        differencing = bool(rows.machine.encoder > 0.0)
+        rows.machine.target *= FAR
+        rows.machine.encoder = rows.machine.torque_noise = 0.0
+        if isinstance(fitted, CompiledController):
+            step = _compiled(fitted, np.array(fitted.vector(own), dtype=np.float64).ravel())
+            first = np.zeros(fitted.state_size)
+        elif isinstance(fitted, PlainController):
+            step, first = _plain(fitted), np.array(fitted.initial_state, dtype=np.float64)
+        else:
+            raise InputError(
+                f"controller = {type(fitted).__name__}: derive it from PlainController or CompiledController."
+            )
+        return cls(machine, fitted, step, rows, first, differencing)
+
+    @property
+    def sees(self) -> int:
+        """The sensors that the controller reads."""
+        return int(self.controller.sensors)
+
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """The indices of what is measured that a small motion changes."""
+        found = [exchange.M_MOTOR_ANGLE, exchange.M_MOTOR_SPEED, exchange.M_MOTOR_TORQUE]
+        found += [exchange.M_SHAFT_TORQUE] * bool(self.sees & exchange.SEES_SHAFT_TORQUE)
+        found += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
+        return tuple(found)
+
+    def samples(
+        self,
+        until: float,
+        *,
+        begin: Sample | None = None,
+        keep: Collection[int] = (),
+        recorder: Recorder | None = None,
+    ) -> Iterator[Sample]:
+        """The start from its beginning or from a kept sample."""
+        seen = self.sees | exchange.SEES_SHAFT_TORQUE
+        recorder = recorder or Recorder(self.rows, seen, 0)
+        recorder.begin(until, bool(self.controller.sensors & Sensor.STAGE))
+        now, state = recorder.state, self.first_state
+        if begin is not None:
+            recorder.work[:], state = begin.work, begin.state
+            now.n_spans = now.n_events = 0.0
+            now.changed, now.t_end = 1.0, until
+        name = f"{self.machine.name}, controller {label_of(self.controller)}"
+        count = 0
+        while (reason := recorder.advance()) != at.ENDED:
+            if reason == at.BUFFER_FULL:
+                recorder.grow()
+                continue
+            if reason != at.ASK:
+                raise SimulationError(f"{name}: the start was given up at t = {now.time:.6g} s.")
+            work = recorder.work.copy() if count in keep else NONE
+            measured, torque = self._measured(recorder)
+            demand, ask_again, slope, after = self.step(measured, state)
+            moves = (now.rubs == 0.0) | (now.direction != 0.0)
+            pressing = np.isin(now.mode[: self.rows.count - 1], CLOSED).all() and moves.all()
+            yield Sample(bool(pressing), torque, measured, state, demand, ask_again, slope, work)
+            if recorder.answer(demand, ask_again, slope) != at.ASK:
+                raise SimulationError(
+                    f"{name}: at t = {now.time:.6g} s the controller's answer was no "
+                    f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
+                )
+            state, count = after, count + 1
+
+    def kept(self, index: int) -> Sample:
+        """The sample of this number from the beginning, from which the start can be continued."""
+        return next(islice(self.samples(math.inf, keep={index}), index, None))
+
+    def _measured(self, recorder: Recorder) -> tuple[Vector, float]:
+        """What the controller sees, and the shaft torque, which it may not see."""
+        now = recorder.state
+        before, when = float(now.sample_angle), float(now.sample_time)
+        recorder.measure()
+        measured = recorder.measured.copy()
+        torque = float(measured[exchange.M_SHAFT_TORQUE])
+        if not self.sees & exchange.SEES_SHAFT_TORQUE:
+            measured[exchange.M_SHAFT_TORQUE] = math.nan
+        if self.differencing and now.asked != 0.0 and now.time > when:
+            measured[exchange.M_MOTOR_SPEED] = (measured[exchange.M_MOTOR_ANGLE] - before) / (now.time - when)
+        return measured, torque
+
+
+def _compiled(controller: CompiledController, numbers: Vector) -> Step:
+    size, lines = controller.state_size, type(controller).kernel
+
+    def step(measured: Vector, state: Vector) -> Answer:
+        command = np.zeros(exchange.NEW_STATE + size)
+        lines(numbers, measured, state.copy(), command)
+        torque, ask_again, slope = command[: exchange.NEW_STATE].tolist()
+        return torque, ask_again, slope, command[exchange.NEW_STATE :]
+
+    return step
+
+
+def _plain(controller: PlainController) -> Step:
+    def step(measured: Vector, state: Vector) -> Answer:
+        torque, ask_again, after, slope = plain_answer(controller, measured, tuple(state.tolist()))
+        return torque, ask_again, slope, np.array(after, dtype=np.float64).ravel()
+
+    return step
+
+
+@dataclass(frozen=True, eq=False)
+class SampledRun:
+    """The samples of a start, and the longest stretch of them in one contact at one sample period."""
+
+    samples: tuple[Sample, ...]
+    contact: range  # indices; empty if there is none
+    steady: bool
+
+    @property
+    def period(self) -> float:
+        """Of the stretch, s."""
+        return self.samples[self.contact[0]].period
+
+
+def run_until_steady(start: SampledStart) -> SampledRun:
+    """Run the start until it is steady, at most for LONGEST and STIFF."""
+    sizes = sizes_of(start.machine)
+    samples: list[Sample] = []
+    pressing, steady = 0, False  # samples since it was last open
+    for sample in start.samples(LONGEST * sizes.period + STIFF * _stiff(start)):
+        samples.append(sample)
+        pressing = pressing + 1 if sample.pressing else 0
+        if len(samples) % 8 == 0 and sample.period > 0.0:
+            back = max(WINDOW, math.ceil(2.0 * sizes.period / sample.period))
+            if pressing >= back:
+                recent = np.array([(one.shaft_torque, one.demand) for one in samples[-back:]])
+                steady = bool(np.ptp(recent, axis=0).max() <= STEADY * sizes.base)
+        if steady or len(samples) >= MOST_SAMPLES:
+            break
+    return SampledRun(tuple(samples), _longest_contact(samples), steady)
+
+
+def _stiff(start: SampledStart) -> float:
+    """The time of a stiff start under the starting torque, s."""
+    mass = start.rows.masses.view(at.MASS)[0, :, 0]
+    target, Ms = float(start.machine.target_speed or 0.0), float(start.machine.motor.starting_torque)
+    against = float((mass["Mc"] + mass["active"] + mass["friction"] + mass["ground"] * target).sum())
+    return float(mass["J"][np.isfinite(mass["J"])].sum()) * target / max(Ms - against, 0.01 * Ms)
+
+
+def _longest_contact(samples: list[Sample]) -> range:
+    """The longest stretch of samples in one contact at one period; the last of equals."""
+    best, first, period = range(0), 0, math.nan
+    for index, sample in enumerate(samples):
+        if not abs(sample.period - period) <= 1e-6 * sample.period:
+            first, period = index, sample.period
+        if index + 1 - first >= len(best) and period > 0.0:
+            best = range(first, index + 1)
+    return best
+
+
+class Smoothness(Enum):
+    """How the step depends on one component."""
+
+    SMOOTH = "smooth"
+    ONE_SIDED = "linear on one side only"
+    CORNER = "a corner: each side has its own slope"
+    JUMP = "a jump: no slope at all"
+
+
+ORDER = list(Smoothness)
+
+
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """The law x+ = A x + B y, demand = C x + D y: small changes of state x and measured y about a sample.
+
+    `rates` are the rows of the demand's slope and of the instant of the next sample: both must be zero, or
+    the controller is not a sampled loop. `smoothness` is that of the states, then of the inputs.
+    """
+
+    law: System
+    rates: Matrix
+    smoothness: tuple[Smoothness, ...]
+
+
+def derivative(
+    step: Step, sample: Sample, inputs: tuple[int, ...], scales: Vector, input_scales: Vector, base: float
+) -> Derivative:
+    """The derivative of the step at a sample, by differences.
+
+    `scales` and `input_scales` are the sizes of x and y, `base` that of the demand.
+    """
+    size, seen = sample.state.size, list(inputs)
+    period = max(sample.ask_again - sample.time, 1e-300)
+    widths = np.concatenate([scales, input_scales])
+    heights = np.concatenate([scales, [base, base / period, period]])
+
+    def response(index: int, by: float) -> Vector:
+        point = np.concatenate([sample.state, sample.measured[seen]])
+        point[index] += by * widths[index]
+        measured = sample.measured.copy()
+        measured[seen] = point[size:]
+        demand, ask_again, slope, after = step(measured, point[:size])
+        return np.asarray(np.array([*after, demand, slope, ask_again]) / heights)
+
+    now = response(0, 0.0)
+    columns, kinds = [], []
+    for index, width in enumerate(widths):
+        tried = []
+        for share in STEPS:
+            with np.errstate(invalid="ignore"):  # "never again" is an infinite instant
+                tried.append(_slope([
+                    [(response(index, by * side) - now) / (by * side) for side in (1.0, -1.0)]
+                    for by in (share, 0.5 * share)
+                ]))  # fmt: skip
+            if tried[-1][1] is Smoothness.SMOOTH:
+                break
+        column, kind = min(tried, key=lambda one: ORDER.index(one[1]))
+        columns.append(np.where(np.abs(column) < NOTHING, 0.0, column) * heights / width)
+        kinds.append(kind)
+    whole = np.array(columns).T
+    law = System(whole[:size, :size], whole[:size, size:], whole[[size], :size], whole[[size], size:])
+    return Derivative(law, whole[size + 1 :], tuple(kinds))
+
+
+def _slope(differences: list[list[Vector]]) -> tuple[Vector, Smoothness]:
+    """The slope from difference quotients over a step and half of it, each forward and backward."""
+    wide, near = differences
+    with np.errstate(invalid="ignore", over="ignore"):
+        forward, backward = sides = [2.0 * half - whole for half, whole in zip(near, wide, strict=True)]
+        tolerance = SAME * max(float(np.max(np.abs(near))), NOTHING)
+        straight = [
+            bool(np.all(np.abs(half - whole) <= tolerance)) for half, whole in zip(near, wide, strict=True)
+        ]
+        if all(straight):
+            if np.all(np.abs(forward - backward) <= tolerance):
+                return (2.0 * (near[0] + near[1]) - 0.5 * (wide[0] + wide[1])) / 3.0, Smoothness.SMOOTH
+            return max(sides, key=lambda column: float(np.sum(np.abs(column)))), Smoothness.CORNER
+    for column, linear in zip(sides, straight, strict=True):
+        if linear:
+            return column, Smoothness.ONE_SIDED
+    return np.zeros_like(forward), Smoothness.JUMP
+
+
+@dataclass(frozen=True, eq=False)
+class OperatingPoint:
+    """An instant, the derivative of the step there, and the controller's part in the loop.
+
+    `law` has the states `states` of the controller: those that a measured quantity moves and that show in the
+    demand. `mismatch` is the largest difference between linear and exact response, relative to the exact.
+    """
+
+    sample: Sample
+    period: float
+    derivative: Derivative
+    states: tuple[int, ...]
+    law: System
+    mismatch: float
+    steady: bool
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether anything measured changes the demand."""
+        return bool(self.states) or bool(np.any(self.law.D))
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether nothing measured changes the slope of the demand or the instant of the next sample."""
+        rates = self.derivative.rates
+        return not (np.any(rates[:, list(self.states)]) or np.any(rates[:, self.derivative.law.A.shape[0] :]))
+
+    @property
+    def rough(self) -> tuple[tuple[int, Smoothness], ...]:
+        """The states in the loop in which the step is not smooth, by their numbers."""
+        kinds = self.derivative.smoothness
+        return tuple((i, kinds[i]) for i in self.states if kinds[i] is not Smoothness.SMOOTH)
+
+
+def operating_point(start: SampledStart, run: SampledRun) -> OperatingPoint | None:
+    """The steady one if its law is good and feeds back; else the best that feeds back; else the best."""
+    points = operating_points(start, run)
+    good = [one for one in points if one.mismatch < GOOD]
+    feeding = [one for one in good if one.feeds_back]
+    steady = [one for one in feeding if one.steady]
+    ranked = steady or feeding or good or [one for one in points if one.feeds_back] or points
+    return ranked[0] if ranked else None
+
+
+def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoint]:
+    """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
+    if len(run.contact) < 3:
+        return []
+    offsets = {round(1.5**k) for k in range(1, 30)}
+    places = {1, len(run.contact) - 1} | {k for k in offsets if k < len(run.contact) - 1}
+    indices = sorted(run.contact[place] for place in places)
+    again = start.samples(math.inf, keep=set(indices))
+    kept = [sample for sample in islice(again, indices[-1] + 1) if sample.work.size]
+    found = [_linearised_at(start, run, index, one) for index, one in zip(indices, kept, strict=True)]
+    return sorted(found, key=lambda one: one.mismatch)
+
+
+def _linearised_at(start: SampledStart, run: SampledRun, index: int, sample: Sample) -> OperatingPoint:
+    sizes, inputs = sizes_of(start.machine), start.inputs
+    scales = _scales(run, index, sizes.period)
+    of_inputs = {
+        exchange.M_MOTOR_ANGLE: sizes.windup,
+        exchange.M_MOTOR_TORQUE: sizes.base,
+        exchange.M_SHAFT_TORQUE: sizes.base,
+    }
+    input_scales = np.array([of_inputs.get(index, sizes.speed) for index in inputs])
+    found = derivative(start.step, sample, inputs, scales, input_scales, sizes.base)
+    reached = moved(found.law)
+    kept = [reached[i] for i in moved(found.law.part(reached).dual())]
+    law = found.law.part(kept)
+    plant = in_contact(start.machine, sample.plant["incline"])
+    delay = float(start.rows.machine.dead_time)
+    held = sampled(plant, run.period, delay, inputs, start.differencing)
+    mismatch = _mismatch(start, sample, run.period, plant, held, law)
+    steady = run.steady and index == run.contact[-1]
+    return OperatingPoint(sample, run.period, found, tuple(kept), law, mismatch, steady)
+
+
+def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
+    """The size of each state: how far it moves within an elastic period, a share of itself, or 1."""
+    back = math.ceil(elastic_period / run.period)
+    states = np.array([one.state for one in run.samples[max(run.contact[0], index - back) : index + 1]])
+    with np.errstate(invalid="ignore"):
+        reach = np.nan_to_num(np.ptp(states, axis=0), nan=0.0, posinf=0.0)
+    size = np.nan_to_num(np.abs(run.samples[index].state), nan=0.0, posinf=0.0)
+    scale = np.maximum(reach, LEAST * size)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def _mismatch(
+    start: SampledStart, sample: Sample, period: float, plant: Plant, held: SampledPlant, law: System
+) -> float:
+    """The linear loop against the exact plant under the controller, after small displacements both ways."""
+    base = sizes_of(start.machine).base
+    loop, _, read = closed(held, law)
+    until = sample.time + (WINDOW - 0.5) * period
+    worst = 0.0
+    for first, changes in _displacements(start, plant, loop.shape[0]):
+        predicted, state = np.zeros((WINDOW, 2)), first
+        for k in range(WINDOW):
+            predicted[k], state = read @ state, loop @ state
+        responses = []
+        for by in (STEP, -STEP):
+            displaced = sample.copied()
+            for name, change in changes.items():
+                displaced.plant[name] += by * change
+            played = list(start.samples(until, begin=displaced))
+            if len(played) != WINDOW or not all(one.pressing for one in played):
+                return math.inf
+            responses.append([(one.shaft_torque, one.demand) for one in played])
+        response = (np.array(responses[0]) - responses[1]) / (2.0 * STEP)
+        size = max(float(np.max(np.abs(response))), 1e-3 * base)
+        worst = max(worst, float(np.max(np.abs(response - predicted))) / size)
+    return worst
+
+
+def _displacements(start: SampledStart, plant: Plant, order: int) -> Iterator[tuple[Vector, dict[str, Any]]]:
+    """Of the whole machine, each body's speed, each twist: the loop's state, and the changes of the start."""
+    sizes, load, motor = sizes_of(start.machine), int(start.rows.machine.load), int(start.rows.machine.motor)
+    speeds, masses = np.array(plant.speeds), np.arange(start.rows.count)
+
+    def filled(values: Any, size: float) -> Vector:
+        return np.asarray(size * np.pad(1.0 * values, (0, at.MOST_MASSES - len(values))))
+
+    angle = sizes.windup
+    yield angle * np.eye(1, order)[0], {"phi": angle, "angle": filled(np.ones(masses.size), angle)}
+    for index in np.unique(speeds):
+        if np.isfinite(start.rows.masses.view(at.MASS)[0, speeds == index, 0]["J"]).all():  # not the ground
+            yield sizes.speed * np.eye(1, order, index)[0], {"w": filled(speeds == index, sizes.speed)}
+    for spring, shaft in enumerate(np.flatnonzero(np.diff(speeds)), start=1):
+        # the motor stays, and what lies on the other side of the shaft turns; `phi` is the angle of the load
+        turned = -1.0 * (masses > shaft) if motor <= shaft else 1.0 * (masses <= shaft)
+        yield (
+            angle * np.eye(1, order, spring)[0],
+            {
+                "theta": filled(masses == shaft, angle),
+                "phi": angle * turned[load],
+                "angle": filled(turned, angle),
+            },
+        )
+
+
+def closed(plant: SampledPlant, law: System) -> tuple[Matrix, Vector, Matrix]:
+    """The closed loop's transition matrix, its input of a torque added to the demand, and what is read.
+
+    States are those of the plant and of the controller; read are the shaft torque and the demand.
+    """
+    A, B, C, _ = plant.system
+    order = law.A.shape[0]
+    into = np.append(B, np.zeros(order))
+    demand = np.hstack([law.D @ C, law.C])
+    whole = np.block([[A, np.zeros((A.shape[0], order))], [law.B @ C, law.A]])
+    torque = np.append(plant.torque, np.zeros(order))
+    return np.asarray(whole + np.outer(into, demand)), into, np.vstack([torque, demand])
