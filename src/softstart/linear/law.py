@@ -50,6 +50,7 @@ STEADY = 1e-6  # of M12avg_base: spread of shaft torque and demand over two elas
 WINDOW = 16  # samples over which the linear loop is compared with the exact plant
 LEAST = 0.01  # of a state: its smallest scale, for rounding's sake
 GOOD = 1e-3  # relative mismatch up to which a linear law counts as good
+FAIR = 0.03  # the same for a law that feeds back, where the good ones do not: a demand beyond its limit
 STEP = 2.0**-13  # of a component's scale
 STEPS = (STEP, 2.0**-17, 2.0**-21)
 SAME = 1e-4  # of a column's largest entry, in scales: the two sides agree, or the two step sizes do
@@ -393,7 +394,8 @@ def operating_point(start: SampledStart, run: SampledRun) -> OperatingPoint | No
     good = [one for one in points if one.mismatch < GOOD]
     feeding = [one for one in good if one.feeds_back]
     steady = [one for one in feeding if one.steady]
-    ranked = steady or feeding or good or [one for one in points if one.feeds_back] or points
+    fair = [one for one in points if one.feeds_back and one.mismatch < FAIR]
+    ranked = steady or feeding or fair or good or [one for one in points if one.feeds_back] or points
     return ranked[0] if ranked else None
 
 
