@@ -26,8 +26,8 @@ def _table(runs: dict[str, Engagement], search: Table, several: bool) -> Claim:
     return Claim(
         "The table of results follows from equations (1)-(3) and the data printed with it.",
         "refuted",
-        f"Only the linear peak does: {linear:.2f}, printed 64.6 (cut, not rounded). Of the six figures {met} "
-        f"is met by any of the readings tried, and {more}.",
+        f"Only the linear peak does: {linear:.2f}, printed 64.6 (cut, not rounded). Of the six figures "
+        f"{met} is met by any of the readings tried, and {more}.",
     )
 
 
@@ -49,11 +49,10 @@ def _order(runs: dict[str, Engagement]) -> Claim:
         "The exponential law costs less friction work than the linear one.",
         "confirmed" if ours < 0 else "refuted",
         f"It costs {ours:.0f} kgf m more; printed: {printed['linear'] - printed['exponential']} less. Its "
-        "torque is below the linear one at every instant, "
-        f"so the masses lag {lag / KGF:.0f} kgf m behind, and what the oscillation stores at the lock-up can "
-        f"take back at most {stored / KGF:.0f} even with the largest printed peak: the difference is above "
-        f"{(lag - stored) / KGF:.0f}, so the printed order cannot come from these equations and data, "
-        "whatever the oscillation.",
+        f"torque is below the linear one at every instant, so the masses lag {lag / KGF:.0f} kgf m behind, "
+        f"and what the oscillation stores at the lock-up can take back at most {stored / KGF:.0f} even "
+        f"with the largest printed peak: the difference is above {(lag - stored) / KGF:.0f}, so the "
+        "printed order cannot come from these equations and data, whatever the oscillation.",
     )
 
 
@@ -88,8 +87,8 @@ def _best(runs: dict[str, Engagement], found: tuple[EngagementFront, ...]) -> Cl
         "By the law of engagement the load of the elements can be made the least possible.",
         "confirmed",
         f"No law that slips a period beyond tM has a peak below {any_law.run.clutch.mean_torque / KGF:.2f} "
-        f"kgf m. At that peak the least work found is {any_law.slip_work / KGF:.0f} kgf m for any law (none "
-        f"has less than {bound:.0f}) and {rising.slip_work / KGF:.0f} for a nondecreasing one (bound "
+        f"kgf m. At that peak the least work found is {any_law.slip_work / KGF:.0f} kgf m for any law "
+        f"(none has less than {bound:.0f}) and {rising.slip_work / KGF:.0f} for a nondecreasing one (bound "
         f"{rising.work_bound / KGF:.0f}): against the linear law "
         f"{100 * (1 - any_law.peak_torque / linear.slip_peak_torque):.1f} % less peak and "
         f"{100 * (1 - any_law.slip_work / linear.slip_work):.1f} % less work at once. All laws of [C] are "
@@ -99,8 +98,8 @@ def _best(runs: dict[str, Engagement], found: tuple[EngagementFront, ...]) -> Cl
 
 def _slips_again(runs: dict[str, Engagement]) -> Claim:
     again = [
-        f"{name}: shaft torque reaches {run.locked_peak_torque / KGF:.2f} kgf m, the clutch slips again and "
-        f"takes {(run.friction_work - run.slip_work) / KGF:.0f} kgf m more"
+        f"{name}: shaft torque reaches {run.locked_peak_torque / KGF:.2f} kgf m, the clutch slips again "
+        f"and takes {(run.friction_work - run.slip_work) / KGF:.0f} kgf m more"
         for name, run in runs.items()
         if run.friction_work > run.slip_work * (1.0 + 1e-12)
     ]
