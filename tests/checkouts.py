@@ -169,7 +169,8 @@ def chains() -> Values:
 
 def machines() -> Values:
     """Shipped clutches under each law and their optimal laws, the shipped engine, linear views."""
-    from softstart import Clutch, Drive, Engine, balance, engage, linear_view, optimize_engagement
+    from softstart import Clutch, Drive, Engine, balance, engage, linear_view
+    from softstart_studies.paper_c import optimize_engagement
 
     for name in CLUTCHES:
         clutch = Clutch.load(name)

@@ -8,18 +8,13 @@ nor pressures; they are assumed and marked as such in every output.
 """
 
 # %%
-# The printed formulas and the model, over the speed of the crank:
-from softstart_studies.paper_b import over_speed
+# The printed formulas and the model, over the speed of the crank; then gas and inertia separately:
+from softstart_studies.paper_b.figures import over_speed
 from softstart_studies.paper_b.vaz import balanced
 
 found = balanced()
-curves = over_speed.curves(found)
-figure = over_speed.figure_2(curves)
+figure, second = over_speed(found)
 figure.set_label("Figure 2 of [B]: first order of the reaction torque over the speed of the crank.")
-
-# %%
-# Gas and inertia separately:
-second = over_speed.figure_3(curves)
 second.set_label("Figure 3 of [B]: first order of the torque of gas, of inertia, and of both.")
 
 # %%

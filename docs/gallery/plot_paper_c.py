@@ -8,8 +8,9 @@ for nondecreasing laws and for arbitrary laws.
 
 # %%
 # The clutch, shaft and load of [C] (in kgf m), and the four laws on the exact plant with renewed slip:
-from softstart.views.clutches import engagement_figure, front_figure
-from softstart_studies.paper_c import IN_KGF, fronts, printed
+from softstart.views.clutches import engagement_figure
+from softstart_studies.paper_c import IN_KGF, optimize_engagement, printed
+from softstart_studies.paper_c.fronts import front_figure
 
 runs = printed.engagements()
 figure = engagement_figure(list(runs.values()), "The laws of [C]", list(runs), IN_KGF)
@@ -17,8 +18,9 @@ figure.set_label("Clutch torque, shaft torque and speeds under the laws of [C]."
 
 # %%
 # The minimum friction work for each peak, with fewer points than in the study:
-found = fronts.fronts(lambda doing: None, points=4)
-front = front_figure(found, IN_KGF)
+classes = ("any", "nondecreasing")
+found = [optimize_engagement(printed.clutch(), 4, law_class=one) for one in classes]
+front = front_figure(found)
 front.set_label("Friction work over peak shaft torque: the optimal laws, and those of [C].")
 
 # %%

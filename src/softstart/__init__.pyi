@@ -11,9 +11,7 @@ from softstart.chain.machines import records as records
 from softstart.chain.periodic_torque import PeriodicTorque as PeriodicTorque
 from softstart.clutch import Clutch as Clutch
 from softstart.clutch import Engagement as Engagement
-from softstart.clutch import EngagementFront as EngagementFront
 from softstart.clutch import engage as engage
-from softstart.clutch import optimize_engagement as optimize_engagement
 from softstart.controller import Command as Command
 from softstart.controller import CompiledController as CompiledController
 from softstart.controller import Controller as Controller

@@ -106,32 +106,14 @@ def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerS
     return first, second
 
 
-@dataclass(frozen=True)
-class Design:
-    """A layout of the balancer: where its arm is computed, and what of it is used.
-
-    `gas`: for the gas torque too, not that of inertia alone; `variable`: computed at every speed, not at the
-    tuning speed once; `sideways`: its offset e too, not its height h alone.
-    """
-
-    name: str
-    about: str
-    gas: bool = True
-    variable: bool = False
-    sideways: bool = False
-
-    def place(self, engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-        """The arm h + i e in m at a speed."""
-        found = arm(engine, speed if self.variable else tuning, load, gas=self.gas)
-        return found if self.sideways else complex(found.real)
-
-
+# name and what it is; whether its arm is for the gas torque too, not that of inertia alone; whether it is
+# computed at every speed, not at the tuning speed once; whether its offset e is used too, not h alone
 DESIGNS = (
-    Design("inertia-only", "h for the inertia torque alone", gas=False),
-    Design("fixed-h", "h for gas and inertia at the tuning speed [B]"),
-    Design("variable-h", "h(n) for gas and inertia at every speed [B]", variable=True),
-    Design("fixed-h-e", "h and sideways offset e at the tuning speed", sideways=True),
-    Design("variable-h-e", "h(n) and e(n) at every speed", variable=True, sideways=True),
+    ("inertia-only", "h for the inertia torque alone", False, False, False),
+    ("fixed-h", "h for gas and inertia at the tuning speed [B]", True, False, False),
+    ("variable-h", "h(n) for gas and inertia at every speed [B]", True, True, False),
+    ("fixed-h-e", "h and sideways offset e at the tuning speed", True, False, True),
+    ("variable-h-e", "h(n) and e(n) at every speed", True, True, True),
 )
 
 
@@ -168,19 +150,20 @@ class Residual:
 
     def row(self, index: int) -> dict[str, float | None]:
         """The values at one of the speeds, as plain data."""
-        return {
-            "speed": float(self.speeds[index]),
-            "height": None if self.height is None else float(self.height[index]),
-            "offset": None if self.offset is None else float(self.offset[index]),
-            "first_order_moment": float(self.first_order[index]),
-            "first_order_moment_cosine": float(self.first_order_cosine[index]),
-            "first_order_moment_sine": float(self.first_order_sine[index]),
-            "moment": float(self.moment[index]),
-            "first_order_force": float(self.force[index]),
-            "force": float(self.all_forces[index]),
-            "first_order_couple": float(self.couple[index]),
-            "couple": float(self.all_couples[index]),
+        columns = {
+            "speed": self.speeds,
+            "height": self.height,
+            "offset": self.offset,
+            "first_order_moment": self.first_order,
+            "first_order_moment_cosine": self.first_order_cosine,
+            "first_order_moment_sine": self.first_order_sine,
+            "moment": self.moment,
+            "first_order_force": self.force,
+            "force": self.all_forces,
+            "first_order_couple": self.couple,
+            "couple": self.all_couples,
         }
+        return {name: None if values is None else float(values[index]) for name, values in columns.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,23 +234,15 @@ class Balance:
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
         for j in range(1, 13):
-            whole, both = j % 2 == 0, gas[j] + inertia[j]
-            shaken = whole and (force[j // 2] > 0.0 or couple[j // 2] > 0.0)
-            if abs(gas[j]) <= tiny and abs(inertia[j]) <= tiny and not shaken:
+            shaken = (force[j // 2], couple[j // 2]) if j % 2 == 0 else (0.0, 0.0)
+            if max(abs(gas[j]), abs(inertia[j])) <= tiny and not (shaken[0] > 0.0 or shaken[1] > 0.0):
                 continue
-            rows.append(
-                {
-                    "order": float(engine.orders[j]),
-                    **(
-                        {"gas_cosine": float(gas[j].real), "gas_sine": float(-gas[j].imag)} if pressed else {}
-                    ),
-                    "inertia_cosine": float(inertia[j].real),
-                    "inertia_sine": float(-inertia[j].imag),
-                    "torque": float(abs(both)),
-                    "force": float(force[j // 2]) if whole else 0.0,
-                    "couple": float(couple[j // 2]) if whole else 0.0,
-                }
-            )
+            row = {"order": engine.orders[j]}
+            if pressed:
+                row |= {"gas_cosine": gas[j].real, "gas_sine": -gas[j].imag}
+            row |= {"inertia_cosine": inertia[j].real, "inertia_sine": -inertia[j].imag}
+            row |= {"torque": abs(gas[j] + inertia[j]), "force": shaken[0], "couple": shaken[1]}
+            rows.append({name: float(value) for name, value in row.items()})
         return rows
 
     def summary(self) -> dict[str, Any]:
@@ -368,9 +343,8 @@ def balance(
     [149.5, 123.4, 55.1, 55.1, 0.0, 0.0]
     """
     operation = engine.operation
-    tuning = (
-        engine.tuning_speed if tuning_speed is None else float(to_si(tuning_speed, "rad/s", "tuning_speed"))
-    )
+    given_speed = engine.tuning_speed if tuning_speed is None else tuning_speed
+    tuning = float(to_si(given_speed, "rad/s", "tuning_speed"))
     if not tuning > 0.0:
         raise InputError(f"tuning_speed = {tuning:g} rad/s: it must be above 0.")
     low, high = operation.lowest_speed, operation.highest_speed
@@ -389,15 +363,16 @@ def balance(
         moments = np.tile(engine.shaft_shaking()[2], (every.size, 1))
         residuals.append(_residual(engine, about, every, given, engine.shafts, moments))
     if force := free_force(engine):
-        for design in DESIGNS:
-            if design.gas and engine.gas is None:
+        for name, what, gas, variable, sideways in DESIGNS:
+            if gas and engine.gas is None:
                 continue
-            places = np.array([design.place(engine, float(w), tuning, given) for w in every])
+            speeds_of_arm = every if variable else np.full(every.size, tuning)
+            places = np.array([arm(engine, float(w), given, gas=gas) for w in speeds_of_arm])
+            places = places if sideways else places.real + 0j
             moments = nothing.copy()
             moments[:, 1] = [moment_harmonic(complex(one), -force, forward=False) for one in places]
-            at_tuning = complex(places[int(np.argmin(np.abs(every - tuning)))])
-            shafts, about = two_shafts(engine, at_tuning), (design.name, design.about)
-            residuals.append(_residual(engine, about, every, given, shafts, moments, places))
+            shafts = two_shafts(engine, complex(places[int(np.argmin(np.abs(every - tuning)))]))
+            residuals.append(_residual(engine, (name, what), every, given, shafts, moments, places))
     against, along = couple_shaft(engine), couple_shaft(engine, forward=True)
     if against:
         about = ("couple-shaft", "a shaft against the crank with two opposite imbalances")

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.gas import MeasuredCycle, SimpleCycle, shape_work, torque_harmonics
+from softstart.balancing.gas import Gas, MeasuredCycle, SimpleCycle, shape_work, torque_harmonics
 from softstart.balancing.parts import (
     CYCLE_ANGLE,
     BalancerShaft,
@@ -91,26 +91,22 @@ def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, A
     Traceback (most recent call last):
     softstart.errors.InputError: assumed = "mases.*": an engine file has no such key; did you mean masses.*?
     """
-    known = [p.path for table in TABLES for p in table.parameters if table.name]
-    stars = [f"{table.name}.*" for table in TABLES if table.name]
-    named: dict[str, None] = {}
+    known: dict[str, list[str]] = {}
+    for table in (table for table in TABLES if table.name):
+        values = found.get(table.name)
+        here = values.items() if isinstance(values, Mapping) else ()
+        known[f"{table.name}.*"] = [f"{table.name}.{key}" for key, value in here if value is not None]
+        known |= {p.path: [p.path] for p in table.parameters}
+    names = [name.strip() for name in text.split(",") if name.strip()]
     wrong = []
-    for name in (one.strip() for one in text.split(",")):
-        if not name:
-            continue
-        if name in stars:
-            values = found.get(name[:-2])
-            here = values if isinstance(values, Mapping) else {}
-            named |= {f"{name[:-1]}{key}": None for key, value in here.items() if value is not None}
-        elif name in known:
-            named[name] = None
-        else:
-            meant = nearest(name, [*stars, *known])
-            hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
-            wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
+    for name in (name for name in names if name not in known):
+        meant = nearest(name, list(known))
+        hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
+        wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
     if wrong:
         raise InputError(wrong)
-    return tuple(name for name in named if name not in changed)
+    keys = dict.fromkeys(key for name in names for key in known[name])
+    return tuple(key for key in keys if key not in changed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +257,7 @@ class Engine:
 
     cylinders: Cylinders
     masses: Masses
-    gas: SimpleCycle | MeasuredCycle | None
+    gas: Gas | None
     operation: Operation
     counterweights: Counterweights = field(default_factory=Counterweights)
     shafts: tuple[BalancerShaft, ...] = ()
@@ -312,38 +308,36 @@ class Engine:
         before = f"{where}: " if where else ""
         wrong: list[str] = []
 
-        def part(place: str, make: Any, values: dict[str, Any]) -> Any:
+        def part(place: str, make: Any, values: Any) -> Any:
             return made(make, values, f"{before}{place}{' ' if place else ''}", wrong)
 
         named: dict[str, Any] = found.pop("")
-        cylinders = part("[cylinders]", Cylinders, found["cylinders"])
+        cycle, indicator = found["cycle"], found["indicator"]
         parts: dict[str, Any] = {
-            "masses": part("[masses]", Masses, found["masses"]),
-            "operation": part("[operation]", Operation, found["operation"]),
-            "counterweights": part("[counterweights]", Counterweights, found["counterweights"] or {}),
-            "shafts": [part(f"[shaft] {i},", BalancerShaft, row) for i, row in enumerate(found["shaft"], 1)],
-            "layout": part("[balancer]", Layout, found["balancer"]) if found["balancer"] else None,
-            "assumed": part(
-                "", assumed_keys, {"text": named.pop("assumed"), "changed": also or {}, "found": found}
-            ),
-        }
-        gas: Any = None
-        if found["cycle"] is not None and found["indicator"] is not None:
-            wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
-        elif found["cycle"] is not None:
-            gas = part("[cycle]", SimpleCycle, found["cycle"])
-        elif found["indicator"] is not None:
-            row = found["indicator"]
-            path = Path(folder) / row["file"]
-            gas = part(
-                "[indicator]",
-                MeasuredCycle.from_csv,
-                {"path": path, "crankcase_pressure": row["crankcase_pressure"]},
+            key: part(f"[{table}]", make, found[table] or {})
+            for key, table, make in (
+                ("cylinders", "cylinders", Cylinders), ("masses", "masses", Masses),
+                ("operation", "operation", Operation), ("counterweights", "counterweights", Counterweights),
+                ("layout", "balancer", Layout), ("gas", "cycle", SimpleCycle),
             )
+            if found[table] or table == "counterweights"
+        }  # fmt: skip
+        parts.setdefault("gas", None)
+        parts["shafts"] = [
+            part(f"[shaft] {i},", BalancerShaft, row) for i, row in enumerate(found["shaft"], 1)
+        ]
+        about = {"text": named.pop("assumed"), "changed": also or {}, "found": found}
+        parts["assumed"] = part("", assumed_keys, about)
+        if cycle is not None and indicator is not None:
+            wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
+        elif indicator is not None:
+            measured = {"path": Path(folder) / indicator["file"]}
+            measured["crankcase_pressure"] = indicator["crankcase_pressure"]
+            parts["gas"] = part("[indicator]", MeasuredCycle.from_csv, measured)
         if wrong:
             raise InputError(wrong)
         try:
-            return cls(cylinders, gas=gas, **parts, **named)
+            return cls(**parts, **named)
         except InputError as error:
             raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
 
@@ -390,43 +384,34 @@ class Engine:
             raise InputError(f"load = {load}: it must be from 0 to 1.")
         return float(load)
 
-    @property
-    def _pressed(self) -> SimpleCycle | MeasuredCycle:
-        """The pressure; raises InputError where none is given."""
+    def _weights(self, speed: float, load: float | None) -> tuple[Gas, Vector]:
+        """The pressure, and the factors of its shapes; raises InputError where none is given."""
         if self.gas is None:
             raise InputError("[cycle], [indicator]: one of the two gives the gas torque; add one.")
-        return self.gas
+        return self.gas, self.gas.weights(self.cylinders, speed, self._load(load))
 
     # ---- torques over the crank angle --------------------------------------------------------------------
 
     def pressure(self, theta: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Pressure in Pa in a cylinder, theta rad after its firing dead centre."""
         theta = np.asarray(theta, dtype=np.float64)
-        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
-        difference = weights @ self._pressed.shapes(self.cylinders, theta.ravel())
-        found: Vector = difference.reshape(theta.shape) + self._pressed.crankcase_pressure
+        gas, weights = self._weights(speed, load)
+        difference = weights @ gas.shapes(self.cylinders, theta.ravel())
+        found: Vector = difference.reshape(theta.shape) + gas.crankcase_pressure
         return found
 
     def gas_torque(self, phi: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Torque in N m of the gas of all cylinders on the crank, at crank angles in rad."""
-        phi = np.asarray(phi, dtype=np.float64)
-        crank, area = self.cylinders.crank, self.cylinders.area
-        found = np.zeros(phi.shape)
-        for firing in self.cylinders.firing_angles:
-            theta = np.mod(phi - firing, CYCLE_ANGLE)
-            difference = self.pressure(theta, speed, load) - self._pressed.crankcase_pressure
-            found -= area * difference * crank.slope(theta)
+        theta = np.mod(-np.subtract.outer(self.cylinders.firing_angles, phi), CYCLE_ANGLE)
+        difference = self.pressure(theta, speed, load) - self._weights(speed, load)[0].crankcase_pressure
+        found: Vector = -self.cylinders.area * (difference * self.cylinders.crank.slope(theta)).sum(axis=0)
         return found
 
     def inertia_torque(self, phi: ArrayLike, speed: float) -> Vector:
         """Torque in N m of the reciprocating masses on the crank: -m w^2 s' s'' for each cylinder."""
-        phi = np.asarray(phi, dtype=np.float64)
-        crank = self.cylinders.crank
-        found = np.zeros(phi.shape)
-        for firing in self.cylinders.firing_angles:
-            found -= crank.slope(phi - firing) * crank.curvature(phi - firing)
-        torque: Vector = self.masses.reciprocating * speed**2 * found
-        return torque
+        theta, crank = -np.subtract.outer(self.cylinders.firing_angles, phi), self.cylinders.crank
+        found: Vector = (crank.slope(theta) * crank.curvature(theta)).sum(axis=0)
+        return -self.masses.reciprocating * speed**2 * found
 
     def torque(self, phi: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Torque in N m of gas and inertia on the crank. Its reaction acts on the housing."""
@@ -449,9 +434,8 @@ class Engine:
 
     def gas_harmonics(self, speed: float, load: float | None = None) -> Complex:
         """C_q of the gas torque Re sum C_q exp(i q phi) in N m, q as in `orders`; [B](2) has z A and z B."""
-        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
-        one = torque_harmonics(self._pressed, self.cylinders, HIGHEST)
-        found: Complex = (weights @ one) * self._turned
+        gas, weights = self._weights(speed, load)
+        found: Complex = weights @ torque_harmonics(gas, self.cylinders, HIGHEST) * self._turned
         return found
 
     @cached_property
@@ -505,8 +489,8 @@ class Engine:
 
     def indicated_work(self, speed: float, load: float | None = None) -> float:
         """Work in J of the gas in one cycle of all cylinders: 4 pi times the mean torque."""
-        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
-        return float(self.cylinders.count * (weights @ shape_work(self._pressed, self.cylinders)))
+        gas, weights = self._weights(speed, load)
+        return float(self.cylinders.count * (weights @ shape_work(gas, self.cylinders)))
 
     def speed_fluctuation(self, speed: float, load: float | None = None) -> float | None:
         """Coefficient (w_max - w_min)/w against a constant load torque: excess work over inertia and w^2.

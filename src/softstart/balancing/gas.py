@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
-from numpy.polynomial import chebyshev
+from numpy.polynomial import Chebyshev
 
 from softstart.arrays import Complex, Vector
 from softstart.balancing.parts import CYCLE_ANGLE, Cylinders
@@ -38,32 +38,6 @@ WIDEST = math.radians(30.0)  # between neighbouring angles
 EXAMPLE = "angle [deg],pressure [bar]"
 
 
-class GasCycle(Hashable, Protocol):
-    """Where the pressure comes from: a simple cycle, or one measured."""
-
-    @property
-    def crankcase_pressure(self) -> float:
-        """Pressure in Pa below the pistons."""
-
-    def breaks(self) -> tuple[float, ...]:
-        """Angles in rad between which the pressure is smooth."""
-
-    def shapes(self, cylinders: Cylinders, theta: Vector) -> Vector:
-        """Shapes of the pressure at angles in rad, one row per shape."""
-
-    def weights(self, cylinders: Cylinders, speed: float, load: float) -> Vector:
-        """Factors on the shapes that give the pressure difference in Pa on the piston."""
-
-    def refuse(self, cylinders: Cylinders) -> Sequence[str]:
-        """Sentences on what is impossible with these cylinders."""
-
-
-@lru_cache(maxsize=2)
-def _gauss(count: int) -> tuple[Vector, Vector]:
-    x, w = np.polynomial.legendre.leggauss(count)
-    return np.asarray(x, dtype=np.float64), np.asarray(w, dtype=np.float64)
-
-
 def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
     """Gauss-Legendre nodes in [0, 4 pi) and their weights, none across a break.
 
@@ -72,19 +46,18 @@ def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
     True
     """
     edges = [0.0, *(b for b in sorted(breaks) if 0.0 < b < CYCLE_ANGLE), CYCLE_ANGLE]
+    x, w = np.polynomial.legendre.leggauss(10 if len(breaks) > MANY else 24)
     places, weights = [], []
     for low, high in pairwise(edges):
-        parts = max(1, math.ceil((high - low) / LONGEST))
-        x, w = _gauss(10 if len(breaks) > MANY else 24)
-        half = 0.5 * (high - low) / parts
-        for i in range(parts):
-            places.append(low + half * (2 * i + 1 + x))
-            weights.append(half * w)
+        count = max(1, math.ceil((high - low) / LONGEST))
+        half = 0.5 * (high - low) / count
+        places.append((low + half * (2.0 * np.arange(count)[:, None] + 1.0 + x)).ravel())
+        weights.append(np.tile(half * w, count))
     return np.concatenate(places), np.concatenate(weights)
 
 
 @lru_cache(maxsize=32)
-def _torque_shapes(cycle: GasCycle, cylinders: Cylinders) -> tuple[Vector, Vector]:
+def _torque_shapes(cycle: Gas, cylinders: Cylinders) -> tuple[Vector, Vector]:
     """The nodes, and weights times the torque on the crank of each shape of pressure."""
     theta, weights = nodes(cycle.breaks())
     per_pressure = -cylinders.area * cylinders.crank.slope(theta)
@@ -92,7 +65,7 @@ def _torque_shapes(cycle: GasCycle, cylinders: Cylinders) -> tuple[Vector, Vecto
 
 
 @lru_cache(maxsize=64)
-def shape_work(cycle: GasCycle, cylinders: Cylinders) -> Vector:
+def shape_work(cycle: Gas, cylinders: Cylinders) -> Vector:
     """Work in J of one cycle of one cylinder for each shape."""
     work: Vector = _torque_shapes(cycle, cylinders)[1].sum(axis=1)
     work.setflags(write=False)
@@ -100,7 +73,7 @@ def shape_work(cycle: GasCycle, cylinders: Cylinders) -> Vector:
 
 
 @lru_cache(maxsize=32)
-def torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Complex:
+def torque_harmonics(cycle: Gas, cylinders: Cylinders, highest: int) -> Complex:
     """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row per shape."""
     theta, torque = _torque_shapes(cycle, cylinders)
     turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * highest + 1)))
@@ -260,7 +233,10 @@ class SimpleCycle(ParameterSet, kw_only=False):
         expanded = (full / start) ** n_c * (start / volume) ** n
         burning = psi[closed] >= -self.combustion_start
         found[0, closed] = np.where(burning, expanded, compressed)
-        found[2, closed] = (n - 1.0) * heat_integral(self, cylinders, psi[closed]) / volume**n
+        edges, pieces = _heat_pieces(self, cylinders)
+        within = np.clip(psi[closed], edges[0], edges[-1])
+        heat = np.piecewise(within, [within >= edge for edge in edges[:-1]], pieces)
+        found[2, closed] = (n - 1.0) * heat / volume**n
         if self.blowdown > 0.0:
             with np.errstate(over="ignore"):  # a very short blowdown
                 share = np.clip((psi[closed] - self.exhaust_opening) / self.blowdown, 0.0, 1.0)
@@ -305,7 +281,7 @@ class SimpleCycle(ParameterSet, kw_only=False):
         clearance = cylinders.displacement / (self.compression_ratio - 1.0)
         return clearance + cylinders.stroke_volume(psi)
 
-    def _rate(self, cylinders: Cylinders, psi: Vector) -> Vector:
+    def rate(self, cylinders: Cylinders, psi: Vector) -> Vector:
         """V^(n-1) dx/dpsi, x the share burnt."""
         tau = np.clip((psi + self.combustion_start) / self.combustion_duration, 0.0, 1.0)
         m = self.vibe_exponent
@@ -314,33 +290,16 @@ class SimpleCycle(ParameterSet, kw_only=False):
         return np.asarray(self._volume(cylinders, psi) ** (self.expansion_exponent - 1.0) * per_angle)
 
 
-def heat_integral(cycle: SimpleCycle, cylinders: Cylinders, psi: Vector) -> Vector:
-    """Integral of V^(n-1) dx from the start of the combustion to psi."""
-    edges, series, before = _heat_series(cycle, cylinders)
-    found = np.zeros(psi.shape)
-    for k, coefficients in enumerate(series):
-        here = (psi >= edges[k]) & (psi < edges[k + 1])
-        x = (2.0 * psi[here] - edges[k] - edges[k + 1]) / (edges[k + 1] - edges[k])
-        found[here] = before[k] + chebyshev.chebval(x, coefficients)
-    found[psi >= edges[-1]] = before[-1]
-    return found
-
-
 @lru_cache(maxsize=16)
-def _heat_series(cycle: SimpleCycle, cylinders: Cylinders) -> tuple[Vector, list[Vector], list[float]]:
-    """Edges of the pieces, Chebyshev series of the integral within each, and its value where each begins."""
+def _heat_pieces(cycle: SimpleCycle, cylinders: Cylinders) -> tuple[Vector, list[Chebyshev]]:
+    """Edges of the pieces and, within each, the integral of V^(n-1) dx from the start of the combustion."""
     edges = cycle.combustion_duration * np.array(GRADES) - cycle.combustion_start
-    x = chebyshev.chebpts1(DEGREE + 1)
-    fit = chebyshev.chebvander(x, DEGREE).T * (2.0 / (DEGREE + 1))  # exact at the Chebyshev points
-    fit[0] *= 0.5
-    series: list[Vector] = []
-    before = [0.0]
-    for low, high in pairwise(edges.tolist()):
-        half = 0.5 * (high - low)
-        rate = fit @ cycle._rate(cylinders, low + half * (x + 1.0))
-        series.append(np.asarray(chebyshev.chebint(rate * half, lbnd=-1), dtype=np.float64))
-        before.append(before[-1] + float(chebyshev.chebval(1.0, series[-1])))
-    return edges, series, before
+    pieces, before = [], 0.0
+    for low, high in pairwise(edges):
+        rate = Chebyshev.interpolate(lambda psi: cycle.rate(cylinders, psi), DEGREE, (low, high))
+        pieces.append(rate.integ(lbnd=low, k=before))
+        before = pieces[-1](high)
+    return edges, pieces
 
 
 @dataclass(frozen=True)
@@ -439,3 +398,6 @@ def _errors(angles: Vector, pressures: Vector) -> list[str]:
         i = int(np.argmax(pressures <= 0.0))
         wrong.append(f"pressure {i + 1} = {pressures[i]:g} Pa: an absolute pressure is above 0.")
     return wrong
+
+
+Gas = SimpleCycle | MeasuredCycle  # where the pressure comes from

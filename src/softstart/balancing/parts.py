@@ -13,18 +13,6 @@ from softstart.balancing.slider_crank import SliderCrank
 from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, Series, parameter
 from softstart.quantities import show
 
-__all__ = [
-    "CYCLE_ANGLE",
-    "BalancerShaft",
-    "Counterweights",
-    "Cylinders",
-    "Layout",
-    "Masses",
-    "Operation",
-    "Quantity",
-]
-
-Quantity = float | str  # a number in SI, or a string with a unit
 TURN = 2.0 * math.pi
 CYCLE_ANGLE = 2.0 * TURN  # a four-stroke cycle
 SAME = 1e-6  # rad: angles nearer than this are one

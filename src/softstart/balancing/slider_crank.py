@@ -67,8 +67,8 @@ class SliderCrank:
         return np.sqrt(1.0 - (self.ratio * np.sin(phi)) ** 2)
 
 
-def samples_needed(ratio: float) -> int:
-    """So many samples of a revolution that the harmonics are exact to rounding.
+def samples_needed(ratio: float, orders: int = 0) -> int:
+    """So many samples of a revolution that the harmonics up to `orders` are exact to rounding.
 
     The rod's square root is singular at sin(phi) = 1/lambda, arccosh(1/lambda) off the real axis: harmonics
     fall by that factor an order.
@@ -76,8 +76,7 @@ def samples_needed(ratio: float) -> int:
     >>> samples_needed(0.3), samples_needed(0.95)
     (64, 256)
     """
-    decay = math.acosh(1.0 / ratio)
-    return int(2 ** math.ceil(math.log2(max(32.0, 80.0 / decay))))
+    return int(2 ** math.ceil(math.log2(max(32.0, 80.0 / math.acosh(1.0 / ratio), 2 * orders + 2))))
 
 
 @lru_cache(maxsize=64)
@@ -89,12 +88,11 @@ def acceleration_harmonics(ratio: float, orders: int) -> tuple[float, ...]:
     >>> [round(a, 6) for a in acceleration_harmonics(0.25, 4)]
     [0.0, 1.0, 0.254025, 0.0, -0.004098]
     """
-    n = max(samples_needed(ratio), 2 ** math.ceil(math.log2(2 * orders + 2)))
-    phi = 2.0 * np.pi * np.arange(n) / n
-    found = -2.0 / n * np.fft.rfft(SliderCrank(ratio, 1.0).curvature(phi) / ratio).real
-    found[0] = 0.0
-    found[3::2] = 0.0  # by symmetry
-    return tuple(float(a) for a in found[: orders + 1])
+    n = samples_needed(ratio, orders)
+    acceleration = SliderCrank(1.0, 1.0 / ratio).curvature(2.0 * np.pi * np.arange(n) / n)
+    found = -2.0 / n * np.fft.rfft(acceleration).real[: orders + 1]
+    found[0] = found[3::2] = 0.0  # by symmetry
+    return tuple(found.tolist())
 
 
 @lru_cache(maxsize=64)
@@ -106,10 +104,8 @@ def inertia_torque_harmonics(ratio: float, orders: int) -> tuple[float, ...]:
     >>> [round(b, 6) for b in inertia_torque_harmonics(0.25, 4)]
     [0.0, 0.063506, -0.50013, -0.192056, -0.016129]
     """
-    n = max(2 * samples_needed(ratio), 2 ** math.ceil(math.log2(2 * orders + 2)))
-    phi = 2.0 * np.pi * np.arange(n) / n
-    crank = SliderCrank(ratio, 1.0)
-    torque = -crank.slope(phi) * crank.curvature(phi) / ratio**2
-    found = -2.0 / n * np.fft.rfft(torque).imag
+    n = 2 * samples_needed(ratio, orders)
+    phi, crank = 2.0 * np.pi * np.arange(n) / n, SliderCrank(1.0, 1.0 / ratio)
+    found = 2.0 / n * np.fft.rfft(crank.slope(phi) * crank.curvature(phi)).imag[: orders + 1]
     found[0] = 0.0
-    return tuple(float(b) for b in found[: orders + 1])
+    return tuple(found.tolist())

@@ -16,7 +16,7 @@ from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import one_of
 from softstart.cli.options import count, reading
 from softstart.cli.running import Answer, answers, working
-from softstart.clutch import LAWS, Clutch, engage, optimize_engagement
+from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.laws import read_law
 from softstart.clutch.model import LIBRARY as CLUTCHES
 from softstart.errors import InputError
@@ -73,15 +73,17 @@ def clutch(
         what = "--nondecreasing" if points is None else f'--points = "{points}"'
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
     clutch = clutch.replace(**law) if law else clutch
-    from softstart.views.clutches import engagement_sheet, front_sheet
+    from softstart.study import find_study
+    from softstart.views.clutches import engagement_sheet
 
     if not optimal:
         run = engage(clutch, until=until)
         return run.summary, engagement_sheet(run)
+    study: Any = find_study("paper-c")
     with working("looking for the best laws ...") as progress:
         law_class, most = "nondecreasing" if nondecreasing else "any", points or DEFAULT_POINTS
-        front = optimize_engagement(clutch, most, law_class=law_class, progress=progress)
-    return front.summary, front_sheet(front)
+        front = study.optimize_engagement(clutch, most, law_class=law_class, progress=progress)
+    return front.summary, front.sheet()
 
 
 def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:

@@ -9,8 +9,7 @@
 from __future__ import annotations
 
 from softstart.clutch.engagement import Engagement, engage
-from softstart.clutch.front import EngagementFront, optimize_engagement
 from softstart.clutch.laws import LAWS, Law
 from softstart.clutch.model import Clutch
 
-__all__ = ["LAWS", "Clutch", "Engagement", "EngagementFront", "Law", "engage", "optimize_engagement"]
+__all__ = ["LAWS", "Clutch", "Engagement", "Law", "engage"]

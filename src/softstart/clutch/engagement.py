@@ -1,18 +1,16 @@
 """One engagement of a clutch: from rest through slip, lock-up and slip again, its figures and its energy.
 
-A step ends at the end of a piece of the law, at the end of the run, or where an event function reaches zero;
-the first of these is found without missing any (`polynomials`). Where several event functions are zero at the
-beginning of a step already, the sign is that of their first term that is more than rounding. Peaks are at the
-roots of T', work comes from the products of the series: no output grid.
+A step ends at the end of a piece of the law, at the end of the run, or where an event function crosses zero
+(`motion`). Peaks are at the roots of T', work comes from the products of the series: no output grid.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -22,18 +20,17 @@ from softstart.arrays import Vector
 from softstart.clutch.laws import Law
 from softstart.clutch.model import Clutch
 from softstart.clutch.motion import (
-    LOCKED,
-    POWERS,
     Mode,
-    Motion,
     State,
+    Step,
     event_functions,
+    first_crossing,
     follow,
-    motion,
+    roots,
     start_mode,
-    step_of,
+    step_from,
+    values,
 )
-from softstart.clutch.polynomials import definite, definite_integral, first_root, leading, roots, value
 from softstart.errors import InputError, SimulationError
 from softstart.quantities import to_si
 
@@ -53,105 +50,6 @@ class Event:
 
     t: float
     name: str
-
-
-@dataclass
-class History:
-    """All steps of an engagement and what happened between them."""
-
-    steps: list[Motion] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    lost_at_release: float = 0.0  # J left in a damped flank when it separates, lost in its own damper
-    locked_at: float = math.nan  # first lock-up, s
-    mode: Mode = field(default_factory=lambda: Mode(1, 1, None))  # at the end
-
-
-def history(clutch: Clutch, law: Law, until: float | None, time_limit: float) -> History:
-    """The engagement up to `until`, or else until its end.
-
-    The end is one period 2 pi sqrt(Ic/cp) after the first lock-up, with a gap not before the twist has
-    reversed twice, and never while the clutch slips again. An engagement that does not get there ends at
-    `time_limit`.
-    """
-    found = History()
-    state, mode = State(), start_mode(clutch)
-    period = 2.0 * math.pi / clutch.locked_frequency
-    last = until if until is not None else time_limit
-    watched, reversals, direction, at_once = math.inf, 0, 0.0, 0
-    while state.t < last:
-        if len(found.steps) >= MOST_STEPS:
-            raise SimulationError(
-                f"The engagement was given up at {state.t:.6g} s: {MOST_STEPS} steps were not enough; end it "
-                "sooner with until, or make the shaft less stiff."
-            )
-        step, event = _next(clutch, law, state, mode, min(last, watched) if state.t < watched else last)
-        M = step.M[0] if step.h == 0.0 else float(step.M @ step.h**POWERS)
-        if step.h > 0.0:
-            found.steps.append(step)
-            at_once = 0
-        state = step.after()
-        if event:
-            at_once += 1
-            if at_once > MOST_AT_ONCE:
-                raise SimulationError(
-                    f"The engagement was given up at {state.t:.6g} s: {MOST_AT_ONCE} changes at one instant."
-                )
-            found.lost_at_release += _left(clutch, event, state, mode)
-            state, mode, name = follow(clutch, event, state, mode, M)
-            if name:
-                found.events.append(Event(state.t, name))
-            if mode.slip == LOCKED and math.isnan(found.locked_at):
-                found.locked_at, watched = state.t, state.t + period
-                reversals, direction = 0, 0.0
-        if abs(state.v) > STILL * clutch.drive_speed and state.v * direction <= 0.0:
-            reversals, direction = reversals + (direction != 0.0), math.copysign(1.0, state.v)
-        complete = clutch.gap == 0.0 or reversals >= REVERSALS
-        if until is None and mode.slip == LOCKED and state.t >= watched and complete:
-            break
-    found.mode = mode
-    return found
-
-
-def _left(clutch: Clutch, event: str, state: State, mode: Mode) -> float:
-    """Energy in J that a damped flank still holds where it separates; negative back in contact."""
-    if event not in ("open", "pressed") or clutch.damping == 0.0:
-        return 0.0
-    side = mode.side if event == "open" else mode.pressed
-    inside = side * state.theta - 0.5 * clutch.gap
-    energy = 0.5 * clutch.stiffness * inside**2
-    return energy if event == "open" else -energy
-
-
-def _next(clutch: Clutch, law: Law, state: State, mode: Mode, last: float) -> tuple[Motion, str]:
-    """The step from here to whatever comes first, and the event function that ends it, if one does."""
-    index = law.index(state.t)
-    piece = law.pieces[index]
-    end = law.starts[index + 1] if index + 1 < len(law.pieces) else math.inf
-    end = min(end, last)
-    h = end - state.t
-    longest = step_of(clutch, mode, piece)
-    whole = h <= longest
-    if not whole:
-        h /= math.ceil(h / longest)
-    if not math.isfinite(h):
-        raise SimulationError("The engagement never ends; give until.")
-    step = motion(clutch, state, mode, piece, h, end if whole else state.t + h)
-    powers = h**POWERS
-    name, share = "", 1.0
-    jitter = ROUNDING * state.t / h
-    for one, a in event_functions(clutch, step):
-        scaled = a * powers
-        first = leading(scaled, jitter)
-        if first == scaled.size:
-            continue
-        if scaled[first] > 0.0:
-            return step.shorter(0.0), one
-        root = first_root(scaled, jitter)
-        if root is not None and root < share:
-            name, share = one, root
-    if name:
-        return step.shorter(h * share), name
-    return step, ""
 
 
 @dataclass(frozen=True)
@@ -222,7 +120,7 @@ class Engagement:
         Spans of slip and of lock.
     events : tuple of Event
         All changes of mode.
-    steps : tuple of Motion
+    steps : tuple of Step
         The Taylor series of all steps.
 
     References
@@ -252,7 +150,7 @@ class Engagement:
     energy: EnergyBalance
     phases: tuple[Phase, ...]
     events: tuple[Event, ...]
-    steps: tuple[Motion, ...]
+    steps: tuple[Step, ...]
 
     @property
     def peak_ratio(self) -> float:
@@ -273,13 +171,13 @@ class Engagement:
         """
         when = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
         names = ("M", "F", "T", "theta", "v", "wM", "wc")
+        which = np.searchsorted([step.start for step in self.steps[1:]], when, side="right")
         out = {name: np.empty(when.size) for name in names}
-        starts = [step.state.t for step in self.steps]
-        for i, t in enumerate(when.tolist()):
-            step = self.steps[max(bisect_right(starts, t) - 1, 0)]
-            powers = min(max(t - step.state.t, 0.0), step.h) ** POWERS
+        for index in np.unique(which):
+            step, here = self.steps[index], which == index
+            u = np.clip((when[here] - step.start) / step.length, 0.0, 1.0)
             for name in names:
-                out[name][i] = getattr(step, name) @ powers
+                out[name][here] = values(getattr(step, name), u)
         out["slip"] = self.clutch.drive_speed - out["wM"]
         return out
 
@@ -288,7 +186,7 @@ class Engagement:
         """Instants in s for plots: 24 in each step, 8 where there are many steps."""
         count = 24 if len(self.steps) < MANY else 8
         shares = np.arange(count) / count
-        inner = [step.state.t + step.h * shares for step in self.steps]
+        inner = [step.start + step.length * shares for step in self.steps]
         return np.concatenate([*inner, [self.end_time]])
 
     def summary(self) -> dict[str, Any]:
@@ -321,83 +219,6 @@ class Engagement:
         from softstart.views import clutches as views
 
         return views.engagement_figure([self], self.clutch.name)
-
-
-def figures_of(clutch: Clutch, law: Law, found: History) -> Engagement:
-    """The figures of a history."""
-    totals = _Totals(clutch, law.engaged_at)
-    for step in found.steps:
-        totals.add(step)
-    last = found.steps[-1].after()
-    elastic = 0.0
-    mode = found.mode
-    flank = mode.side or mode.pressed
-    if flank:
-        elastic = 0.5 * clutch.stiffness * (last.theta - 0.5 * flank * clutch.gap) ** 2
-    if mode.side == 0:
-        elastic = 0.0  # compressed without torque: counted as lost at the release
-    kinetic = 0.5 * (clutch.clutch_inertia * last.wM**2 + clutch.load_inertia * last.wc**2)
-    energy = EnergyBalance(
-        totals.drive, totals.friction, totals.damping + found.lost_at_release, totals.load, kinetic, elastic
-    )
-    phases = tuple(totals.phases)
-    slipping = [p for p in phases if p.start < found.locked_at or math.isnan(found.locked_at)]
-    locked = [p for p in phases if p.start >= found.locked_at]
-    top = max(phases, key=lambda p: p.peak_torque)
-    slip_top = max(slipping, key=lambda p: p.peak_torque)
-    return Engagement(
-        clutch=clutch, law=law, status="LOCKED" if mode.slip == LOCKED else "SLIPS",
-        slip_time=found.locked_at, end_time=found.steps[-1].end,
-        peak_torque=top.peak_torque, peak_time=top.peak_time,
-        slip_peak_torque=slip_top.peak_torque, slip_peak_time=slip_top.peak_time,
-        locked_peak_torque=max((p.peak_torque for p in locked), default=math.nan),
-        friction_work=totals.friction, slip_work=sum(p.friction_work for p in slipping),
-        work_while_engaging=totals.engaging,
-        energy=energy, phases=phases, events=tuple(found.events), steps=tuple(found.steps),
-    )  # fmt: skip
-
-
-class _Totals:
-    """Adds up work and keeps peaks, step by step."""
-
-    def __init__(self, clutch: Clutch, engaged_at: float) -> None:
-        self.clutch = clutch
-        self.engaged_at = engaged_at
-        self.drive = self.friction = self.damping = self.load = self.engaging = 0.0
-        self.phases: list[Phase] = []
-
-    def add(self, step: Motion) -> None:
-        clutch, h = self.clutch, step.h
-        self.drive += clutch.drive_speed * definite_integral(step.F, h)
-        self.load += step.R * definite_integral(step.wc, h)
-        if clutch.damping > 0.0 and step.mode.side != 0:
-            self.damping += clutch.damping * definite(step.v, step.v, h)
-        work = 0.0
-        if step.mode.slip != LOCKED:
-            slip = -step.wM
-            slip[0] += clutch.drive_speed
-            work = definite(step.F, slip, h)
-        self.friction += work
-        if step.state.t < self.engaged_at:
-            self.engaging += work
-        kind = "locked" if step.mode.slip == LOCKED else "slip"
-        if not self.phases or self.phases[-1].kind != kind:
-            self.phases.append(Phase(kind, step.state.t, step.end, 0.0, step.state.t, 0.0))
-        before = self.phases[-1]
-        top, when = peak_of(step, before.peak_torque)
-        if top <= before.peak_torque * SAME:  # of equal peaks the first
-            top, when = before.peak_torque, before.peak_time
-        self.phases[-1] = Phase(kind, before.start, step.end, top, when, before.friction_work + work)
-
-
-def peak_of(step: Motion, known: float = 0.0) -> tuple[float, float]:
-    """Largest |T| of the step and its instant; (0, its begin) if it is no larger than `known`."""
-    scaled = step.T * step.h**POWERS
-    if np.abs(scaled).sum() <= known:
-        return 0.0, step.state.t
-    instants: Sequence[float] = [0.0, *roots(scaled[1:] * POWERS[1:]), 1.0]
-    best = max(instants, key=lambda u: abs(value(scaled, u)))
-    return abs(value(scaled, best)), step.state.t + best * step.h
 
 
 def engage(clutch: Clutch, *, until: float | str | None = None) -> Engagement:
@@ -444,6 +265,136 @@ def engage(clutch: Clutch, *, until: float | str | None = None) -> Engagement:
         if not end > 0.0:
             raise InputError(f"until = {until!r}: the end of the run is a time above 0 s.")
     law = clutch.friction
+    events: list[Event] = []
+    steps, mode, lost = _steps(clutch, law, end, events)
+    return _figures(clutch, law, steps, events, mode, lost)
+
+
+def _time_limit(clutch: Clutch, law: Law) -> float:
+    """When an engagement is given up, s: by far later than a rigid shaft is at speed."""
+    inertia = clutch.clutch_inertia + clutch.load_inertia
+    needed = clutch.drive_speed * inertia + clutch.load_torque * law.engaged_at
     periods = 2.0 * math.pi / clutch.locked_frequency + 2.0 * math.pi / clutch.B
-    limit = PATIENCE * (max(clutch.rigid_slip_time, law.engaged_at) + periods)
-    return figures_of(clutch, law, history(clutch, law, end, limit))
+    return PATIENCE * (law.engaged_at + needed / (law.held - clutch.load_torque) + periods)
+
+
+def _steps(
+    clutch: Clutch, law: Law, until: float | None, events: list[Event]
+) -> tuple[list[Step], Mode, float]:
+    """The steps up to `until` or the end, the last mode, and the energy in J lost as damped flanks separate.
+
+    The end is one period 2 pi sqrt(Ic/cp) after the first lock-up, with a gap not before the twist has
+    reversed twice, and never while the clutch slips again. An engagement that does not get there ends at the
+    time limit.
+    """
+    steps: list[Step] = []
+    state, mode = State(), start_mode(clutch)
+    last = _time_limit(clutch, law) if until is None else until
+    watched = math.inf  # until then at least, once it has locked
+    lost, reversals, direction, at_once = 0.0, 0, 0.0, 0
+    while state.t < last:
+        if len(steps) >= MOST_STEPS:
+            raise SimulationError(
+                f"The engagement was given up at {state.t:.6g} s: {MOST_STEPS} steps were not enough; end it "
+                "sooner with until, or make the shaft less stiff."
+            )
+        step = step_from(clutch, law, state, mode, min(last, watched) if state.t < watched else last)
+        step, name = _first_event(clutch, step)
+        if step.length > 0.0:
+            steps.append(step)
+            state, at_once = step.after(), 0
+        if name:
+            at_once += 1
+            if at_once > MOST_AT_ONCE:
+                raise SimulationError(
+                    f"The engagement was given up at {state.t:.6g} s: {MOST_AT_ONCE} changes at one instant."
+                )
+            lost += mode.elastic_energy(clutch, state.theta)
+            state, mode, event = follow(clutch, name, state, mode, float(step.M.sum()))
+            lost -= mode.elastic_energy(clutch, state.theta)
+            if event:
+                events.append(Event(state.t, event))
+            if event == "locked" and watched == math.inf:
+                watched = state.t + 2.0 * math.pi / clutch.locked_frequency
+                reversals, direction = 0, 0.0
+        v = state.wM - state.wc
+        if abs(v) > STILL * clutch.drive_speed and v * direction <= 0.0:
+            reversals, direction = reversals + (direction != 0.0), math.copysign(1.0, v)
+        complete = clutch.gap == 0.0 or reversals >= REVERSALS
+        if until is None and mode.locked and state.t >= watched and complete:
+            break
+    return steps, mode, lost
+
+
+def _first_event(clutch: Clutch, step: Step) -> tuple[Step, str]:
+    """The step up to the first event within it, and the event function; the whole step without one."""
+    name, share = "", math.inf
+    jitter = ROUNDING * step.start / step.length
+    for one, a in event_functions(clutch, step):
+        u = first_crossing(a, jitter)
+        if u is not None and u < share:
+            name, share = one, u
+    return (step.cut(share) if name else step), name
+
+
+def _figures(
+    clutch: Clutch, law: Law, steps: list[Step], events: list[Event], mode: Mode, lost: float
+) -> Engagement:
+    """Peaks, work and energy of the steps."""
+    drive, load, damping = 0.0, 0.0, lost
+    works = [0.0 if step.mode.locked else _integral(step, step.F, _slip(clutch, step)) for step in steps]
+    for step in steps:
+        drive += clutch.drive_speed * _integral(step, step.F)
+        load += step.R * _integral(step, step.wc)
+        if clutch.damping > 0.0 and step.mode.presses:
+            damping += clutch.damping * _integral(step, step.v, step.v)
+    end = steps[-1].after()
+    kinetic = 0.5 * (clutch.clutch_inertia * end.wM**2 + clutch.load_inertia * end.wc**2)
+    elastic = mode.elastic_energy(clutch, end.theta)
+    phases = []
+    for locked, group in groupby(zip(steps, works, strict=True), lambda one: one[0].mode.locked):
+        parts, done = zip(*group, strict=True)
+        peak, when = _peak(parts)
+        phases.append(
+            Phase("locked" if locked else "slip", parts[0].start, parts[-1].end, peak, when, sum(done))
+        )
+    slip_time = next((event.t for event in events if event.name == "locked"), math.nan)
+    slipping = [phase for phase in phases if not phase.start >= slip_time]
+    top, slip_top = (max(some, key=lambda phase: phase.peak_torque) for some in (phases, slipping))
+    return Engagement(
+        clutch=clutch, law=law, status="LOCKED" if mode.locked else "SLIPS",
+        slip_time=slip_time, end_time=end.t,
+        peak_torque=top.peak_torque, peak_time=top.peak_time,
+        slip_peak_torque=slip_top.peak_torque, slip_peak_time=slip_top.peak_time,
+        locked_peak_torque=max((p.peak_torque for p in phases if p.start >= slip_time), default=math.nan),
+        friction_work=sum(works), slip_work=sum(phase.friction_work for phase in slipping),
+        work_while_engaging=sum(
+            work for step, work in zip(steps, works, strict=True) if step.start < law.engaged_at
+        ),
+        energy=EnergyBalance(drive, sum(works), damping, load, kinetic, elastic),
+        phases=tuple(phases), events=tuple(events), steps=tuple(steps),
+    )  # fmt: skip
+
+
+def _slip(clutch: Clutch, step: Step) -> Vector:
+    """w0 - wM."""
+    return np.append(clutch.drive_speed - step.wM[0], -step.wM[1:])
+
+
+def _integral(step: Step, a: Vector, b: Vector | None = None) -> float:
+    """Integral over the step of one series, or of the product of two, every term of it."""
+    product = a if b is None else np.convolve(a, b)
+    return step.length * float((product / np.arange(1, product.size + 1)).sum())
+
+
+def _peak(steps: Iterable[Step]) -> tuple[float, float]:
+    """Largest |T| of the steps and its instant; of equal peaks the first."""
+    top, when = 0.0, 0.0
+    for step in steps:
+        if np.abs(step.T).sum() <= top:
+            continue
+        u = np.concatenate([[0.0], roots(step.T[1:] * np.arange(1, step.T.size)), [1.0]])
+        sizes = np.abs(values(step.T, u))
+        if sizes.max() > top * SAME:
+            top, when = float(sizes.max()), step.start + float(u[sizes.argmax()]) * step.length
+    return top, when

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import math
 import os
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -83,14 +81,10 @@ class Law:
         """The torque that is held at last, N m."""
         return self.pieces[-1].a
 
-    @cached_property
-    def starts(self) -> list[float]:
-        """Where the pieces begin, s."""
-        return [piece.start for piece in self.pieces]
-
-    def index(self, t: float) -> int:
-        """Number of the piece that acts from the instant t on."""
-        return max(bisect_right(self.starts, t) - 1, 0)
+    def piece_at(self, t: float) -> tuple[Piece, float]:
+        """The piece that acts from the instant t on, and the instant at which it ends (s)."""
+        index = sum(piece.start <= t for piece in self.pieces[1:])
+        return self.pieces[index], (*(piece.start for piece in self.pieces[1:]), math.inf)[index]
 
     def torque(self, t: ArrayLike) -> Vector:
         """M at the instants t (s), in N m; at a step, the torque behind it.
@@ -99,7 +93,7 @@ class Law:
         [0.0, 30.0, 60.0]
         """
         times = np.asarray(t, dtype=np.float64)
-        values = [self.pieces[self.index(one)].torque(one) for one in times.ravel().tolist()]
+        values = [self.piece_at(one)[0].torque(one) for one in times.ravel().tolist()]
         return np.array(values).reshape(times.shape)
 
 

@@ -164,19 +164,6 @@ class Clutch(ParameterSet, kw_only=False):
         """Elastic frequency once the clutch has locked, rad/s: sqrt(cp/Ic)."""
         return math.sqrt(self.stiffness / self.load_inertia)
 
-    @property
-    def rigid_slip_time(self) -> float:
-        """Slip time in s on a rigid shaft, if behind tM: w0 (IM + Ic) = integral of M - Mc."""
-        law, needed = self.friction, self.drive_speed * (self.clutch_inertia + self.load_inertia)
-        t, given = 0.0, 0.0
-        for piece, end in zip(law.pieces[:-1], law.starts[1:], strict=True):
-            s = end - piece.start
-            gained = (piece.a - self.load_torque + (piece.b / 2.0 + piece.q * s / 3.0) * s) * s
-            if piece.e:
-                gained += piece.e * (piece.T * math.expm1(s / piece.T) - s)
-            given, t = given + gained, end
-        return t + (needed - given) / (law.held - self.load_torque)
-
     def summary(self) -> dict[str, Any]:
         """The parameters as plain data, for JSON."""
         return {p.name: getattr(self, p.name) for table in self.TABLES for p in table.parameters}

@@ -5,9 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from softstart.balancing import Balance
+from softstart.balancing.design import free_force
 from softstart.study import Claim, Verdict
-from softstart_studies.paper_b import convergence, over_speed, printed, sensitivity
-from softstart_studies.paper_b.vaz import RPM, TUNING, VAZ, balanced, first_order
+from softstart_studies.paper_b.orders import series_difference
+from softstart_studies.paper_b.tables import curves
+from softstart_studies.paper_b.vaz import (
+    FORCE,
+    MOMENTS,
+    RADIUS,
+    RPM,
+    TUNING,
+    VAZ,
+    balanced,
+    first_order,
+    left_at_load,
+    pressure_needed,
+    sine_at_corners,
+)
 
 TINY = 1e-9  # N or N m: rounding
 
@@ -52,8 +66,7 @@ def forces_vanish(found: Balance) -> Claim:
         "centrifugal forces and the first-order inertia force completely.",
         Verdict.CONFIRMED if fixed.force.max() < TINY else Verdict.REFUTED,
         f"First order at 4500 rpm: {bare:.0f} N without anything, {none.force[i]:.0f} N with the "
-        "counterweights, "
-        f"{tiny(fixed.force[i])} N with the shafts too. The even orders stay: up to "
+        f"counterweights, {tiny(fixed.force[i])} N with the shafts too. The even orders stay: up to "
         f"{fixed.all_forces[i]:.0f} N.",
     )
 
@@ -66,17 +79,15 @@ def gas_orders() -> Claim:
         "(2): the gas torque of z evenly firing cylinders has the orders k z/2 only.",
         Verdict.CONFIRMED if halves < TINY < harmonics[2] else Verdict.REFUTED,
         f"Two cylinders: orders 1, 2, 3 of {harmonics[2]:.1f}, {harmonics[4]:.1f}, {harmonics[6]:.1f} N m; "
-        "the "
-        f"orders 1/2, 3/2 .. of at most {tiny(halves)} N m. In (2) the sums of A and B are those of one "
-        "cylinder, "
-        "times z.",
+        f"the orders 1/2, 3/2 .. of at most {tiny(halves)} N m. In (2) the sums of A and B are those of "
+        "one cylinder, times z.",
     )
 
 
 def inertia_orders() -> Claim:
     """The inertia torque as a sum of sines."""
     ratio = VAZ.cylinders.crank.ratio
-    difference = convergence.differences(ratio)[1]
+    difference = series_difference(ratio)
     phi = np.linspace(0.0, 2.0 * np.pi, 97)
     w = TUNING * RPM
     harmonics = w**2 * VAZ.inertia_harmonics
@@ -85,36 +96,33 @@ def inertia_orders() -> Claim:
     return Claim(
         "(3): the inertia torque is a sum of sines, m r^2 w^2 sum B_k sin k(phi + theta (i-1)).",
         Verdict.CONFIRMED if error < 1e-8 and difference < 1e-12 else Verdict.REFUTED,
-        f"24 orders meet the exact crank drive within {tiny(error)} N m; B_k by FFT and by the power series "
-        "in "
-        f"lambda = {ratio:.4f} differ by {tiny(difference)}. B_1 = {-harmonics[2].imag:.1f} N m at 4500 rpm.",
+        f"24 orders meet the exact crank drive within {tiny(error)} N m; B_k by FFT and by the power "
+        f"series in lambda = {ratio:.4f} differ by {tiny(difference)}. B_1 = {-harmonics[2].imag:.1f} N m "
+        "at 4500 rpm.",
     )
 
 
 def formula_4() -> Claim:
     """The balancing force."""
-    whole, shafts = printed.imbalances()
-    given = printed.printed_imbalance()
-    mass = given / VAZ.cylinders.crank.r
+    shafts, given = abs(free_force(VAZ)), FORCE / RPM**2
+    whole, mass = 2.0 * shafts, given / RADIUS
     return Claim(
         "(4): the two-shaft mechanism makes F_b = 4.98e-4 n^2 N.",
         Verdict.PARTLY,
         f"That is m r = {given:.4f} kg m, {mass:.2f} kg on 35.5 mm. With the masses assumed the whole "
-        "first-order "
-        f"force has {whole:.4f} kg m ({100 * (given / whole - 1):+.0f} %), so (4) fits shafts and "
-        "counterweights "
-        f"together. The shafts alone carry half, {shafts:.4f} kg m; for (4) to be theirs a cylinder would "
-        "need "
-        f"{mass:.2f} kg of reciprocating mass instead of {VAZ.masses.reciprocating:g} kg.",
+        f"first-order force has {whole:.4f} kg m ({100 * (given / whole - 1):+.0f} %), so (4) fits shafts "
+        f"and counterweights together. The shafts alone carry half, {shafts:.4f} kg m; for (4) to be "
+        f"theirs a cylinder would need {mass:.2f} kg of reciprocating mass instead of "
+        f"{VAZ.masses.reciprocating:g} kg.",
     )
 
 
 def formula_5() -> Claim:
     """The balancing moment, both readings."""
-    span = sensitivity.corners()
-    sine = first_order(VAZ, TUNING)[1]
-    low, high = span.sine
-    readings = sensitivity.readings()
+    sine = first_order()[1]
+    low, high = sine_at_corners()
+    moments = [(name, moment * TUNING**2) for name, moment in MOMENTS]
+    readings = [(name, moment, 1e-5 * pressure_needed(moment)) for name, moment in moments]
     within = [name for name, moment, _ in readings if low <= moment <= high]
     said = "; ".join(
         f"read with {name} it is {moment:.1f} N m, which needs a mean indicated pressure of {pressure:.1f} "
@@ -122,34 +130,30 @@ def formula_5() -> Claim:
         for name, moment, pressure in readings
     )
     assumed = 1e-5 * VAZ.indicated_work(TUNING * RPM, 1.0) / VAZ.displacement
-    h = [1e3 * printed.printed_arm(moment / TUNING**2) for _, moment, _ in readings]
+    h = [1e3 * moment / FORCE for _, moment in MOMENTS]
     return Claim(
         "(5): at the tuning speed the shafts' moment 2.099e-5 n^2 (or e-6) N m balances the first-order "
-        "reaction "
-        "torque.",
+        "reaction torque.",
         Verdict.PARTLY if within else Verdict.REFUTED,
         f"By (4) and (5) h is {h[0]:.1f} or {h[1]:.2f} mm. The model has {sine:.1f} N m ({low:.0f} to "
-        f"{high:.0f} "
-        f"over the corners of what is assumed); (5) {said}. Assumed are {assumed:.1f} bar.",
+        f"{high:.0f} over the corners of what is assumed); (5) {said}. Assumed are {assumed:.1f} bar.",
     )
 
 
 def speed_dependence(found: Balance) -> Claim:
     """How gas and inertia depend on the speed."""
-    curves = over_speed.curves(found)
-    spread = over_speed.spread(curves.gas)
+    one = curves(found)
+    spread = float(100.0 * np.ptp(one.gas) / one.gas.mean())
     light = abs(VAZ.gas_harmonics(TUNING * RPM, 0.0)[2])
     full = abs(VAZ.gas_harmonics(TUNING * RPM, 1.0)[2])
     return Claim(
         "Inertia and balancing moments grow with n^2, the gas moment hardly depends on n.",
         Verdict.PARTLY if spread > 5.0 or light < 0.5 * full else Verdict.CONFIRMED,
-        f"The first two exactly. The gas moment of first order is {curves.gas.min():.0f} to "
-        f"{curves.gas.max():.0f} "
-        f"N m over the speeds at full load (the assumed torque curve), {spread:.0f} % of its mean, while "
-        "that of "
-        f"inertia grows from {curves.inertia.min():.1f} to {curves.inertia.max():.1f}; but it depends on "
-        "the load: "
-        f"{full:.0f} N m at full load, {light:.0f} at load 0 (4500 rpm).",
+        f"The first two exactly. The gas moment of first order is {one.gas.min():.0f} to "
+        f"{one.gas.max():.0f} N m over the speeds at full load (the assumed torque curve), {spread:.0f} % "
+        f"of its mean, while that of inertia grows from {one.inertia.min():.1f} to "
+        f"{one.inertia.max():.1f}; but it depends on the load: {full:.0f} N m at full load, {light:.0f} at "
+        "load 0 (4500 rpm).",
     )
 
 
@@ -160,37 +164,34 @@ def fixed_arm(found: Balance) -> Claim:
     assert fixed.height is not None
     assert both.offset is not None
     elsewhere = np.delete(both.first_order, i)
+    cosine, sine, amplitude = first_order()
+    equal_amplitude = float(np.hypot(cosine, sine - amplitude))
     complete = fixed.first_order[i] < TINY
     return Claim(
         "With h fixed, the balance of the first-order reaction torque is complete at the tuning speed only.",
         Verdict.CONFIRMED if complete else Verdict.PARTLY,
         f"At 4500 rpm h = {1e3 * fixed.height[i]:.1f} mm leaves {fixed.first_order[i]:.1f} of "
-        f"{none.first_order[i]:.1f} "
-        "N m: the sine goes, the cosine that the gas has stays (with M_b equal in amplitude instead, "
-        f"{over_speed.tuned_without_phase():.1f}). Shafts moved sideways too, by e = "
-        f"{1e3 * both.offset[i]:.1f} mm, "
-        f"leave {tiny(both.first_order[i])} there and at least {elsewhere.min():.1f}, at most "
-        f"{both.first_order.max():.0f} "
-        "N m at the other speeds computed.",
+        f"{none.first_order[i]:.1f} N m: the sine goes, the cosine that the gas has stays (with M_b equal "
+        f"in amplitude instead, {equal_amplitude:.1f}). Shafts moved sideways too, by e = "
+        f"{1e3 * both.offset[i]:.1f} mm, leave {tiny(both.first_order[i])} there and at least "
+        f"{elsewhere.min():.1f}, at most {both.first_order.max():.0f} N m at the other speeds computed.",
     )
 
 
 def variable_arm(found: Balance) -> Claim:
     """An arm over the speed."""
     variable, both = found.residual("variable-h"), found.residual("variable-h-e")
-    low, high = over_speed.distance(found)
-    without, left = over_speed.left_at_load(0.0, TUNING, sideways=True)
+    assert variable.height is not None
+    low, high = 1e3 * variable.height[[0, -1]]
+    without, left = left_at_load(0.0, TUNING, sideways=True)
     complete = variable.first_order.max() < TINY
     return Claim(
         "Moved so that h = h(n), the shafts balance it completely over the whole speed range.",
         Verdict.CONFIRMED if complete else Verdict.PARTLY,
         f"h(n) alone leaves {variable.first_order.min():.0f} to {variable.first_order.max():.0f} N m, the "
-        "cosine; "
-        f"h(n) and e(n) leave {tiny(both.first_order.max())}. It takes {low:.0f} mm at 850 rpm and "
-        f"{high:.0f} mm at "
-        f"5600 rpm, and holds at one load: set for full load, they leave {left:.0f} N m at load 0 and 4500 "
-        "rpm, "
-        f"where no shafts at all leave {without:.0f}.",
+        f"cosine; h(n) and e(n) leave {tiny(both.first_order.max())}. It takes {low:.0f} mm at 850 rpm and "
+        f"{high:.0f} mm at 5600 rpm, and holds at one load: set for full load, they leave {left:.0f} N m "
+        f"at load 0 and 4500 rpm, where no shafts at all leave {without:.0f}.",
     )
 
 
@@ -204,11 +205,9 @@ def inertia_alone(found: Balance) -> Claim:
     return Claim(
         "A balancer must be designed for the reaction torque of inertia and gas together.",
         Verdict.CONFIRMED if better else Verdict.REFUTED,
-        f"First order at 4500 rpm: {none.first_order[i]:.1f} N m without shafts, {alone.first_order[i]:.1f} "
-        "with an "
-        f"arm for the inertia alone, {fixed.first_order[i]:.1f} with h for both, "
-        f"{tiny(both.first_order[i])} with h "
-        "and e.",
+        f"First order at 4500 rpm: {none.first_order[i]:.1f} N m without shafts, "
+        f"{alone.first_order[i]:.1f} with an arm for the inertia alone, {fixed.first_order[i]:.1f} with h "
+        f"for both, {tiny(both.first_order[i])} with h and e.",
     )
 
 
@@ -222,6 +221,5 @@ def all_orders(found: Balance) -> Claim:
         Verdict.REFUTED if both.moment[i] > 0.5 * none.moment[i] else Verdict.CONFIRMED,
         f"Largest alternating moment at 4500 rpm with all orders: {none.moment[i]:.0f} N m without shafts, "
         f"{fixed.moment[i]:.0f} with h ({100 * (gain - 1):+.0f} %), {both.moment[i]:.0f} with h and e: the "
-        "second "
-        f"order alone is {abs(VAZ.torque_harmonics(TUNING * RPM)[4]):.0f} N m.",
+        f"second order alone is {abs(VAZ.torque_harmonics(TUNING * RPM)[4]):.0f} N m.",
     )

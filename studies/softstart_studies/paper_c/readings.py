@@ -9,17 +9,16 @@ if it meets several.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_simpson, simpson, solve_ivp
 
 from softstart.arrays import Vector
 from softstart.study import Table
-from softstart_studies.paper_c.printed import PRINTED, Row
+from softstart_studies.paper_c.printed import PRINTED
 
 w0, MM, Mc, tM, cp = 230.0, 60.0, 20.0, 1.0, 5.0  # kgf m, s
 LOADS = ("acts from t = 0", "stands until the shaft carries it", "carried by the shaft before t = 0")
@@ -44,27 +43,16 @@ POWERS = {"linear": (1.0, 0.0), "quadratic-concave": (2.0, -1.0), "quadratic-con
 NEAR = 0.02
 
 
-@dataclass(frozen=True)
-class Reading:
-    """One way of reading the paper, and what it gives: work and peak in kgf m."""
+class Reading(NamedTuple):
+    """One way of reading the paper, by its choice of each kind, and what it gives: work and peak in kgf m."""
 
     law: str
-    load: str
-    own: str
-    inertias: str
-    carried: str
-    slip: str
-    root: str
-    peak: str
+    choices: tuple[str, ...]
     L: float
     Md: float
 
-    @property
-    def choices(self) -> tuple[str, ...]:
-        """Everything but the law."""
-        return self.load, self.own, self.inertias, self.carried, self.slip, self.root, self.peak
 
-
+KINDS = ("load", "oscillation in (6)", "inertias", "carried over tM", "slip of the", "root", "peak")
 USUAL = (LOADS[0], OWN[0], INERTIAS[0], CARRIED[0], SLIPS[0], ROOTS[0], PEAKS[0])
 
 
@@ -76,10 +64,7 @@ def readings(law: str) -> tuple[Reading, ...]:
     >>> round(ours.L), round(ours.Md, 2)
     (27141, 64.66)
     """
-    return tuple(_readings(law))
-
-
-def _readings(law: str) -> Iterator[Reading]:
+    found = []
     for load, own, inertias in product(LOADS, OWN, INERTIAS):
         if load == LOADS[1] and own != OWN[0]:
             continue  # while the load stands, (6) does not hold
@@ -88,11 +73,11 @@ def _readings(law: str) -> Iterator[Reading]:
         for carried, slip, root in product(CARRIED, SLIPS, ROOTS):
             L, peaks = _slipping(start, carried, slip, root, IM, Ic)
             for peak, Md in zip(PEAKS, peaks, strict=True):
-                yield Reading(law, load, own, inertias, carried, slip, root, peak, L, Md)
+                found.append(Reading(law, (load, own, inertias, carried, slip, root, peak), L, Md))
+    return tuple(found)
 
 
-@dataclass(frozen=True)
-class _Start:
+class _Start(NamedTuple):
     """At tM: twist, its rate, both speeds; work up to here by both slips, largest torque."""
 
     z: float
@@ -190,38 +175,34 @@ def meets(value: float, printed: float) -> bool:
     return printed - 0.5 * digit <= value < printed + digit
 
 
-def explained(row: Row) -> tuple[list[Reading], list[Reading], float, float]:
-    """Readings that meet L, those that meet Md, and how many of each would by chance."""
-    every = [one for law in row.readings for one in readings(law)]
-    works = {(one.law, *one.choices[:-1]): one for one in every}
-    peaks = {(one.law, one.load, one.own, one.inertias, round(one.Md, 2)): one for one in every}
-
-    def chance(values: list[float], printed: float) -> float:
-        near = sum(abs(value / printed - 1.0) < NEAR for value in values)
-        return near * (1.5 if printed > 1000 else 0.15) / (2.0 * NEAR * printed)
-
-    return (
-        [one for one in works.values() if meets(one.L, row.L)],
-        [one for one in peaks.values() if meets(one.Md, row.Md)],
-        chance([one.L for one in works.values()], row.L),
-        chance([one.Md for one in peaks.values()], row.Md),
-    )
-
-
 def search_table() -> tuple[Table, bool]:
     """What meets each printed number, and whether one set of choices meets more than one of them."""
     rows = []
     met: list[tuple[str, ...]] = []
     for row in PRINTED:
-        works, peaks, by_chance_L, by_chance_Md = explained(row)
-        for figure, printed, found, by_chance in (
-            ("L", float(row.L), works, by_chance_L), ("Md", row.Md, peaks, by_chance_Md)
-        ):  # fmt: skip
+        every = [one for law in row.readings for one in readings(law)]
+        works: dict[tuple[object, ...], Reading] = {(one.law, *one.choices[:-1]): one for one in every}
+        peaks: dict[tuple[object, ...], Reading]
+        peaks = {(one.law, *one.choices[:3], round(one.Md, 2)): one for one in every}
+        for figure, printed, different, width in (("L", row.L, works, 1.5), ("Md", row.Md, peaks, 0.15)):
+            values = {key: getattr(one, figure) for key, one in different.items()}
+            found = [different[key] for key, value in values.items() if meets(value, printed)]
             met += list({one.choices for one in found})
-            nearest = _nearest(row, figure, printed)
-            value = nearest.L if figure == "L" else nearest.Md
-            rows.append((row.law, figure, printed, len(found), by_chance, value, _told(nearest)))
-    often = max((met.count(one) for one in met), default=0)
+            near = sum(abs(value / printed - 1.0) < NEAR for value in values.values())
+            by_chance = near * width / (2.0 * NEAR * printed)
+
+            def off(one: Reading, figure: str = figure, printed: float = printed) -> tuple[float, bool]:
+                value = getattr(one, figure)
+                return 0.0 if meets(value, printed) else abs(value - printed), one.choices != USUAL
+
+            best = min(every, key=off)
+            other = [
+                f"{kind}: {choice}"
+                for kind, choice, usual in zip(KINDS, best.choices, USUAL, strict=True)
+                if choice != usual
+            ]
+            told = f"{best.law}; " + ("; ".join(other) if other else "(1)-(3) as they stand")
+            rows.append((row.law, figure, float(printed), len(found), by_chance, getattr(best, figure), told))
     return (
         Table(
             "Which reading gives the printed numbers",
@@ -229,22 +210,5 @@ def search_table() -> tuple[Table, bool]:
              "nearest, kgf m", "nearest reading"),
             rows,
         ),
-        often > 1,
+        max((met.count(one) for one in met), default=0) > 1,
     )  # fmt: skip
-
-
-def _nearest(row: Row, figure: str, printed: float) -> Reading:
-    every = [one for law in row.readings for one in readings(law)]
-
-    def off(one: Reading) -> tuple[float, bool]:
-        value = one.L if figure == "L" else one.Md
-        return (0.0 if meets(value, printed) else abs(value - printed), one.choices != USUAL)
-
-    return min(every, key=off)
-
-
-def _told(one: Reading) -> str:
-    """The reading in words: only what is not as the paper has it."""
-    names = ("load", "oscillation in (6)", "inertias", "carried over tM", "slip of the", "root", "peak")
-    other = [f"{n}: {c}" for n, c, u in zip(names, one.choices, USUAL, strict=True) if c != u]
-    return f"{one.law}; " + ("; ".join(other) if other else "(1)-(3) as they stand")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart.balancing.slider_crank import SliderCrank, acceleration_harmonics, inertia_torque_harmonics
-from softstart_studies.paper_b.series import acceleration_series, inertia_torque_series
+from softstart_studies.paper_b.orders import acceleration_series, inertia_torque_series
 
 PHI = np.linspace(0.0, 2.0 * np.pi, 97)
 ratios = st.floats(0.02, 0.9)

@@ -8,10 +8,32 @@ import numpy as np
 import pytest
 
 from softstart.clutch import LAWS, Clutch, engage
-from softstart.clutch.closed_forms import linear_torque, pulse_and_pause, two_steps
 from softstart.clutch.laws import shaped_law, table_law
+from softstart.clutch.motion import first_crossing, roots
 
 PAPER = Clutch.load("paper-c")
+
+
+def linear_torque(clutch, t):
+    """T(t) of (4) and (5) under the linear law: a ramp up to tM, less the same ramp begun there."""
+    IM, Ic, B, tM = clutch.clutch_inertia, clutch.load_inertia, clutch.B, clutch.engagement_time
+    ramps = [np.where(s > 0.0, s - np.sin(B * s) / B, 0.0) for s in (t, t - tM)]
+    swing = clutch.load_torque * IM / (IM + Ic) * (1.0 - np.cos(B * t))
+    return Ic / (IM + Ic) * clutch.clutch_torque / tM * (ramps[0] - ramps[1]) + swing
+
+
+def rigid_slip_time(clutch):
+    """w0 (IM + Ic) = integral of M - Mc, with the means of the laws over 0 .. tM = 1 s, T = 1 s."""
+    e = math.e
+    mean = {
+        "linear": 1 / 2,
+        "quadratic-concave": 2 / 3,
+        "quadratic-convex": 1 / 3,
+        "exponential": (e - 2) / (e - 1),
+    }
+    inertia = clutch.clutch_inertia + clutch.load_inertia
+    left = clutch.drive_speed * inertia - (mean[clutch.law] * clutch.clutch_torque - clutch.load_torque)
+    return 1.0 + left / (clutch.clutch_torque - clutch.load_torque)
 
 
 @pytest.mark.parametrize("load_torque", [0.0, 196.133])
@@ -50,8 +72,8 @@ def test_a_stiff_shaft_slips_as_long_as_a_rigid_one(law):
     errors = []
     for stiffer in (1e2, 1e4):
         clutch = PAPER.replace(law=law, stiffness=PAPER.stiffness * stiffer)
-        run = engage(clutch, until=1.01 * clutch.rigid_slip_time)
-        errors.append(abs(run.slip_time - clutch.rigid_slip_time))
+        run = engage(clutch, until=1.01 * rigid_slip_time(clutch))
+        errors.append(abs(run.slip_time - rigid_slip_time(clutch)))
     assert errors[0] < 0.1
     assert errors[1] < 0.02
     assert errors[1] < errors[0] + 1e-12
@@ -65,15 +87,6 @@ def test_a_light_clutch_side_hands_the_friction_torque_on():
     # the ripple is the slope of the law over the frequency: MM/(B tM)
     assert np.abs(traces["T"] - traces["M"]).max() < 2.0 * clutch.clutch_torque / clutch.B
     assert run.peak_ratio == pytest.approx(1.0, abs=0.01)
-
-
-@pytest.mark.parametrize("law", [pulse_and_pause, two_steps])
-def test_two_laws_bring_the_shaft_to_rest_at_its_mean_torque(law):
-    run = engage(PAPER.with_table(*law(PAPER)))
-    assert run.slip_peak_torque == pytest.approx(PAPER.mean_torque, rel=1e-12)
-    t = np.linspace(0.5, run.slip_time, 200)
-    assert run.at(t)["T"] == pytest.approx(np.full(200, PAPER.mean_torque), rel=1e-12)
-    assert run.locked_peak_torque == pytest.approx(PAPER.mean_torque, rel=1e-12)
 
 
 def test_units_do_not_matter():
@@ -154,3 +167,22 @@ def test_lining_heat_is_work_over_area():
     run = engage(Clutch.load("tractor-pto"))
     assert run.lining_heat == run.friction_work / 0.06
     assert math.isnan(engage(PAPER).lining_heat)
+
+
+def test_roots_of_a_step():
+    random = np.random.default_rng(1)
+    for _ in range(60):
+        known = np.sort(random.choice(np.arange(1, 100), random.integers(1, 6), replace=False)) / 100.0
+        a = np.poly([*known, *random.uniform(1.2, 4.0, 3)])[::-1]
+        assert roots(a) == pytest.approx(
+            known, abs=1e-9
+        )  # five roots a hundredth apart: 1e-16 times the condition
+        assert first_crossing(a if a[0] < 0.0 else -a) == pytest.approx(known[0], abs=1e-9)
+    n = np.arange(25)  # cos over the 1.9 radians of a step crosses zero at pi/2
+    factorial = np.concatenate([[1.0], np.cumprod(np.arange(1.0, 25.0))])
+    cosine = np.where(n % 2 == 0, (-1.0) ** (n // 2), 0.0) / factorial * 1.9**n
+    assert roots(cosine) == pytest.approx([np.pi / 2 / 1.9], rel=1e-15)
+    # an event at the beginning is not found again
+    assert first_crossing(np.array([1e-19, -1.0, 2.0])) == pytest.approx(0.5)
+    assert first_crossing(np.array([0.0, -1.0, 0.5])) is None
+    assert first_crossing(np.array([0.0, 0.0, -1.0, 4.0])) == pytest.approx(0.25)
