@@ -11,7 +11,7 @@ from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, 
 from softstart.drive import Drive
 from softstart_controllers import contact, landing
 from softstart_controllers.contact import ahead, observe, raised, send, watching
-from softstart_controllers.landing import approach, approach_speed_parameter, landing_numbers
+from softstart_controllers.landing import ROOM, approach, approach_speed_parameter, landing_numbers
 from softstart_controllers.reduced import reduced_torque_parameter
 from softstart_controllers.sampled import full_torque_parameter, patience_parameter, period_parameter
 
@@ -68,7 +68,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         y.torque = approach(p.landing, p.watch, watch, t)
     else:
         w1, _, w2, _ = ahead(p.watch, watch, u)
-        limit = p.low_torque + (p.full_torque - p.low_torque) * y.progress
+        limit = p.low_torque + (ROOM * p.full_torque - p.low_torque) * y.progress
         y.torque = min(max(limit - p.feedback * (w1 - w2), 0.0), p.full_torque)
         if watch.held == 0.0:  # else the limit waits for the brake
             y.progress = min(1.0, y.progress + p.rise)
@@ -88,8 +88,8 @@ class CurrentLimitFeedback(CompiledController):
     to M12avg, [G](12), that is to K_dyn = 1, from however wide a gap; the default is 0.85 of it, which leaves
     the rise some room.
 
-    *Gap closed.* The contact and what follows are estimated (`contact`). The limit rises from `low_torque` to
-    `full_torque` in the time `rise`, and
+    *Gap closed.* The contact and what follows are estimated (`contact`). The limit rises from `low_torque` to 99 %
+    of `full_torque` (below it the feedback can act both ways) in the time `rise`, and
 
         u = clip(limit - kd T', 0, full_torque),     kd = 2 damping_ratio J1 Omega/c
 

@@ -22,6 +22,7 @@ from softstart_controllers.sampled import pulling_load
 
 COARSE = 0.1  # of Ms/c: with larger counts the contact is over before it is seen
 SLOW = 2.0  # sqrt(J1/c): with a torque later than this no feedback comes in time
+ROOM = 0.99  # of the full torque, to which a feedback raises it: below its limit it can act both ways
 LOW_TORQUE_SHARE = 0.5  # of the accelerating torque
 
 

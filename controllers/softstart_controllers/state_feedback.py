@@ -11,7 +11,7 @@ from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, ke
 from softstart.drive import Drive
 from softstart_controllers import contact, landing
 from softstart_controllers.contact import ahead, observe, raised, send, watching
-from softstart_controllers.landing import approach, landing_numbers
+from softstart_controllers.landing import ROOM, approach, landing_numbers
 from softstart_controllers.regulator import feedback_gains
 from softstart_controllers.sampled import full_torque_parameter, patience_parameter, period_parameter
 
@@ -56,7 +56,7 @@ def feedback(p: Parameters, u: float, y: State) -> float:
     w1, z, w2, u = ahead(near, y.watch, u)
     share, load = a / (a + b), near.Mc * b / (a + b)  # of the motor torque, in the mean torque of the shaft
     Omega = math.sqrt(c * (a + b))
-    low, full = share * p.low_torque + load, share * p.full_torque + load
+    low, full = share * p.low_torque + load, share * ROOM * p.full_torque + load
     reference = low + (full - low) * y.progress
     rate = (full - low) / p.rise if y.progress < 1.0 else 0.0
     if y.watch.held == 0.0:  # else the reference waits for the brake
@@ -103,8 +103,8 @@ class StateFeedback(CompiledController):
     `low_torque` (`landing`). The contact and what follows are estimated (`contact`): phi1, w1, the twist z,
     w2 and 1/J2, which takes up what is wrong in the model of the load.
 
-    *Feedback.* The reference T_ref rises from the mean shaft torque under the low torque to that under
-    `full_torque` in the time `rise`. With M = (u J2 + Mc J1)/(J1 + J2), the mean torque under the motor
+    *Feedback.* The reference T_ref rises from the mean shaft torque under the low torque to that under 99 % of
+    `full_torque` (below it the feedback can act both ways) in the time `rise`. With M = (u J2 + Mc J1)/(J1 + J2), the mean torque under the motor
     torque u, and M_y that under the torque the lagging motor has reached by now,
 
         M = T_ref + 2 zeta T_ref'/Omega - f1 (T - T_ref) - f2 (T' - T_ref')/Omega - f3 (M_y - T_ref)
