@@ -55,7 +55,7 @@ class Question:
 class Task:
     """A chunk: the question and those values of the axes that are its own. Small, and sent to anyone."""
 
-    number: int
+    index: tuple[int, ...]
     question: Question
     axes: tuple[Axis, ...]
 
@@ -143,7 +143,7 @@ def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
     controllers = next((c.values for axis in axes for c in axis.columns if c.owner == "controller"), ("",))
     for name in controllers:
         first = tuple(Axis(axis.name, tuple(_one(c, name) for c in axis.columns)) for axis in axes)
-        compute(Task(0, question, first))
+        compute(Task((), question, first))
         design = (question.fitted_to or question.drive).design_drive
         compiled &= isinstance(question.maker.make({}, name).set_up(design)[0], CompiledController)
     return compiled

@@ -144,17 +144,17 @@ def sweep(
     with Store(None if to is None else Path(to), plan, axes, question, most) as store:
         watch = Watch(plan.starts, store.finished_starts(), progress)
         tasks = (
-            Task(number, question, tuple(map(Axis.part, axes, store.plan.place(number))))
-            for number in range(store.plan.chunks if watch.done < plan.starts else 0)
-            if not store.finished(number)
+            Task(index, question, tuple(map(Axis.part, axes, store.plan.place(index))))
+            for index in (store.plan.indices() if watch.done < plan.starts else ())
+            if not store.finished(index)
         )
         with Pool(
             min(count, store.plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
             advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
         ) as pool:  # fmt: skip
             for task, block in pool.results(compute, tasks):
-                store.keep(task.number, block)
-                watch.add(store.plan.size(task.number))
+                store.keep(task.index, block)
+                watch.add(store.plan.size(task.index))
         results = store.results()
         if netcdf is not None:
             _write_netcdf(Path(netcdf), results)
@@ -162,7 +162,7 @@ def sweep(
 
 
 def _described(task: Task) -> str:
-    return f"chunk {task.number} of the sweep"
+    return f"chunk {', '.join(map(str, task.index))} of the sweep"
 
 
 def _check_netcdf(path: Path) -> None:

@@ -302,7 +302,7 @@ class Plan:
     """A grid of `shape` in chunks of shape `chunk`, the last index fastest; those at the edge are smaller.
 
     >>> plan = Plan((3, 5), (1, 2))
-    >>> plan.chunks, plan.index(5), plan.place(5), plan.size(5)
+    >>> plan.chunks, plan.index(5), plan.place((1, 2)), plan.size((1, 2))
     (9, (1, 2), (slice(1, 2, None), slice(4, 5, None)), 1)
     """
 
@@ -345,14 +345,18 @@ class Plan:
         """Where a chunk stands among the chunks of each axis."""
         return tuple(map(int, np.unravel_index(number, self.counts)))
 
-    def place(self, number: int) -> tuple[slice, ...]:
+    def place(self, index: Sequence[int]) -> tuple[slice, ...]:
         """The part of the grid that is a chunk's."""
-        each = zip(self.index(number), self.chunk, self.shape, strict=True)
+        each = zip(index, self.chunk, self.shape, strict=True)
         return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in each)
 
-    def size(self, number: int) -> int:
+    def size(self, index: Sequence[int]) -> int:
         """How many starts a chunk has."""
-        return math.prod(part.stop - part.start for part in self.place(number))
+        return math.prod(part.stop - part.start for part in self.place(index))
+
+    def indices(self) -> Iterator[tuple[int, ...]]:
+        """Where each chunk stands, one after another."""
+        return map(self.index, range(self.chunks))
 
 
 def checked_chunk(value: object) -> int | None:

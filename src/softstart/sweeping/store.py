@@ -13,6 +13,7 @@ import hashlib
 import json
 import warnings
 import zlib
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -138,37 +139,37 @@ class Store:
     def __exit__(self, *error: object) -> None:
         self._exit.close()
 
-    def finished(self, number: int) -> bool:
+    def finished(self, index: Sequence[int]) -> bool:
         """Whether a chunk is finished."""
-        return self._list.find(number) is not None
+        return self._list.find(index) is not None
 
     def finished_starts(self) -> int:
         """How many starts are finished and as they were written; the chunks that are not are given up."""
         found, damaged = 0, list[str]()
         for record in self._list.parts():
-            if (number := record["part"]) != "chunk":
-                if changed := self._changed(number, record["checksums"]):
+            if (index := record["part"]) != "chunk":
+                if changed := self._changed(index, record["checksums"]):
                     damaged += changed[:1]
-                    self._list.forget(number)
+                    self._list.forget(index)
                 else:
-                    found += self.plan.size(number)
+                    found += self.plan.size(index)
         if self.path is not None:
             warn_of_damage(self.path, damaged)
         return found
 
-    def keep(self, number: int, block: Block) -> None:
+    def keep(self, index: Sequence[int], block: Block) -> None:
         """Take in a finished chunk and list it."""
-        place = self.plan.place(number)
+        place = self.plan.place(index)
         with ExitStack() as stack:
             if self._target is not None:
                 stack.enter_context(self._target.errors())
             for name, values in block.items():
                 if self.path is not None:
                     _free(
-                        self.path, self._file(name, number)
+                        self.path, self._file(name, index)
                     )  # Zarr reads a chunk at the edge before it writes it
                 self._arrays[name][place] = values
-        self._list.add({"part": number, "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
+        self._list.add({"part": list(index), "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
 
     def results(self) -> xarray.Dataset:
         """The results; those in a folder are read when they are looked at, not yet computed ones are NaN."""
@@ -179,18 +180,18 @@ class Store:
         found: xarray.Dataset = xarray.open_zarr(self.path, chunks=None)[list(self._arrays)]
         return found
 
-    def _file(self, name: str, number: int) -> Path:
+    def _file(self, name: str, index: Sequence[int]) -> Path:
         """The file of a chunk, as Zarr names it."""
-        return Path(name, "c", *map(str, self.plan.index(number)))
+        return Path(name, "c", *map(str, index))
 
-    def _changed(self, number: int, checksums: dict[str, int]) -> list[str]:
+    def _changed(self, index: Sequence[int], checksums: dict[str, int]) -> list[str]:
         """The files of a finished chunk that do not hold what was written."""
         assert self.path is not None
         found = []
         for name, checksum in checksums.items():
-            file = self._file(name, number)
+            file = self._file(name, index)
             try:
-                values = self._arrays[name][self.plan.place(number)] if (self.path / file).is_file() else b""
+                values = self._arrays[name][self.plan.place(index)] if (self.path / file).is_file() else b""
             except (ValueError, RuntimeError, OSError):  # what Zarr and its codecs say of a damaged file
                 values = b""
             if zlib.crc32(bytes(values)) != checksum:

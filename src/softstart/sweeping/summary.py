@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -91,11 +91,9 @@ def summarise(results: xarray.Dataset) -> Summary:
 
 
 def plan_of(results: xarray.Dataset) -> Plan:
-    """The chunks in which results are best read."""
+    """The chunks of the results."""
     shape = tuple(results["status"].shape)
     chunk = results.attrs.get("softstart_chunk", ())
-    if math.prod(shape) <= READ_AT_ONCE:
-        return Plan(shape, shape)
     return (
         Plan(shape, tuple(map(int, chunk)))
         if len(chunk) == len(shape)
@@ -104,9 +102,10 @@ def plan_of(results: xarray.Dataset) -> Plan:
 
 
 def pieces(results: xarray.Dataset, name: str) -> Iterator[tuple[tuple[slice, ...], Any]]:
-    """A figure piece by piece: places on the grid, and the values there."""
+    """A figure in pieces that fit into memory: places on the grid, and the values there."""
     plan = plan_of(results)
-    return ((place, results[name][place].values) for place in map(plan.place, range(plan.chunks)))
+    plan = replace(plan, chunk=plan.shape) if plan.starts <= READ_AT_ONCE else plan
+    return ((place, results[name][place].values) for place in map(plan.place, plan.indices()))
 
 
 def spread(parts: Iterable[Any], shares: Sequence[float] = SHARES, thin: int = 1) -> Spread:

@@ -56,8 +56,8 @@ class Sweeping:
     def finished(self, folder: Path) -> dict[str, int]:
         """The files of the finished chunks, and when each was written."""
         parts = parts_in(folder / "status" / "softstart.sqlite")
-        chunks = [divmod(one["part"], self.chunks // 2) for one in parts if one["part"] != "chunk"]
-        names = [f"status/c/{kind}/{gap}/0" for kind, gap in chunks]
+        chunks = [one["part"] for one in parts if isinstance(one["part"], list)]
+        names = ["/".join(["status", "c", *map(str, index)]) for index in chunks]
         return {name: (folder / name).stat().st_mtime_ns for name in names}
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
