@@ -1,4 +1,4 @@
-"""The best gains of each job: searched, offered to the cells beside, smoothed, no worse than the defaults."""
+"""The best gains of each job: searched, smoothed over the grid, no worse than the defaults."""
 
 from __future__ import annotations
 
@@ -71,7 +71,6 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
     best = np.arange(jobs) * restarts + restart_costs.argmin(axis=1)
     places, found = (part[best] for part in last.best)
     if not trials.robust:
-        places, found = _advised(trials, costs, places, found)
         places = _smooth(trials, costs, places, found)
     return _settled(trials, places, restart_costs)
 
@@ -126,22 +125,6 @@ def _seeds(trials: Trials, schedule: Found | None, searches: Any, most: int) -> 
     )
     others[0] = trials.places(np.zeros(len(cells), dtype=int), gains)
     return np.concatenate([own[:, None], others], axis=1)
-
-
-def _advised(trials: Trials, costs: SharedCosts, places: Vector, found: Vector) -> tuple[Vector, Vector]:
-    """Gains of the cells beside where they are better: as multiples of the defaults, and as they are."""
-    pairs = [(cell, near) for cell in range(len(places)) for near in trials.question.neighbours(cell)]
-    if not pairs:
-        return places, found
-    cells, near = np.array(pairs).T
-    same = trials.places(cells, trials.values(near, places[near]))
-    cells, offered = np.tile(cells, 2), np.concatenate([places[near], same])
-    offers = costs(cells, offered)
-    places, found = places.copy(), found.copy()
-    for k in np.argsort(-offers):  # the best one comes last
-        if offers[k] < found[cells[k]]:
-            places[cells[k]], found[cells[k]] = offered[k], offers[k]
-    return places, found
 
 
 def _smooth(trials: Trials, costs: SharedCosts, places: Vector, found: Vector) -> Vector:
