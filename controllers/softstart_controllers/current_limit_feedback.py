@@ -88,8 +88,8 @@ class CurrentLimitFeedback(CompiledController):
     to M12avg, [G](12), that is to K_dyn = 1, from however wide a gap; the default is 0.85 of it, which leaves
     the rise some room.
 
-    *Gap closed.* The contact and what follows are estimated (`contact`). The limit rises from `low_torque` to 99 %
-    of `full_torque` (below it the feedback can act both ways) in the time `rise`, and
+    *Gap closed.* The contact and what follows are estimated (`contact`). The limit rises from `low_torque` to
+    99 % of `full_torque` (below it the feedback can act both ways) in the time `rise`, and
 
         u = clip(limit - kd T', 0, full_torque),     kd = 2 damping_ratio J1 Omega/c
 

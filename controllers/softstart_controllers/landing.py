@@ -70,7 +70,7 @@ def landing_numbers(drive: Drive, p: Any) -> dict[str, float]:
         "approach": p.approach_speed,
         "horizon": horizon(drive, p.period),
         "drift": load_drift(drive),
-        "blind": contact.blind(drive, COARSE, SLOW),
+        "blind": contact.blind(drive, COARSE, SLOW) and not contact.hanging(drive)[0],
     }
 
 

@@ -60,6 +60,10 @@ def sweep(
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
     drive of the literature. The results are a Zarr store that xarray opens.
     """
+    if controller is None and not any(text.partition("=")[0].strip() == "controller" for text in grid):
+        raise InputError(
+            "controller = None: name a strategy, or make several an axis, as --axis controller=direct,ramp."
+        )
     asked = {name: value for name, value in asked.items() if value is not None}
     begin, last = time.monotonic(), None
 
@@ -116,9 +120,7 @@ def read_axes(texts: Sequence[str], maker: Maker, machine: Machine | None = None
     grid: dict[str, Any] = {}
     if "controller" in split:
         names = values_in(split["controller"], "--axis controller", whole=True)
-        parameters = maker.common_parameters(
-            [options.check_name(name, "--axis controller") for name in names]
-        )
+        parameters = maker.parameters([options.check_name(name, "--axis controller") for name in names])
     elif maker.given:
         parameters = maker.parameters()
     for key, values in split.items():

@@ -41,7 +41,7 @@ TUNING_SHARES = {
     "starts": (0.0, 0.05),
     "schedule": (0.05, 0.45),
     "robust": (0.45, 0.8),
-    "certified": (0.8, 1.0),
+    "optima": (0.8, 1.0),
 }
 INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
@@ -198,16 +198,13 @@ class _Throttled:
 def tuning_share(doing: str) -> float | None:
     """How much of a tuning is done, from its message.
 
-    >>> tuning_share("schedule, searches 2 of 4, 3,088 starts, 6,314/s"), tuning_share("something else")
+    >>> tuning_share("schedule, generation 2 of 4, 3,088 starts, 6,314/s"), tuning_share("something else")
     (0.25, None)
     """
     for begin, (low, high) in TUNING_SHARES.items():
         if doing.startswith(begin):
-            counted = re.search(r"(search |\s)?(\d+) of (\d+)", doing)
-            if counted is None:
-                return low
-            done = int(counted[2]) - (1 if counted[1] == "search " else 0)
-            return low + (high - low) * done / int(counted[3])
+            counted = re.search(r"(\d+) of (\d+)", doing)
+            return low + (high - low) * (int(counted[1]) / int(counted[2]) if counted else 0.0)
     return None
 
 

@@ -1,7 +1,7 @@
 """Sweeps: the starts of a whole grid, of any size, in memory or chunk by chunk on disk.
 
 `sweep` (entry.py) reads the grid and cuts it into chunks (grid.py), refuses what is impossible and computes
-the starts of each chunk (starts.py) in threads, processes or on a cluster (softstart.parallel), and keeps
-what is finished in memory (results.py) or in a Zarr folder (store.py), from which it goes on after any end.
-summary.py and softstart.views.sweeps read such results piece by piece.
+the starts of each chunk (compute.py) in threads, processes or on a cluster (softstart.parallel). store.py
+keeps them in memory or in a Zarr folder, whose list of finished chunks, with checksums of their values, says
+what is left to compute after any end. summary.py and softstart.views.sweeps read results piece by piece.
 """

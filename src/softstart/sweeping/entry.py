@@ -1,4 +1,8 @@
-"""`sweep`: the starts of a whole grid, however large, and how far they are."""
+"""`sweep`: the starts of a whole grid, however large, and how far they are.
+
+The grid is cut into chunks (grid.py). Chunks that the store (store.py) does not hold yet are computed
+(compute.py) in threads, processes or on a cluster, and kept one by one.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,15 +20,15 @@ from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.drive.records import is_machine
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.parallel import Pool, checked_workers, why_not_sendable
 from softstart.quantities import nearest, show
 from softstart.start.batch import has_margin
-from softstart.sweeping.grid import Axis, checked_chunk, plan_for, read_grid
+from softstart.store import fresh_folder
+from softstart.sweeping.compute import Question, Task, check_corners, compute, first_start, known_figures
+from softstart.sweeping.grid import NO_CONTROLLER, Axis, Plan, checked_chunk, read_grid
 from softstart.sweeping.maker import Maker, with_whole_path
-from softstart.sweeping.results import Memory, check_netcdf, write_netcdf
-from softstart.sweeping.starts import Question, Task, check_corners, cut, first_start, known_figures
-from softstart.sweeping.store import Folder, compute_and_keep
+from softstart.sweeping.store import Store
 
 if TYPE_CHECKING:
     import xarray
@@ -126,58 +129,69 @@ def sweep(
         drive = load_machine(drive)
     maker = _maker(controller, parameters, allow_code)
     axes = _checked(drive, maker, grid, until, time_limit, fitted_to, base, figures)
-    kept = _figures_kept(drive, figures)
-    question = Question(drive, maker, kept, _time(until), fitted_to, base, _time(time_limit))
+    question = Question(drive, maker, _figures_kept(drive, figures), until, fitted_to, base, time_limit)
     most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
     if netcdf is not None:
-        check_netcdf(Path(netcdf))
+        _check_netcdf(Path(netcdf))
     check_corners(question, axes)
-    single = [not axis.numeric for axis in axes]
-    plan = plan_for([axis.size for axis in axes], single, most)
+    plan = Plan.of([axis.size for axis in axes], [not axis.numeric for axis in axes], most)
     threads = first_start(question, axes)
     if scheduler is not None or (min(count, plan.chunks) > 1 and not threads):
         if workers is None and scheduler is None and why_not_sendable(maker.given):
             count = 1
         else:
             maker.check_sendable()
-    pool = partial(
-        Pool, min(count, plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
-        advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
-    )  # fmt: skip
-    with Memory(plan, axes, question) if to is None else Folder(Path(to), plan, axes, question, most) as home:
-        _run(home, axes, question, pool, progress)
-        results = home.results()
+    with Store(None if to is None else Path(to), plan, axes, question, most) as store:
+        watch = Watch(plan.starts, store.finished_starts(), progress)
+        tasks = (
+            Task(index, question, tuple(map(Axis.part, axes, store.plan.place(index))))
+            for index in (store.plan.indices() if watch.done < plan.starts else ())
+            if not store.finished(index)
+        )
+        with Pool(
+            min(count, store.plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
+            advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
+        ) as pool:  # fmt: skip
+            for task, block in pool.results(compute, tasks):
+                store.keep(task.index, block)
+                watch.add(store.plan.size(task.index))
+        results = store.results()
         if netcdf is not None:
-            write_netcdf(Path(netcdf), results, home.plan, axes, question)
+            _write_netcdf(Path(netcdf), results)
     return results
 
 
-def _run(
-    home: Memory | Folder,
-    axes: tuple[Axis, ...],
-    question: Question,
-    make_pool: Callable[[], Pool],
-    progress: Told | None,
-) -> None:
-    """Compute what is not finished, and keep it."""
-    plan, before = home.plan, home.finished_starts()
-    watch = Watch(plan.starts, before, progress)
-    if before == plan.starts:
-        return
-    with make_pool() as pool:
-        keep_in = home.folder if pool.scheduler is None else ""
-        tasks = (
-            Task(number, question, cut(axes, plan.place(number)), plan.place(number), keep_in)
-            for number in range(plan.chunks)
-            if not home.finished(number)
-        )
-        for task, found in pool.results(compute_and_keep, tasks):
-            home.keep(task, found)
-            watch.add(math.prod(task.shape))
-
-
 def _described(task: Task) -> str:
-    return f"chunk {task.number} of the sweep"
+    return f"chunk {', '.join(map(str, task.index))} of the sweep"
+
+
+def _check_netcdf(path: Path) -> None:
+    """Raise InputError if the file cannot be written, before anything is computed."""
+    if path.is_dir():
+        raise InputError(f"netcdf = {path}: this is a folder; give the name of a file.")
+    if not path.parent.is_dir():
+        raise InputError(f"netcdf = {path}: there is no folder {path.parent}; make it, or give another file.")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"netcdf = {path}: you may not write there; give another file.")
+
+
+def _write_netcdf(path: Path, results: xarray.Dataset) -> None:
+    """Write the results; with dask in the memory of some chunks, else in that of one figure."""
+    import importlib.util
+
+    chunks = tuple(results.attrs["softstart_chunk"])
+    packed = {"zlib": True, "complevel": 1, "shuffle": True, "chunksizes": chunks}
+    if importlib.util.find_spec("dask") is not None:
+        results = results.chunk(dict(zip(results["status"].dims, chunks, strict=True)))
+    try:
+        with fresh_folder(path.parent) as stage:
+            encoding = dict.fromkeys(results.data_vars, packed)
+            results.to_netcdf(stage / path.name, engine="h5netcdf", encoding=encoding)
+            (stage / path.name).replace(path)
+    except OSError as error:
+        raise InputError(
+            f"netcdf = {path}: the file could not be written ({error.strerror or error}); give another one."
+        ) from None
 
 
 def _maker(controller: object, parameters: Mapping[str, object] | None, allow_code: bool) -> Maker:
@@ -209,27 +223,25 @@ def _checked(
     figures: object,
 ) -> tuple[Axis, ...]:
     """The axes, if all input is right in itself; all mistakes at once."""
-    wrong: list[str] = []
-    axes: tuple[Axis, ...] = ()
+    wrong, axes = Mistakes(), tuple[Axis, ...]()
     for name, other in (("drive", drive), ("fitted_to", fitted_to), ("base", base)):
         if not is_machine(other) and not (other is None and name != "drive"):
-            wrong.append(f"{name} = {show(other)}: give one Drive or Chain; what varies goes into the grid.")
+            sentence = f"{name} = {show(other)}: give one Drive or Chain; what varies goes into the grid."
+            wrong.sentences.append(sentence)
     for name, value in (("until", until), ("time_limit", time_limit)):
         if value is not None and not (
             isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf
         ):
-            wrong.append(f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out.")
+            sentence = f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out."
+            wrong.sentences.append(sentence)
     machine: Any = drive if is_machine(drive) else None
-    wrong += _figure_mistakes(figures, machine)
+    wrong.sentences += _figure_mistakes(figures, machine)
     if not maker.given and not (isinstance(grid, Mapping) and "controller" in grid):
-        wrong.append("controller = None: name a controller, or make several an axis of the grid.")
+        wrong.sentences.append(NO_CONTROLLER)
     else:
-        try:
+        with wrong.noted():
             axes = read_grid(grid, maker, machine)
-        except InputError as error:
-            wrong.extend(error.sentences)
-    if wrong:
-        raise InputError(wrong)
+    wrong.settle()
     return axes
 
 
@@ -263,10 +275,6 @@ def _figure_mistakes(figures: object, machine: Machine | None) -> list[str]:
             hint = f"did you mean {near}?" if near else f"there are {', '.join(known)}."
             wrong.append(f"figures = {show(name)}: there is no such figure; {hint}")
     return wrong
-
-
-def _time(value: float | None) -> float | None:
-    return None if value is None else float(value)
 
 
 RECENT = 30.0  # s, over which the rate is taken

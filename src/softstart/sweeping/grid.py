@@ -6,7 +6,7 @@ Chunks are never listed: a chunk is a number, and its place on the grid follows 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -16,13 +16,14 @@ from softstart.chain.machines import Machine
 from softstart.controller.finding import quantity
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.drive.model import BY_PATH
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.input.parameters import Wording, meant_by, read_value
 from softstart.quantities import RefusedError, nearest, show
 from softstart.sweeping.maker import Maker, Parameters
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"
+NO_CONTROLLER = "controller = None: name a controller, or make several an axis of the grid."
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,35 +96,30 @@ def read_grid(grid: object, maker: Maker, machine: Machine | None = None) -> tup
         raise InputError(
             f'grid = {show(grid)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
         )
-    wrong: list[str] = []
-    axes: list[Axis] = []
-    first: dict[str, str] = {}
+    wrong, axes, first = Mistakes(), list[Axis](), dict[str, str]()
     parameters = _parameters(grid, maker, wrong)
     for key, values in grid.items():
-        pairs = values.items() if isinstance(values, Mapping) else [(key, values)]
-        columns: list[Column] = []
-        for name, given in pairs:
-            try:
+        paired, columns = isinstance(values, Mapping), list[Column]()
+        for name, given in values.items() if paired else [(key, values)]:
+            with wrong.noted():
                 column = read_column(str(name), given, parameters, machine)
-            except InputError as error:
-                wrong.extend(error.sentences)
-                continue
-            if column.name in first:
-                wrong.append(f"{name}: this is the same as {first[column.name]}; name each parameter once.")
-            first[column.name] = str(name)
-            columns.append(column)
-        if isinstance(values, Mapping):
-            axes += _paired(str(key), columns, len(values), wrong)
+                columns.append(column)
+                if column.name in first:
+                    same = first[column.name]
+                    wrong.sentences.append(f"{name}: this is the same as {same}; name each parameter once.")
+                first[column.name] = str(name)
+        if paired:
+            wrong.sentences += _wrong_samples(str(key), columns, len(values))
         elif columns:
-            wrong.extend(_repeated(columns[0]))
-            axes.append(Axis(columns[0].name, tuple(columns)))
-    wrong += [
+            wrong.sentences += _repeated(columns[0])
+        if columns:
+            axes.append(Axis(str(key) if paired else columns[0].name, tuple(columns)))
+    wrong.sentences += [
         f"{axis.name}: a parameter among the samples has the name of this axis; give the axis another one."
         for axis in axes
         if axis.paired and axis.name in first
     ]
-    if wrong:
-        raise InputError(wrong)
+    wrong.settle()
     return tuple(axes)
 
 
@@ -179,26 +175,22 @@ def read_column(
     return Column(f"{PREFIX}_{field}", owner, field, known.unit, known.meaning or field, read)
 
 
-def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: list[str]) -> Parameters | None:
+def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: Mistakes) -> Parameters | None:
     """The parameters that all controllers of the sweep have."""
     names = grid.get(PREFIX)
-    try:
-        if PREFIX not in grid:
-            return maker.parameters()
-        if maker.given:
-            wrong.append(
-                f"controller = {maker.shown}: the controllers are an axis too; leave one of the two out."
-            )
-        if maker.values:
-            wrong.append(
-                f"parameters = {show(dict(maker.values))}: with several controllers give each parameter as "
-                "an axis, of one value if need be."
-            )
-        listed = [] if isinstance(names, str | bytes) or not isinstance(names, Sequence) else list(names)
-        return maker.common_parameters([name for name in listed if isinstance(name, str)])
-    except InputError as error:
-        wrong.extend(error.sentences)
-        return None
+    if PREFIX in grid and maker.given:
+        wrong.sentences.append(
+            f"controller = {maker.shown}: the controllers are an axis too; leave one of the two out."
+        )
+    if PREFIX in grid and maker.values:
+        wrong.sentences.append(
+            f"parameters = {show(dict(maker.values))}: with several controllers give each parameter as "
+            "an axis, of one value if need be."
+        )
+    listed = [] if isinstance(names, str | bytes) or not isinstance(names, Sequence) else list(names)
+    with wrong.noted():
+        return maker.parameters([n for n in listed if isinstance(n, str)] if PREFIX in grid else None)
+    return None
 
 
 def _of_drive(key: str, name: str, values: object, machine: Machine | None) -> Column:
@@ -261,20 +253,18 @@ def _repeated(column: Column) -> list[str]:
     return [f"{column.name} = {show(twice[0])}: this value is given twice; give each once."] if twice else []
 
 
-def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> list[Axis]:
+def _wrong_samples(name: str, columns: list[Column], count: int) -> Iterator[str]:
+    """What is wrong with parameters that vary together."""
     if not name.isidentifier():
-        wrong.append(f"{show(name)}: the name of samples is one word of letters and digits, as sample.")
+        yield f"{show(name)}: the name of samples is one word of letters and digits, as sample."
     if not count:
-        wrong.append(f"{name}: these samples have no parameter; give some, as {{'gap': [0.5, 0.6]}}.")
+        yield f"{name}: these samples have no parameter; give some, as {{'gap': [0.5, 0.6]}}."
     if len({column.size for column in columns}) > 1:
         sizes = ", ".join(f"{column.name} has {column.size}" for column in columns)
-        wrong.append(f"{name}: all parameters of samples need equally many values; {sizes}.")
-    wrong += [
-        f"{column.name}: samples are numbers; make an axis of its own of these names."
-        for column in columns
-        if not column.numeric
-    ]
-    return [Axis(name, tuple(columns))] if columns else []
+        yield f"{name}: all parameters of samples need equally many values; {sizes}."
+    for column in columns:
+        if not column.numeric:
+            yield f"{column.name}: samples are numbers; make an axis of its own of these names."
 
 
 def _unknown(key: str, parameters: Parameters | None, machine: Machine | None = None) -> str:
@@ -312,12 +302,29 @@ class Plan:
     """A grid of `shape` in chunks of shape `chunk`, the last index fastest; those at the edge are smaller.
 
     >>> plan = Plan((3, 5), (1, 2))
-    >>> plan.chunks, plan.index(5), plan.place(5), plan.size_at((1, 2))
+    >>> plan.chunks, plan.index(5), plan.place((1, 2)), plan.size((1, 2))
     (9, (1, 2), (slice(1, 2, None), slice(4, 5, None)), 1)
     """
 
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
+
+    @classmethod
+    def of(cls, shape: Sequence[int], single: Sequence[bool], most: int | None = None) -> Plan:
+        """Chunks of at most `most` starts, of one value along the axes that are `single`.
+
+        Without `most` a chunk has a 64th of the grid, within 1,024 and 16,384 starts.
+
+        >>> Plan.of((1000, 1000), (False, False)).chunk, Plan.of((2, 100), (True, False)).chunk
+        ((15, 1000), (1, 100))
+        """
+        room = min(max(math.prod(shape) // PARTS, LEAST), MOST) if most is None else most
+        chunk = list[int]()
+        for size, alone in zip(reversed(shape), reversed(single), strict=True):
+            step = 1 if alone else max(1, min(size, room))
+            room //= step
+            chunk.insert(0, step)
+        return cls(tuple(shape), tuple(chunk))
 
     @property
     def starts(self) -> int:
@@ -336,49 +343,24 @@ class Plan:
 
     def index(self, number: int) -> tuple[int, ...]:
         """Where a chunk stands among the chunks of each axis."""
-        found = []
-        for count in reversed(self.counts):
-            number, remainder = divmod(number, count)
-            found.append(remainder)
-        return tuple(reversed(found))
+        return tuple(map(int, np.unravel_index(number, self.counts)))
 
-    def place(self, number: int) -> tuple[slice, ...]:
+    def place(self, index: Sequence[int]) -> tuple[slice, ...]:
         """The part of the grid that is a chunk's."""
-        return self.place_at(self.index(number))
+        each = zip(index, self.chunk, self.shape, strict=True)
+        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in each)
 
-    def place_at(self, index: Sequence[int]) -> tuple[slice, ...]:
-        """The same from where the chunk stands among the chunks of each axis."""
-        return tuple(
-            slice(i * step, min((i + 1) * step, size))
-            for i, step, size in zip(index, self.chunk, self.shape, strict=True)
-        )
+    def size(self, index: Sequence[int]) -> int:
+        """How many starts a chunk has."""
+        return math.prod(part.stop - part.start for part in self.place(index))
 
-    def size_at(self, index: Sequence[int]) -> int:
-        """How many starts the chunk there has."""
-        return math.prod(part.stop - part.start for part in self.place_at(index))
-
-
-def plan_for(shape: Sequence[int], single: Sequence[bool], most: int | None = None) -> Plan:
-    """Chunks of at most `most` starts, of one value along the axes that are `single`.
-
-    Without `most` a chunk has a 64th of the grid, within 1,024 and 16,384 starts.
-
-    >>> plan_for((1000, 1000), (False, False)).chunk, plan_for((2, 100), (True, False)).chunk
-    ((15, 1000), (1, 100))
-    """
-    room = min(max(math.prod(shape) // PARTS, LEAST), MOST) if most is None else most
-    chunk = []
-    for size, alone in zip(reversed(shape), reversed(single), strict=True):
-        step = 1 if alone else max(1, min(size, room))
-        room //= step
-        chunk.append(step)
-    return Plan(tuple(shape), tuple(reversed(chunk)))
+    def indices(self) -> Iterator[tuple[int, ...]]:
+        """Where each chunk stands, one after another."""
+        return map(self.index, range(self.chunks))
 
 
 def checked_chunk(value: object) -> int | None:
     """The number of starts of a chunk, or None."""
-    if value is None:
-        return None
-    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+    if value is None or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
         return value
     raise InputError(f"chunk = {value!r}: the starts of a chunk are a whole number of 1 or more.")

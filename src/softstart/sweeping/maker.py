@@ -60,32 +60,23 @@ class Maker:
             return replace(self.given, **more) if more else self.given
         return make_controller(name or self.given, {**self.values, **more}, allow_code=self.allow_code)
 
-    def parameters(self) -> Parameters:
-        """Those of its class."""
-        found = _parameters_of(self._class_of(self.given), self.shown)
-        found.fixed = tuple(self.values)
-        return found
-
-    def common_parameters(self, names: Sequence[str]) -> Parameters:
-        """Those that all controllers of these names have."""
-        wrong = Mistakes()
-        tables = []
-        for name in names:
+    def parameters(self, names: Sequence[str] | None = None) -> Parameters:
+        """Those of the controller; or those that all controllers of these names have."""
+        wrong, tables = Mistakes(), list[Parameters]()
+        for one in [self.given] if names is None else names:
             with wrong.noted():
-                tables.append(_parameters_of(self._class_of(name), name))
+                tables.append(_parameters_of(self._class_of(one), self.shown if names is None else str(one)))
         wrong.settle()
-        shared = Parameters(
-            {
-                name: known
-                for name, known in (tables[0] if tables else {}).items()
-                if all(
-                    name in table and (table[name].unit, table[name].kind) == (known.unit, known.kind)
-                    for table in tables
-                )
-            }
-        )
-        if len(tables) > 1:
-            shared.lacking = f"not all of {', '.join(names)} have this parameter"
+        shared, *others = tables or [Parameters()]
+        if others:
+            same = [
+                n
+                for n, one in shared.items()
+                if all(table.get(n, one[:0])[::2] == one[::2] for table in others)
+            ]
+            shared = Parameters({name: shared[name] for name in same})
+            shared.lacking = f"not all of {', '.join(map(str, names or ()))} have this parameter"
+        shared.fixed = tuple(self.values) if names is None else ()
         return shared
 
     def _class_of(self, given: str | Controller) -> type[Controller]:

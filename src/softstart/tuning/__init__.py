@@ -1,6 +1,7 @@
 """Gains tuned over gaps and load inertias: a schedule, one robust set, and the price of robustness.
 
-`tune` (solving.py) reads the question (question.py, ranges.py), tries candidates (trials.py) in searches
-(search.py) whose parts are spread over threads, processes or a cluster (work.py), and finds the best gains of
-each cell and one set for all (gains.py). tables.py and outcome.py hold what was found.
+What is minimised: K_dyn, or another figure, of the worst start (or a quantile) that gains are judged by, as
+long as these starts keep the bound on the start time; trials.py computes this cost of a candidate in one
+batch. `tune` (solving.py) reads the question (question.py, ranges.py); gains.py searches the gains of all
+cells at once by differential evolution (search.py). tables.py and outcome.py hold what was found.
 """

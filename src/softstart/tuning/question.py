@@ -24,7 +24,8 @@ from softstart.input.parameters import Knob
 from softstart.optimal.problem import StartTime
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import nearest, to_si
-from softstart.tuning.ranges import Range, latin
+from softstart.tuning.ranges import Range
+from softstart.tuning.search import latin
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
 MARGIN = "margin"  # a metric that is made large
@@ -108,10 +109,6 @@ class Question:
         found = self.drive_of(cell).knob(name)
         assert found is not None
         return float(found.value)
-
-    def fitted(self) -> list[Drive]:
-        """The drives for which controllers are set up in the cells."""
-        return [self.drive_of(cell).design_drive for cell in range(len(self.cells))]
 
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""

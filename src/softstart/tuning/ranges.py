@@ -207,10 +207,3 @@ def check_number(name: str, value: object, low: float, high: float, meaning: str
         if math.isfinite(number) and low < number <= high:
             return number
     raise InputError(f"{name} = {value!r}: give {meaning}.")
-
-
-def latin(rng: np.random.Generator, count: int, size: int) -> Vector:
-    """A Latin hypercube in the unit box: each place, one a row, in a stratum of its own along every axis."""
-    strata = rng.permuted(np.tile(np.arange(count), (size, 1)), axis=1).T
-    places: Vector = (strata + rng.random(strata.shape)) / count
-    return places

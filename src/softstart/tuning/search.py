@@ -1,109 +1,107 @@
-"""The search for the best point of a unit box: differential evolution, then a polish without derivatives.
+"""Differential evolution of many populations at once: every generation of all of them is one call.
 
-Several searches run at once, so that the candidates of all of them are started in one batch.
+A point is a place in a unit box. Costs are only compared, so that jumps of the cost do no harm.
 """
 
 from __future__ import annotations
 
-import math
-import threading
-from collections.abc import Callable, Sequence
-from queue import SimpleQueue
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import differential_evolution
 
-from softstart.arrays import Vector
-from softstart.tuning.ranges import latin
+from softstart.arrays import Indices, Vector
 
-Cost = Callable[[Vector], Vector]  # places, one a row, to their costs
+Costs = Callable[[Indices, Vector], Vector]  # which search each place (one a row) belongs to -> costs
 
-CONVERGED = 1e-4  # standard deviation of the population's costs, over their mean
-FIRST_STEP, LAST_STEP = 0.08, 2e-4
+CONVERGED = 1e-4  # standard deviation of a population's costs, over their mean
+WEIGHTS = 0.5, 1.0  # of the difference of two members, drawn for each candidate
+CROSSOVER = 0.7  # share of the parameters that are changed
 AGREES = 0.01  # of the best: within this share of it searches agree
-POLLS = 1.5  # of the polish, at most, for each generation of the search
 
 
-class Found(NamedTuple):
-    """The best place, its cost, and how many candidates were tried."""
+class Populations(NamedTuple):
+    """Places (axes: search, member, parameter), their costs, the generation, and how many were tried."""
 
-    place: Vector
-    cost: float
+    places: Vector
+    costs: Vector
+    generation: int
     tried: int
 
+    @property
+    def best(self) -> tuple[Vector, Vector]:
+        """The best place of each search, and its cost."""
+        rows, k = np.arange(len(self.costs)), self.costs.argmin(axis=1)
+        return self.places[rows, k], self.costs[rows, k]
 
-def search(cost: Cost, seeds: Any, random: tuple[int, ...], population: int, generations: int) -> Found:
-    """The least cost in the unit box, by scipy's differential evolution over whole generations at a time.
 
-    `seeds` (one a row) belong to the first population, the others fill the box as a Latin hypercube; `random`
-    seeds the generator. The polish of `polish` follows. The answer is never worse than any seed.
-
-    >>> found = search(lambda x: np.sum((x - 0.3) ** 2, axis=1), [[0.9, 0.9]], (0,), 16, 30)
-    >>> found.place.round(2).tolist(), found.cost < 1e-5
-    ([0.3, 0.3], True)
-    """
+def populations(seeds: Vector, size: int, random: tuple[int, ...]) -> Vector:
+    """First places: the seeds (axes: search, seed, parameter), and a Latin hypercube of at least `size`."""
     rng = np.random.default_rng(random)
-    first = np.atleast_2d(np.asarray(seeds, dtype=np.float64))
-    size = first.shape[1]
-    # at least as many fresh places as seeds, however many seeds there are
-    fresh = max(population - len(first), population // 2, 5)
-    start = np.concatenate([first, latin(rng, fresh, size)])
-    best = Found(first[0], np.inf, 0)
-
-    def costs(columns: Vector) -> Vector:
-        nonlocal best
-        places = columns.T if columns.ndim == 2 else columns[None, :]
-        found = cost(places)
-        k = int(np.argmin(found))
-        tried = best.tried + len(places)
-        best = (
-            Found(places[k].copy(), float(found[k]), tried)
-            if found[k] < best.cost
-            else best._replace(tried=tried)
-        )
-        return found if columns.ndim == 2 else found[0]
-
-    differential_evolution(
-        costs, [(0.0, 1.0)] * size, init=start, maxiter=generations, tol=CONVERGED, seed=rng,
-        polish=False, vectorized=True, updating="deferred",
-    )  # fmt: skip
-    after = polish(cost, best.place, best.cost, (*random, 1), generations)
-    return after._replace(tried=best.tried + after.tried)
+    fresh = max(size - seeds.shape[1], size // 2, 5)
+    return np.concatenate([seeds, [latin(rng, fresh, seeds.shape[2]) for _ in seeds]], axis=1)
 
 
-def polish(
-    cost: Cost,
-    place: Vector,
-    known: float,
-    random: tuple[int, ...],
-    generations: int,
-    step: float = FIRST_STEP,
-) -> Found:
-    """The least cost near a place: a mesh search with whole polls, without derivatives.
+def evolve(
+    costs: Costs, first: Vector | Populations, random: tuple[int, ...], generations: int
+) -> Iterator[Populations]:
+    """The populations after each generation, the first ones included; DE/best/1/bin.
 
-    Each poll tries, in one batch, a step along every axis and along as many random orthogonal directions,
-    both ways. The best one that is better becomes the centre; where none is, the step is halved, down to 2e-4
-    of the box. Jumps of the cost do no harm: only values are compared.
+    v = x_best + F (x_a - x_b), F drawn from 0.5 to 1, at random where it leaves the box; 70 % of its
+    parameters replace those of a member. The candidate stays if it is no worse. A search whose costs are
+    nearly equal is at its end. With the populations of an interrupted search the same ones follow: each
+    generation has random numbers of its own.
+
+    R. Storn, K. Price, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
+
+    >>> first = populations(np.full((1, 1, 2), 0.9), 16, (0,))
+    >>> *_, last = evolve(lambda which, x: np.sum((x - 0.3) ** 2, axis=1), first, (0,), 40)
+    >>> last.best[0].round(2).tolist()
+    [[0.3, 0.3]]
     """
-    rng = np.random.default_rng(random)
-    tried = 0
-    for _ in range(math.ceil(POLLS * generations)):
-        if step < LAST_STEP:
-            break
-        turned, _ = np.linalg.qr(rng.normal(size=(place.size, place.size)))
-        ways = np.concatenate(
-            [np.eye(place.size), turned] if place.size > 1 else [np.eye(1), 0.5 * np.eye(1)]
-        )
-        places = np.clip(place + step * np.concatenate([ways, -ways]), 0.0, 1.0)
-        found = cost(places)
-        tried += len(places)
-        k = int(np.argmin(found))
-        if found[k] < known:
-            place, known = places[k], float(found[k])
-        else:
-            step *= 0.5
-    return Found(place, known, tried)
+    if isinstance(first, Populations):
+        places, cost, begin, tried = first
+    else:
+        places, begin, tried = first, 0, first.shape[0] * first.shape[1]
+        cost = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
+        cost = cost.reshape(places.shape[:2])
+        yield Populations(places, cost, 0, tried)
+    for number in range(begin + 1, generations + 1):
+        active = np.flatnonzero(cost.std(axis=1) > CONVERGED * np.abs(cost.mean(axis=1)))
+        if not active.size:
+            return
+        candidates = _candidates(places, cost, np.random.default_rng((*random, number)))[active]
+        found = costs(np.repeat(active, places.shape[1]), np.concatenate(candidates))
+        found = found.reshape(candidates.shape[:2])
+        better = found <= cost[active]
+        places, cost = places.copy(), cost.copy()
+        places[active] = np.where(better[..., None], candidates, places[active])
+        cost[active] = np.where(better, found, cost[active])
+        tried += found.size
+        yield Populations(places, cost, number, tried)
+
+
+def _candidates(places: Vector, costs: Vector, rng: np.random.Generator) -> Vector:
+    """A candidate for each member of each search; the same whatever other searches are at their end."""
+    searches, members, size = places.shape
+    rows, own = np.arange(searches)[:, None], np.arange(members)
+    step = rng.integers(1, members, (searches, members))
+    other = rng.integers(1, members - 1, (searches, members))
+    a, b = (own + step) % members, (own + other + (other >= step)) % members  # two different others
+    best = places[rows, costs.argmin(axis=1)[:, None]]
+    weight = rng.uniform(*WEIGHTS, (searches, members, 1))
+    mutant = best + weight * (places[rows, a] - places[rows, b])
+    mutant = np.where((mutant < 0.0) | (mutant > 1.0), rng.random(places.shape), mutant)
+    changed = rng.random(places.shape) < CROSSOVER
+    changed |= np.arange(size) == rng.integers(size, size=(searches, members, 1))  # at least one
+    return np.where(changed, mutant, places)
+
+
+def latin(rng: np.random.Generator, count: int, size: int) -> Vector:
+    """A Latin hypercube in the unit box: each place, one a row, in a stratum of its own along every axis."""
+    strata = rng.permuted(np.tile(np.arange(count), (size, 1)), axis=1).T
+    places: Vector = (strata + rng.random(strata.shape)) / count
+    return places
 
 
 def agreement(costs: Any, best: float) -> tuple[int, float]:
@@ -116,72 +114,3 @@ def agreement(costs: Any, best: float) -> tuple[int, float]:
     scale = abs(best) or 1.0
     near = int(np.sum(values <= best + AGREES * scale))
     return near, float(f"{(values.max() - min(best, values.min())) / scale:.12g}")
-
-
-Search = Callable[[Cost], Any]
-Batch = Callable[[Vector, Vector], Vector]  # whose place each row is, and the rows, to their costs
-
-
-class _StoppedError(Exception):
-    """Ends a search that is waiting when another one has failed."""
-
-
-def together(batch: Batch, searches: Sequence[Search]) -> list[Any]:
-    """The results of searches, each a function of a cost function, in order.
-
-    Each search runs as if it were alone, in a thread of its own. Whenever all that still run have asked for
-    the costs of some places, `batch` is called once with these, in the calling thread. A cost depends on the
-    search and the place alone, so the results do not depend on what else runs.
-
-    >>> def halve(cost):
-    ...     return float(cost(np.array([[2.0]]))[0]) / 2
-    >>> together(lambda whose, places: places[:, 0] * (1 + whose), [halve, halve])
-    [1.0, 2.0]
-    """
-    asked: SimpleQueue[tuple[int, bool, Any]] = SimpleQueue()
-    answers: list[SimpleQueue[Any]] = [SimpleQueue() for _ in searches]
-
-    def run(index: int, search: Search) -> None:
-        def cost(places: Vector) -> Vector:
-            asked.put((index, False, places))
-            answer = answers[index].get()
-            if answer is None:
-                raise _StoppedError
-            found: Vector = answer
-            return found
-
-        try:
-            asked.put((index, True, search(cost)))
-        except BaseException as error:
-            asked.put((index, True, error))
-
-    threads = [threading.Thread(target=run, args=pair, daemon=True) for pair in enumerate(searches)]
-    for thread in threads:
-        thread.start()
-    found: list[Any] = [None] * len(searches)
-    running, waiting = len(searches), dict[int, Vector]()
-    try:
-        while running:
-            index, ended, what = asked.get()
-            if ended:
-                running -= 1
-                if isinstance(what, BaseException):
-                    raise what
-                found[index] = what
-            else:
-                waiting[index] = what
-            if running and len(waiting) == running:
-                order = sorted(waiting)
-                rows = [waiting[i] for i in order]
-                costs = batch(np.repeat(order, [len(row) for row in rows]), np.concatenate(rows))
-                waiting.clear()
-                for i, part in zip(
-                    order, np.split(costs, np.cumsum([len(row) for row in rows])[:-1]), strict=True
-                ):
-                    answers[i].put(part)
-    finally:
-        for queue in answers:
-            queue.put(None)  # whoever still waits is sent home
-        for thread in threads:
-            thread.join()
-    return found

@@ -11,12 +11,11 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.parallel import Pool, checked_workers
+from softstart.parallel import Pool, checked_workers, why_not_sendable
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target
-from softstart.tuning.gains import robust_set
-from softstart.tuning.gains import schedule as tuned_schedule
+from softstart.tuning.gains import Found, Log, Progress, best_gains
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.question import (
     MARGIN,
@@ -31,8 +30,6 @@ from softstart.tuning.question import (
 )
 from softstart.tuning.ranges import Free, check_number, ranges_of
 from softstart.tuning.tables import (
-    Asked,
-    Optima,
     between_table,
     check_metric,
     optima,
@@ -41,9 +38,9 @@ from softstart.tuning.tables import (
     schedule_table,
 )
 from softstart.tuning.trials import Trials
-from softstart.tuning.work import Log, Progress, Workers, pool_for
 
-GENERATIONS = 40
+WORTH_SHARING = 20_000  # starts of a plain controller from which on processes are started
+GENERATIONS = 60
 DRAWN = 100  # drives that stand for an identification
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
@@ -183,42 +180,59 @@ def tune(
     if not (schedule or robust):
         raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
     log = Log(progress)
-    log.begin("starts with the defaults")
-    trials = Trials(question)
-    check_metric(trials)
-    size = len(question.cells) * len(question.scenarios) * question.restarts
-    found, one = None, None
-    best: Optima = {}
+    log.tell("starts with the defaults")
+    sides = {
+        name: Trials(question, robust=name == "robust")
+        for name, wanted in (("schedule", schedule), ("robust", robust)) if wanted
+    }  # fmt: skip
+    found: dict[str, tuple[Trials, Found]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
     with Records(target, question.inputs(), ["part"]) as kept:
-        with pool_for(trials, workers, scheduler, size * question.population * question.generations) as pool:
-            work = Workers(trials, pool)
-            if schedule:
-                found = tuned_schedule(work, kept, log)
-            if robust:
-                one = robust_set(work, kept, log, found)
+        with _pool_for(*sides.values(), workers=workers, scheduler=scheduler) as pool:
+            for name, trials in sides.items():
+                check_metric(trials)
+                before = found.get("schedule")
+                found[name] = trials, best_gains(trials, pool, kept, log, before and before[1])
+        best = {}
         if certified and metric == "k_dyn":
-            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
-                best = optima(pool, question, kept, log, _bounds(trials, schedule, robust))
+            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_optimum) as pool:
+                best = optima(pool, sides.values(), kept, log)
+    scheduled = found.get("schedule")
     return Tuning(
         question,
-        None if found is None else schedule_table(trials, found),
-        None if one is None else robust_outcome(trials, one),
-        price_table(trials, found, one, best),
-        None if found is None else between_table(trials, found),
+        scheduled and schedule_table(*scheduled),
+        robust_outcome(*found["robust"]) if robust else None,
+        price_table(found, best),
+        scheduled and between_table(*scheduled),
         log.starts,
         log.seconds,
     )
 
 
-def _described(asked: Asked) -> str:
+def _pool_for(first: Trials, *_: Trials, workers: int | None, scheduler: str | None) -> Pool:
+    """Where candidates are started: threads for compiled controllers, else processes, or a cluster."""
+    question, count = first.question, checked_workers(workers, scheduler)
+    starts = len(question.cells) * len(question.scenarios) * question.restarts
+    if not first.compiled and starts * question.population * question.generations < WORTH_SHARING:
+        count = 1
+    if scheduler is not None or (count > 1 and not first.compiled):
+        reason = why_not_sendable(question)
+        if reason and (workers is not None or scheduler is not None):
+            given = f"workers = {workers}" if scheduler is None else "scheduler"
+            raise InputError(
+                f"{given}: the controller or the metric cannot be handed to another process ({reason}); "
+                "define it at the top level of a module, or give workers=1."
+            )
+        count = 1 if reason else count
+    return Pool(count, threads=first.compiled, scheduler=scheduler, describe=_candidates)
+
+
+def _candidates(part: Any) -> str:
+    return f"candidates from number {part.first + 1} on"
+
+
+def _optimum(asked: Any) -> str:
     return f"the optimum of cell {asked.cell + 1}"
-
-
-def _bounds(trials: Trials, schedule: bool, robust: bool) -> list[tuple[int, float]]:
-    """Cells and the bounds on the start time within which their optima are asked for."""
-    sides = ((schedule, trials.yardstick.own_bound), (robust, trials.yardstick.nominal_bound))
-    return [(cell, float(t)) for asked, bounds in sides if asked for cell, t in enumerate(bounds[:, 0])]
 
 
 def _question(

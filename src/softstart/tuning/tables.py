@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,12 +17,11 @@ from softstart.optimal.optimize import optimize
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.parallel import Pool
 from softstart.store import Records
-from softstart.tuning.gains import ScheduleFound, SetFound
+from softstart.tuning.gains import Found, Log
 from softstart.tuning.outcome import RobustSet, gains_on_grid
 from softstart.tuning.question import Question
 from softstart.tuning.search import agreement
-from softstart.tuning.trials import Judged, Trials, excess, in_time, single, upper
-from softstart.tuning.work import Log
+from softstart.tuning.trials import Judged, Trials, excess, in_time, upper
 
 if TYPE_CHECKING:
     import xarray
@@ -31,83 +31,76 @@ Columns = dict[str, tuple[Any, str, str]]  # name -> values of the cells, unit, 
 
 def check_metric(trials: Trials) -> None:
     """Refuse a metric that no start has. Raises InputError."""
-    for judged in (trials.yardstick.own, trials.yardstick.nominal):
-        if np.any(np.isfinite(judged.metric)):
-            return
-    raise InputError(
-        f"metric = {trials.question.metric_name}: no start of {trials.question.recipe.label} with its "
-        "defaults has this figure; choose another metric, or give parameters with which it starts."
-    )
+    if not np.any(np.isfinite(trials.default.metric)):
+        raise InputError(
+            f"metric = {trials.question.metric_name}: no start of {trials.question.recipe.label} with its "
+            "defaults has this figure; choose another metric, or give parameters with which it starts."
+        )
 
 
-def schedule_table(trials: Trials, found: ScheduleFound) -> xarray.Dataset:
+def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
     """The schedule with what it reaches."""
-    question, yardstick = trials.question, trials.yardstick
     columns: Columns = {
-        one.name: (found.values[one.name], one.unit, f"tuned, within {one.text()}") for one in question.ranges
+        one.name: (found.values[one.name], one.unit, f"tuned, within {one.text()}")
+        for one in trials.question.ranges
     }
-    columns |= {
-        f"{one.name}_default": (trials.own_defaults[one.name], one.unit, "default") for one in question.ranges
-    }
-    columns |= _figures(trials, found.judged, yardstick.own, yardstick.own_bound)
-    near = [
-        agreement(row, min(best, row.min()))
-        for row, best in zip(found.restart_costs, found.costs, strict=True)
-    ]
-    sure = in_time(found.restart_costs).all(axis=1)
-    columns["agreement"] = (np.array([n for n, _ in near]), "1", "searches within 1 % of the best")
-    columns["spread"] = (
-        np.where(sure, [apart for _, apart in near], np.nan), "1", "how far apart the searches end",
-    )  # fmt: skip
+    columns |= {f"{one.name}_default": (trials.defaults[one.name], one.unit, "default")
+                for one in trials.question.ranges}  # fmt: skip
+    columns |= _figures(trials, found.judged)
+    near, apart = zip(*map(_agreement, found.restart_costs, found.costs), strict=True)
+    columns["agreement"] = (np.array(near), "1", "searches within 1 % of the best")
+    columns["spread"] = (np.array(apart), "1", "how far apart the searches end")
     columns["kept_default"] = (found.kept_default, "", "whether the defaults were best")
-    return _dataset(trials, columns)
+    return _dataset(trials.question, columns)
 
 
-def robust_outcome(trials: Trials, found: SetFound) -> RobustSet:
+def _agreement(restarts: Any, best: float) -> tuple[int, float]:
+    near, apart = agreement(restarts, min(best, restarts.min()))
+    return near, apart if bool(in_time(restarts).all()) else math.nan
+
+
+def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     """The robust set with what it reaches."""
-    question, yardstick = trials.question, trials.yardstick
-    controller = single(trials.controller, found.values)
-    ready, own = controller.set_up(trials.nominal)
-    near, apart = agreement(found.restart_costs, min(found.cost, found.restart_costs.min()))
-    both = (found.judged, yardstick.nominal)
-    worst, worst_default = (_quantile(one.metric.ravel(), question.quantile) for one in both)
-    over, over_default = (
-        float(excess(one.start_time.ravel(), yardstick.nominal_bound.ravel(), question.quantile))
-        for one in both
-    )
+    quantile = trials.question.quantile
+    gains = {name: float(value[0]) for name, value in found.values.items()}
+    ready, own = replace(trials.controller, **gains).set_up(trials.drives[0])
+    near, apart = _agreement(found.restart_costs[0], float(found.costs[0]))
+    both = found.judged, trials.default
+    worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
+    over, over_default = (float(excess(one.start_time, trials.bound, quantile)[0]) for one in both)
     return RobustSet(
         parameters=ready.parameters,
-        gains=found.values,
-        defaults=trials.nominal_defaults,
+        gains=gains,
+        defaults={name: float(value[0]) for name, value in trials.defaults.items()},
         worst=worst,
         worst_default=worst_default,
         excess=over,
         excess_default=over_default,
         agreement=near,
-        restarts=question.restarts,
-        spread=apart if bool(in_time(found.restart_costs).all()) else float("nan"),
-        kept_default=found.kept_default,
-        cells=_dataset(trials, _figures(trials, found.judged, yardstick.nominal, yardstick.nominal_bound)),
+        restarts=trials.question.restarts,
+        spread=apart,
+        kept_default=bool(found.kept_default[0]),
+        cells=_dataset(trials.question, _figures(trials, found.judged)),
         controller=RobustGains("robust", ready, own),
     )
 
 
-def between_table(trials: Trials, found: ScheduleFound) -> xarray.Dataset | None:
+def between_table(trials: Trials, found: Found) -> xarray.Dataset | None:
     """The schedule half way between the cells, where its gains are interpolated; None for a single cell."""
     question = trials.question
     if len(question.cells) == 1:
         return None
     gains = gains_on_grid(question, found.values)
     halves = replace(question, gaps=_halves(question.gaps), load_inertias=_halves(question.load_inertias))
-    there = Trials(halves)
+    there = Trials(halves, robust=False)
     schedule = GainSchedule(
         "schedule", trials.controller, *question.declared(),
         tuple((name, *gain) for name, gain in gains.items()),
     )  # fmt: skip
-    each = [schedule.gains_at(one.gap, one.load_inertia) for one in there.fitted]
+    each = [schedule.gains_at(one.gap, one.load_inertia) for one in there.drives]
     gains_there = {name: np.array([gains[name] for gains in each]) for name in found.values}
-    judged = there.to_the_end().of_pairs(gains_there, range(len(halves.cells)))
-    return _dataset(there, _figures(there, judged, there.yardstick.own, there.yardstick.own_bound))
+    judged = there.judged(np.arange(len(each)), gains_there, to_the_end=True)
+    return _dataset(halves, _figures(there, judged))
 
 
 def _halves(axis: tuple[float, ...]) -> tuple[float, ...]:
@@ -115,45 +108,42 @@ def _halves(axis: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(0.5 * (a + b) for a, b in pairwise(axis)) or axis
 
 
-def price_table(
-    trials: Trials, found: ScheduleFound | None, one: SetFound | None, best: Optima
-) -> xarray.Dataset | None:
-    """Robust set, schedule and optimum within the same time, side by side."""
-    question, yardstick = trials.question, trials.yardstick
-    name, columns = question.metric_name, {}
-    both = found is not None and one is not None
+def price_table(sides: dict[str, tuple[Trials, Found]], best: Optima) -> xarray.Dataset | None:
+    """Schedule, robust set and optimum within the same time, side by side."""
+    both = len(sides) == 2
     if not (both or best):
         return None
-    sides = (
-        ("schedule", found.judged if found else None, yardstick.own_bound),
-        ("robust", one.judged if one else None, yardstick.nominal_bound),
-    )
-    for side, judged, bounds in sides:
-        if judged is None:
-            continue
-        values = _over_scenarios(judged.metric, question.quantile)
-        columns[side] = (values, "1", f"{name} of the {side}")
-        columns[f"{side}_bound"] = (bounds[:, 0], "s", "bound on the start time")
+    columns: Columns = {}
+    for side, (trials, found) in sides.items():
+        question, bounds = trials.question, _by_cell(trials, trials.bound)[:, 0]
+        values = _over_scenarios(_by_cell(trials, found.judged.metric), question.quantile)
+        columns[side] = (values, "1", f"{question.metric_name} of the {side}")
+        columns[f"{side}_bound"] = (bounds, "s", "bound on the start time")
         if best:
-            records = [best.get((cell, float(bound)), {}) for cell, bound in enumerate(bounds[:, 0])]
+            records = [best.get((cell, float(bound)), {}) for cell, bound in enumerate(bounds)]
             least = _column(records, "k_dyn")
             columns[f"{side}_optimum"] = (least, "1", "least K_dyn of any start within the bound")
             columns[f"{side}_lower_bound"] = (_column(records, "k_dyn_lower_bound"), "1", "its lower bound")
             columns[f"{side}_over_optimum"] = (values / least, "1", f"{side} over optimum")
     if both:
-        columns["robust_over_schedule"] = (
-            columns["robust"][0] / columns["schedule"][0], "1", "what one set for all costs"
-        )  # fmt: skip
-    return _dataset(trials, columns)
+        ratio = columns["robust"][0] / columns["schedule"][0]
+        columns["robust_over_schedule"] = (ratio, "1", "what one set for all costs")
+    return _dataset(question, columns)
 
 
 def _column(records: list[dict[str, Any]], key: str) -> Any:
     return np.array([np.nan if record.get(key) is None else record[key] for record in records])
 
 
-def _figures(trials: Trials, tuned: Judged, default: Judged, bound: Any) -> Columns:
+def _by_cell(trials: Trials, values: Any) -> Any:
+    """Values of all starts. Axes: cell, scenario."""
+    return np.reshape(values, (-1, len(trials.question.scenarios)))
+
+
+def _figures(trials: Trials, found: Judged) -> Columns:
     """Metric and start time, tuned and with the defaults, of each cell."""
-    question = trials.question
+    question, bound = trials.question, _by_cell(trials, trials.bound)
+    tuned, default = (Judged(*(_by_cell(trials, part) for part in one)) for one in (found, trials.default))
     name, share = question.metric_name, question.quantile
     over = "" if len(question.scenarios) == 1 else f", quantile {share:g} over the tolerances"
     columns: Columns = {
@@ -163,12 +153,8 @@ def _figures(trials: Trials, tuned: Judged, default: Judged, bound: Any) -> Colu
     if over:
         columns[f"{name}_as_is"] = (tuned.metric[:, 0], "", f"{name}, tuned, nothing off")
     if name != "start_time":
-        columns["start_time"] = (tuned.start_time[:, 0], "s", "start time, tuned, nothing off")
-        columns["start_time_default"] = (
-            default.start_time[:, 0],
-            "s",
-            "start time of the defaults, nothing off",
-        )
+        for end, what, one in (("", "tuned", tuned), ("_default", "of the defaults", default)):
+            columns[f"start_time{end}"] = (one.start_time[:, 0], "s", f"start time, {what}, nothing off")
     columns["start_time_bound"] = (bound[:, 0], "s", "bound on the start time, nothing off")
     late = excess(tuned.start_time, bound, share)
     columns["excess"] = (late, "1", "share by which the start time is beyond its bound, 0 if not")
@@ -183,30 +169,23 @@ def _over_scenarios(values: Any, share: float) -> Any:
     return np.where(np.isinf(found), np.nan, found)
 
 
-def _quantile(values: Any, share: float) -> float:
-    return float(_over_scenarios(values, share))
-
-
-def _dataset(trials: Trials, columns: Columns) -> xarray.Dataset:
-
+def _dataset(question: Question, columns: Columns) -> xarray.Dataset:
     import xarray
 
-    question = trials.question
     shape = (len(question.gaps), len(question.load_inertias))
+    dims = ("gap", "load_inertia")
+
+    def about(unit: str, meaning: str) -> dict[str, str]:
+        return {"units": unit, "long_name": meaning}
+
     data = {
-        name: (
-            ("gap", "load_inertia"),
-            np.asarray(values).reshape(shape),
-            {"units": unit, "long_name": meaning},
-        )
+        name: (dims, np.asarray(values).reshape(shape), about(unit, meaning))
         for name, (values, unit, meaning) in columns.items()
     }
     coordinates = {
-        "gap": ("gap", np.array(question.gaps), {"units": "rad", "long_name": "total gap"}),
-        "load_inertia": (
-            "load_inertia", np.array(question.load_inertias), {"units": "kg*m^2", "long_name": "inertia J2"},
-        ),
-    }  # fmt: skip
+        "gap": ("gap", np.array(question.gaps), about("rad", "total gap")),
+        "load_inertia": ("load_inertia", np.array(question.load_inertias), about("kg*m^2", "inertia J2")),
+    }
     return xarray.Dataset(data, coords=coordinates)
 
 
@@ -222,27 +201,23 @@ class Asked(NamedTuple):
     base: Machine | None
 
 
-def optima(
-    pool: Pool, question: Question, saved: Records, log: Log, bounds: list[tuple[int, float]]
-) -> Optima:
-    """The least K_dyn of cells within bounds on the start time, each with its lower bound."""
-    asked = list(dict.fromkeys((cell, bound) for cell, bound in bounds if math.isfinite(bound)))
+def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Optima:
+    """The least K_dyn of each cell within its bounds on the start time, each with its lower bound."""
     found: Optima = {}
-    for cell, bound in asked:
-        record = saved.find(("optimum", cell, bound))
-        if record is not None:
-            found[cell, bound] = {name: value for name, value in record.items() if name != "part"}
-    missing = [
-        Asked(cell, bound, question.drive_of(cell), question.base)
-        for cell, bound in asked
-        if (cell, bound) not in found
-    ]
-    log.begin("optima", len(asked), len(found))
-    for one, record in pool.results(optimum_of, missing):
+    missing: dict[tuple[int, float], Asked] = {}
+    for trials in sides:
+        question = trials.question
+        for cell, bound in enumerate(_by_cell(trials, trials.bound)[:, 0].tolist()):
+            record = saved.find(("optimum", cell, bound))
+            if record is not None:
+                found[cell, bound] = record
+            elif math.isfinite(bound):
+                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell), question.base)
+    for done, (one, record) in enumerate(pool.results(optimum_of, missing.values())):
+        log.tell("optima", done, len(missing), "cell")
         found[one.cell, one.bound] = record
         if record["status"] != "NOT_FOUND":  # another attempt may find it
             saved.add({"part": ("optimum", one.cell, one.bound), **record})
-        log.did(0)
     return found
 
 

@@ -1,220 +1,230 @@
-"""Candidates tried: their starts in every cell and scenario, in one batch, and which candidate is better."""
+"""What the tuner minimises: the cost of candidate gains, judged by starts that one batch simulates.
+
+A *job* is what gains are wanted for: each cell of the schedule, judged by the scenarios of that cell, or the
+one robust set, judged by all cells. The cost of a candidate is its metric, K_dyn if nobody says otherwise, at
+the quantile over the starts of its job (1: the worst start), if these keep the bound on the start time; else
+the larger, the later they are.
+"""
 
 from __future__ import annotations
 
-import copy
 import math
-import threading
-from collections.abc import Mapping, Sequence
-from concurrent.futures import CancelledError
-from dataclasses import dataclass, replace
+import pickle
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softstart.arrays import Vector
+from softstart.arrays import Indices, Vector
 from softstart.chain.machines import varied
-from softstart.controller import CompiledController, Controller, make_controller
-from softstart.drive import Drive
+from softstart.controller import CompiledController, make_controller
 from softstart.errors import InputError
+from softstart.parallel import Pool
 from softstart.quantities import nearest
 from softstart.start.batch import Batch, Figures, prepared
 from softstart.tuning.question import MARGIN, Question
 
-Cells = NDArray[np.int64]  # axes: candidate, cell
-Values = Mapping[str, Any]  # name -> one value a candidate
+Values = Mapping[str, Vector]  # parameter -> one value a candidate
 
 PATIENCE = 3.0  # a start is given up at so many times the longest bound
+STARTS_A_CALL = 20_000  # for the sake of memory
+STARTS_A_THREAD = 600  # in a call of one of several threads, which hear no Ctrl-C meanwhile
 
 
 class Judged(NamedTuple):
-    """Metric and start time in s of starts, with the scenario as last axis. NaN where a start failed."""
+    """Metric and start time in s of starts. Axes: candidate, start of its job. NaN where a start failed."""
 
     metric: Vector
     start_time: Vector
 
 
-@dataclass(frozen=True, eq=False)
-class Yardstick:
-    """What the defaults reach, and the bounds on the start time in s: axes cell, scenario.
+class Trials:
+    """Candidates for the jobs of a question: one for each cell or, if `robust`, one for all cells.
 
-    `own` is for a controller set up for the drive of each cell, `nominal` for one set up for the nominal
-    drive.
+    `defaults` are the parameters as the controller derives them, by name, one a job; `default` is what they
+    reach and `bound` the bound on the start time of each start in s (axes: job, start).
     """
 
-    own: Judged
-    nominal: Judged
-    own_bound: Vector
-    nominal_bound: Vector
-
-    @property
-    def time_limit(self) -> float | None:
-        """When a start is given up, s: far beyond every bound."""
-        longest = max(float(self.own_bound.max()), float(self.nominal_bound.max()))
-        return PATIENCE * longest if np.isfinite(longest) else None
-
-
-class Trials:
-    """Tries candidates for a question."""
-
-    def __init__(self, question: Question, yardstick: Yardstick | None = None) -> None:
-        self.question = question
+    def __init__(self, question: Question, robust: bool, known: tuple[Judged, Vector] | None = None) -> None:
+        self.question, self.robust = question, robust
         self.controller = question.recipe.make()
-        gaps, inertias = (np.array(axis) for axis in zip(*question.cells, strict=True))
-        self.gap, self.load_inertia = gaps, inertias
-        self.starts = self._starts()
-        bases = [(question.base or question.drive_of(i)).mean_torque for i in range(len(gaps))]
-        self.base_torque = np.array(bases, dtype=np.float64)
-        self.fitted = question.fitted()
-        self.nominal = question.drive.design_drive
-        self.own_defaults = self._defaults(self.fitted)
-        self.nominal_defaults = {
-            name: float(value[0]) for name, value in self._defaults([self.nominal]).items()
-        }
+        count, scenarios = len(question.cells), len(question.scenarios)
+        starts = np.arange(count * scenarios)
+        self.starts_of = starts.reshape(1 if robust else count, -1)  # job -> its starts, cell by cell
+        cells = [question.drive_of(cell) for cell in range(count)]
+        self.drives = [question.drive.design_drive] if robust else [one.design_drive for one in cells]
+        self.base = np.repeat([(question.base or one).mean_torque for one in cells], scenarios)
+        self.batch = _starts_of_cells(question)
+        set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
+        self.compiled = isinstance(set_up[0], CompiledController)
+        self.defaults = {name: _defaults(question, name, set_up) for name in question.names}
         self.time_limit: float | None = None
-        self.stopping: threading.Event | None = None  # set when nobody wants the answer any more
-        self.compiled = isinstance(self.controller.set_up(self.nominal)[0], CompiledController)
-        self.yardstick = self._measured() if yardstick is None else yardstick
-        self.time_limit = self.yardstick.time_limit
+        self.default, self.bound = known or self._measured()
+        if np.isfinite(longest := float(self.bound.max())):
+            self.time_limit = PATIENCE * longest
 
-    def _starts(self) -> Batch:
-        """The machines that start: of each cell, one after another, those of all scenarios."""
-        question = self.question
-        own: dict[str, Any] = {"gap": self.gap, "load_inertia": self.load_inertia}
-        found = {}
-        for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
-            value = own.get(name)
-            if value is None:
-                value = np.array([question.value_in(cell, name) for cell in range(self.gap.size)])
-            columns = [one[name].of(value) if name in one else value for one in question.scenarios]
-            found[name] = np.stack(columns, axis=1).ravel()
-        return prepared(varied(question.drive, found))
-
-    def _defaults(self, drives: Sequence[Drive]) -> dict[str, Vector]:
-        """The tuned parameters as derived from the drives."""
-        rows = [self.controller.set_up(one)[0].parameters for one in drives]
-        found = {}
-        for name in self.question.names:
-            values = [row[name] for row in rows]
-            if None in values:
-                raise InputError(
-                    f"free: the controller {self.question.recipe.label} derives no default for {name}; "
-                    "tuning starts from the default, so give the parameter one."
-                )
-            found[name] = np.array(values, dtype=np.float64)
-        return found
-
-    def _measured(self) -> Yardstick:
-        """The defaults, and the bounds that follow."""
-        bound = self.question.bound
-        own = self.of_pairs({}, range(self.gap.size))
-        nominal = Judged(*(part[0] for part in self.of_set({})))
+    def _measured(self) -> tuple[Judged, Vector]:
+        """What the defaults reach, and the bounds that follow."""
+        bound, default = self.question.bound, self.judged(np.arange(len(self.drives)), {})
         if bound.kind in ("seconds", "limits"):
-            both = [np.full(own.start_time.shape, bound.value)] * 2
-        elif bound.kind == "direct":
-            both = [bound.value * self._direct()] * 2
-        else:
-            both = [np.where(np.isnan(t), np.inf, t) for t in (own.start_time, nominal.start_time)]
-        return Yardstick(own, nominal, *both)
+            return default, np.full(self.starts_of.shape, bound.value)
+        if bound.kind == "direct":
+            return default, bound.value * self._direct()[self.starts_of]
+        return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
 
     def _direct(self) -> Vector:
-        """Start time of `direct` in every cell and scenario."""
-        shape = (self.gap.size, len(self.question.scenarios))
-        direct = make_controller("direct")
-        figured = self.starts.figures(direct.set_ups(self.fitted), 1.0)
-        found: Vector = figured["start_time"][0].reshape(shape)
-        if np.any(np.isnan(found)):
-            gap, inertia = self.question.cells[int(np.argwhere(np.isnan(found))[0][0])]
+        """Start time of `direct` for every start."""
+        question = self.question
+        drives = [question.drive_of(cell).design_drive for cell in range(len(question.cells))]
+        found: Vector = self.batch.figures(make_controller("direct").set_ups(drives), 1.0)["start_time"][0]
+        if np.any(failed := np.isnan(found)):
+            gap, inertia = question.cells[int(failed.argmax()) // len(question.scenarios)]
             raise InputError(
                 f"start_time: direct does not bring a load of {inertia:g} kg m2 behind a gap of {gap:g} rad "
                 "to its target speed; give the start time in s instead of a multiple."
             )
         return found
 
-    # candidates -------------------------------------------------------------------------------------------
+    def values(self, jobs: Any, places: Vector) -> dict[str, Vector]:
+        """Values of the tuned parameters at places in their ranges; the last axis are the parameters."""
+        chosen = np.asarray(jobs)
+        return {
+            one.name: one.value(places[..., k], self.defaults[one.name][chosen])
+            for k, one in enumerate(self.question.ranges)
+        }
 
-    def to_the_end(self) -> Trials:
-        """These trials for gains that are settled: their figures are those of `simulate` to the bit.
+    def places(self, jobs: Any, values: Values) -> Vector:
+        """The places of values; the last axis are the parameters."""
+        chosen = np.asarray(jobs)
+        each = [one.place(values[one.name], self.defaults[one.name][chosen]) for one in self.question.ranges]
+        return np.stack(each, axis=-1)
 
-        A start flies through its gaps in spans that end with the time limit, and rounds by their length.
+    def costs(self, jobs: Any, places: Vector) -> Vector:
+        """The cost of each place, one a row, for a job of its own."""
+        chosen = np.asarray(jobs)
+        return self.cost(chosen, self.judged(chosen, self.values(chosen, places)))
+
+    def cost(self, jobs: Any, judged: Judged) -> Vector:
+        """The cost of what candidates reach."""
+        return cost(judged.metric, judged.start_time, self.bound[jobs], self.question.quantile)
+
+    def judged(self, jobs: Indices, values: Values, to_the_end: bool = False) -> Judged:
+        """What candidates reach, each for a job of its own; NaN where the controller refuses its values.
+
+        Without values: the controller as it is. `to_the_end` for gains that are settled: a start flies
+        through its gaps in spans that end with the time limit, and rounds by their length; without it the
+        figures are those of `simulate` to the bit.
         """
-        whole = copy.copy(self)
-        whole.time_limit = None
-        return whole
-
-    def of_pairs(self, values: Values, cells: Any) -> Judged:
-        """Candidates each for a cell of its own, and set up for it. Axes: candidate, scenario."""
-        which = np.asarray(cells, dtype=np.int64).reshape(-1, 1)
-        judged = self._judged(values, which, own=True)
-        return Judged(judged.metric[:, 0], judged.start_time[:, 0])
-
-    def of_set(self, values: Values) -> Judged:
-        """Candidates for all cells, set up for the nominal drive. Axes: candidate, cell, scenario.
-
-        Without values it is one, the defaults.
-        """
-        count = max((np.size(value) for value in values.values()), default=1)
-        return self._judged(values, np.tile(np.arange(self.gap.size), (count, 1)), own=False)
-
-    def _judged(self, values: Values, which: Cells, own: bool) -> Judged:
-        """Candidate k in the cells which[k] and all scenarios; NaN where the controller refuses it."""
-        if self.stopping is not None and self.stopping.is_set():
-            raise CancelledError
+        starts = self.starts_of[jobs]
+        set_ups = (
+            replace(self.controller, **{name: float(value[k]) for name, value in values.items()}).set_up(
+                self.drives[job]
+            )
+            for k, job in enumerate(jobs.tolist())
+        )
         try:
-            figured = self._figured(values, which, own)
+            limit = None if to_the_end else self.time_limit
+            figured = self.batch.figures(set_ups, self.base[starts].ravel(), starts.ravel(), time_limit=limit)
         except InputError:
             if not values:
                 raise  # the defaults are no candidate: the input is wrong
-            if len(which) == 1:
-                nothing = np.full((*which.shape, len(self.question.scenarios)), np.nan)
-                return Judged(nothing, nothing)
+            if len(jobs) == 1:
+                return Judged(*np.full((2, *starts.shape), np.nan))
             each = [
-                self._judged(
-                    {name: value[k : k + 1] for name, value in values.items()}, which[k : k + 1], own
-                )
-                for k in range(len(which))
+                self.judged(jobs[k : k + 1], {n: v[k : k + 1] for n, v in values.items()}, to_the_end)
+                for k in range(len(jobs))
             ]
             return Judged(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
-        return self._read(figured, which)
+        return self._read(figured, starts.shape)
 
-    def _figured(self, values: Values, which: Cells, own: bool) -> Figures:
-        """The figures of all starts, in one call."""
-        scenarios = len(self.question.scenarios)
-        starts = (which[..., None] * scenarios + np.arange(scenarios)).ravel()
-        set_ups = [
-            single(self.controller, {name: value[k] for name, value in values.items()}).set_up(
-                self.fitted[cell] if own else self.nominal
-            )
-            for k, cell in enumerate(which[:, 0].tolist())
-        ]
-        base = np.repeat(self.base_torque[which.ravel()], scenarios)
-        return self.starts.figures(set_ups, base, starts, time_limit=self.time_limit)
-
-    def _read(self, figured: Figures, which: Cells) -> Judged:
-        shape = (*which.shape, len(self.question.scenarios))
+    def _read(self, figured: Figures, shape: tuple[int, ...]) -> Judged:
         found = {name: values for name, (values, _, _) in figured.items()}
         metric = self.question.metric
         if metric == MARGIN:
-            return Judged((1.0 - found[MARGIN]).reshape(shape), found["start_time"].reshape(shape))
-        if isinstance(metric, str) and metric not in found:
-            near = nearest(metric, found)
-            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(found)}."
-            raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
-        value = found[metric] if isinstance(metric, str) else metric(found)
-        numbers = np.asarray(value)
+            value = 1.0 - found[MARGIN]
+        elif isinstance(metric, str):
+            if metric not in found:
+                near = nearest(metric, found)
+                hint = f"did you mean {near}?" if near else f"choose one of {', '.join(found)}."
+                raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
+            value = found[metric]
+        else:
+            value = np.asarray(metric(found))
         count = math.prod(shape)
-        if numbers.shape != (count,) or numbers.dtype.kind not in "fiu":
+        if value.shape != (count,) or value.dtype.kind not in "fiu":
             raise InputError(
-                f"metric = {self.question.metric_name}: for {count} starts it gives {numbers.dtype} "
-                f"of shape {numbers.shape}; it has to be one number a start."
+                f"metric = {self.question.metric_name}: for {count} starts it gives {value.dtype} "
+                f"of shape {value.shape}; it has to be one number a start."
             )
-        return Judged(numbers.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
+        return Judged(value.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
 
 
-def single(controller: Controller, values: Values) -> Controller:
-    """The controller with these values as single numbers."""
-    return replace(controller, **{name: float(value) for name, value in values.items()})
+def _starts_of_cells(question: Question) -> Batch:
+    """The machines that start: of each cell, one after another, those of all scenarios."""
+    gaps, inertias = np.array(question.cells).T
+    own: dict[str, Any] = {"gap": gaps, "load_inertia": inertias}
+    found = {}
+    for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
+        value = own.get(name)
+        if value is None:
+            value = np.array([question.value_in(cell, name) for cell in range(gaps.size)])
+        columns = [one[name].of(value) if name in one else value for one in question.scenarios]
+        found[name] = np.stack(columns, axis=1).ravel()
+    return prepared(varied(question.drive, found))
+
+
+def _defaults(question: Question, name: str, set_up: list[Any]) -> Vector:
+    """A tuned parameter as the controller derives it for each job."""
+    values = [one.parameters[name] for one in set_up]
+    if None in values:
+        raise InputError(
+            f"free: the controller {question.recipe.label} derives no default for {name}; "
+            "tuning starts from the default, so give the parameter one."
+        )
+    return np.array(values, dtype=np.float64)
+
+
+class SharedCosts:
+    """The costs of `trials`, computed by the workers of a pool in any number of parts: the same bits."""
+
+    def __init__(self, trials: Trials, pool: Pool) -> None:
+        self.trials, self.pool = trials, pool
+        elsewhere = pool.scheduler is not None or (pool.count > 1 and not pool.threads)
+        about = (trials.question, trials.robust, (trials.default, trials.bound))
+        self._packed = pickle.dumps(about) if elsewhere else b""
+
+    def __call__(self, jobs: Indices, places: Vector) -> Vector:
+        most = STARTS_A_THREAD if self.pool.threads and self.pool.count > 1 else STARTS_A_CALL
+        size = min(-(-len(jobs) // self.pool.count), max(most // self.trials.starts_of.shape[1], 1))
+        parts = (Part(k, self._packed, jobs[k : k + size], places[k : k + size])
+                 for k in range(0, len(jobs), size))  # fmt: skip
+        found = np.empty(len(jobs))
+        for part, costs in self.pool.results(_costs if self._packed else self._here, parts):
+            found[part.first : part.first + size] = costs
+        return found
+
+    def _here(self, part: Part) -> Vector:
+        return self.trials.costs(part.jobs, part.places)
+
+
+class Part(NamedTuple):
+    """Candidates from number `first` on; `trials` makes the same trials in another process."""
+
+    first: int
+    trials: bytes
+    jobs: Indices
+    places: Vector
+
+
+@lru_cache(maxsize=2)
+def _trials(packed: bytes) -> Trials:
+    return Trials(*pickle.loads(packed))
+
+
+def _costs(part: Part) -> Vector:
+    return _trials(part.trials).costs(part.jobs, part.places)
 
 
 TOO_SLOW = 1e30  # where the costs of candidates begin that start, but not in time

@@ -11,7 +11,7 @@ import numpy as np
 
 from softstart.drive import PARAMETERS
 from softstart.start.status import Status
-from softstart.sweeping.summary import plan_of
+from softstart.sweeping.summary import pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
 from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number
@@ -74,13 +74,13 @@ def _each(results: xarray.Dataset, name: str, across: list[str], rest: list[str]
 def _worst(results: xarray.Dataset, name: str, across: list[str]) -> Any:
     """The largest value over all axes that are not drawn, of a margin the least, read piece by piece."""
     worse = np.fmin if name == "margin" else np.fmax
-    field, plan = results[name], plan_of(results)
+    field = results[name]
     kept = [list(field.dims).index(dim) for dim in across]
     away = tuple(i for i in range(field.ndim) if i not in kept)
-    found = np.full([plan.shape[i] for i in kept], np.nan)
-    for place in map(plan.place, range(plan.chunks)):
+    found = np.full([field.shape[i] for i in kept], np.nan)
+    for place, values in pieces(results, name):
         part = tuple(place[i] for i in kept)
-        found[part] = worse(found[part], worse.reduce(field[place].values, axis=away))
+        found[part] = worse(found[part], worse.reduce(values, axis=away))
     return found
 
 

@@ -118,13 +118,13 @@ def test_an_interrupted_command_keeps_its_parts_and_goes_on(interrupted, place):
     err = interrupted(
         "tune", "--controller", "ramp", *SIXTY, "--gaps", "0.5:2:6", "--inertias", "2J1:5J1:6",
         "--no-optimum", "--workers", "2", "--out", "tuned",
-        begun=lambda: len(parts_in(state)) > 1,
+        begun=lambda: bool(parts_in(state)),
     )  # fmt: skip
     assert "finished parts are kept in tuned/tuning.sqlite" in err
     assert os.listdir(place / "tuned") == ["tuning.sqlite"]
-    kept = parts_in(state)
-    assert {one["part"][0] for one in kept} == {"cell"}
-    assert {tuple(one["part"][2:]) for one in kept} <= {(0,), (1,), (2,)}
+    (kept,) = parts_in(state)
+    assert kept["part"][0] == "schedule"
+    assert 0 < kept["done"][0] < 60  # generations
 
 
 ONE_SENTENCE = {

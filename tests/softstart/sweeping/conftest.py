@@ -53,12 +53,12 @@ class Sweeping:
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
 
-    @staticmethod
-    def finished(folder: Path) -> dict[str, int]:
+    def finished(self, folder: Path) -> dict[str, int]:
         """The files of the finished chunks, and when each was written."""
         parts = parts_in(folder / "status" / "softstart.sqlite")
-        files = [name for one in parts if isinstance(one["part"], list) for name in one["files"]]
-        return {name: (folder / name).stat().st_mtime_ns for name in files if name.startswith("status/")}
+        chunks = [one["part"] for one in parts if isinstance(one["part"], list)]
+        names = ["/".join(["status", "c", *map(str, index)]) for index in chunks]
+        return {name: (folder / name).stat().st_mtime_ns for name in names}
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
         """Until so many chunks are finished."""

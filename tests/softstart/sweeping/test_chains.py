@@ -5,7 +5,7 @@ import pytest
 
 from softstart import InputError, Status, simulate, sweep
 from softstart.chain import Chain
-from softstart.sweeping.starts import known_figures
+from softstart.sweeping.compute import known_figures
 
 CHAIN = Chain.from_toml(
     Chain.load("crane-4-mass").to_toml(),

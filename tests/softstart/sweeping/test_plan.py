@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softstart import InputError
-from softstart.sweeping.grid import Plan, checked_chunk, plan_for
+from softstart.sweeping.grid import Plan, checked_chunk
 
 SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 
@@ -18,34 +18,34 @@ SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 @given(SHAPES, st.integers(1, 50), st.integers(0, 15))
 def test_chunks_part_the_grid(shape, most, singles):
     single = [bool(singles >> i & 1) for i in range(len(shape))]
-    plan = plan_for(shape, single, most)
+    plan = Plan.of(shape, single, most)
     counted = np.zeros(plan.shape, dtype=int)
-    for number in range(plan.chunks):
-        place = plan.place(number)
+    for index in plan.indices():
+        place = plan.place(index)
         counted[place] += 1
-        assert counted[place].size == plan.size_at(plan.index(number)) <= most
+        assert counted[place].size == plan.size(index) <= most
         assert all(part.stop - part.start == 1 for part, alone in zip(place, single, strict=True) if alone)
     assert (counted == 1).all()
 
 
 def test_chunks_of_a_grid_beyond_all_memory_are_found_at_once():
-    plan = plan_for([10_000] * 4, [False] * 4)
+    plan = Plan.of([10_000] * 4, [False] * 4)
     assert plan.starts == 10**16
     assert math.prod(plan.chunk) <= 16_384
-    last = plan.place(plan.chunks - 1)
+    last = plan.place(plan.index(plan.chunks - 1))
     assert [part.stop for part in last] == [10_000] * 4
     assert plan.index(plan.chunks - 1) == tuple(count - 1 for count in plan.counts)
 
 
 @given(st.integers(1, 10**12))
 def test_small_grids_have_work_for_many(size):
-    plan = plan_for([size], [False])
+    plan = Plan.of([size], [False])
     assert plan.chunk[0] <= 16_384
     assert plan.chunks >= min(64, size // 1024)
 
 
 def test_the_last_index_is_the_fastest():
-    assert [Plan((2, 4), (1, 2)).place(n)[1].start for n in range(4)] == [0, 2, 0, 2]
+    assert list(Plan((2, 4), (1, 2)).indices()) == [(0, 0), (0, 1), (1, 0), (1, 1)]
 
 
 @pytest.mark.parametrize("chunk", [0, -1, 1.5, True, "many"])

@@ -13,7 +13,7 @@ from softstart import Command, Drive, InputError, PlainController, Status, recor
 from softstart.controller import make_controller, parameter, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.start.recommendation import Row
-from softstart.sweeping.starts import known_figures
+from softstart.sweeping.compute import known_figures
 from softstart.sweeping.summary import summarise
 from softstart.views.sweeps import conclusion, sweep_figure
 

@@ -24,11 +24,8 @@ def test_each_candidate_is_the_start_that_simulate_makes(name, position):
     tried = trials(name, chain, OFF, gaps=(0.5, 1.0), load_inertias=(40.0, 69.2))
     cells = np.array([0, 3])
     places = np.random.default_rng(3).random((2, len(tried.question.ranges)))
-    values = {
-        one.name: one.value(places[:, k], tried.own_defaults[one.name][cells])
-        for k, one in enumerate(tried.question.ranges)
-    }
-    judged = tried.to_the_end().of_pairs(values, cells)
+    values = tried.values(cells, places)
+    judged = tried.judged(cells, values, to_the_end=True)
     for k, cell in enumerate(cells):
         one = tried.question.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
@@ -74,20 +71,6 @@ def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
     assert found.price is not None
     assert "schedule_optimum" not in found.price  # asked for a chain alone
     json.dumps(found.summary())
-
-
-def test_an_interrupted_tuning_goes_on_to_the_same_bits(tmp_path):
-    def stopped(text):
-        if "neighbours" in text:
-            raise KeyboardInterrupt
-
-    asked = {"gaps": ["1x", "2x"], "inertias": ["1x"], "free": ["time"], "robust": False, **QUICK}
-    file = tmp_path / "tuning.sqlite"
-    with pytest.raises(KeyboardInterrupt):
-        tune(DAMPED, "s-curve", save_to=file, progress=stopped, **asked)
-    again, whole = tune(DAMPED, "s-curve", save_to=file, **asked), tune(DAMPED, "s-curve", **asked)
-    assert again.schedule.identical(whole.schedule)
-    assert again.starts < whole.starts
 
 
 def test_gaps_and_inertias_of_a_chain():

@@ -1,10 +1,10 @@
-"""The search: what it finds, that jumps do it no harm, and that running at once changes nothing."""
+"""The search: what it finds, that jumps do it no harm, and that it goes on where it was."""
 
 import numpy as np
 import pytest
 from scipy.optimize import rosen
 
-from softstart.tuning.search import agreement, polish, search, together
+from softstart.tuning.search import agreement, evolve, populations
 from softstart.tuning.trials import cost, excess, in_time, upper
 
 
@@ -24,66 +24,46 @@ def many(places):
     return np.sum(z**2 - 10.0 * np.cos(2.0 * np.pi * z) + 10.0, axis=1)
 
 
-@pytest.mark.parametrize(("cost_of", "least"), [(valley, 1e-3), (stairs, 2e-3), (many, 1e-2)])
-def test_the_least_cost_is_found(cost_of, least):
-    found = search(cost_of, [0.5, 0.5], (1,), 24, 60)
-    assert found.cost <= least
-    assert found.cost == cost_of(found.place[None])[0]
+PROBLEMS = [valley, stairs, many]
+
+
+def searched(problems, seeds, generations, first=None):
+    """The last populations of searches at once, one for each problem."""
+    seeds = np.broadcast_to(np.array(seeds, dtype=float), (len(problems), *np.shape(seeds)))
+
+    def costs(which, places):
+        return np.array([problems[k](row[None])[0] for k, row in zip(which, places, strict=True)])
+
+    begin = populations(seeds, 24, (1,)) if first is None else first
+    *_, last = evolve(costs, begin, (1,), generations)
+    return last
+
+
+def test_the_least_costs_are_found():
+    found = searched(PROBLEMS, [[0.5, 0.5]], 60)
+    places, costs = found.best
+    assert (costs <= [1e-3, 2e-3, 1e-2]).all()
+    assert costs.tolist() == [one(place[None])[0] for one, place in zip(PROBLEMS, places, strict=True)]
+    assert np.all((found.places >= 0.0) & (found.places <= 1.0))
 
 
 def test_the_answer_is_never_worse_than_a_seed():
     best = np.array([0.4, 0.4])
-    found = search(many, [best, [0.9, 0.9]], (2,), 8, 1)
-    assert found.cost <= many(best[None])[0]
-    assert np.all((found.place >= 0.0) & (found.place <= 1.0))
+    assert searched([many], [best, [0.9, 0.9]], 1).best[1][0] <= many(best[None])[0]
 
 
-def test_polish_ends_at_a_corner():
-    found = polish(lambda x: -x.sum(axis=1), np.array([0.9, 0.2, 0.5]), -1.6, (0,), 40)
-    assert found.place.tolist() == [1.0, 1.0, 1.0]
+def test_a_corner_and_one_parameter():
+    assert searched([lambda x: -x.sum(axis=1)], [[0.9, 0.2, 0.5]], 80).best[1][0] <= -2.999
+    assert searched([lambda x: np.abs(x[:, 0] - 0.123)], [[0.5]], 30).best[0][0, 0] == pytest.approx(
+        0.123, abs=3e-4
+    )
 
 
-def test_one_parameter():
-    found = search(lambda x: np.abs(x[:, 0] - 0.123), [0.5], (0,), 8, 30)
-    assert found.place[0] == pytest.approx(0.123, abs=3e-4)
-
-
-def test_searches_at_once_find_what_they_find_alone():
-    costs = [valley, stairs, many]
-    alone = [search(one, [0.5, 0.5], (k,), 8 + 4 * k, 5 + k) for k, one in enumerate(costs)]
-    calls = []
-
-    def batch(whose, places):
-        calls.append(set(whose.tolist()))
-        return np.array([costs[k](row[None])[0] for k, row in zip(whose, places, strict=True)])
-
-    runs = [
-        lambda cost_of, k=k: search(cost_of, [0.5, 0.5], (k,), 8 + 4 * k, 5 + k) for k in range(len(costs))
-    ]
-    for a, b in zip(alone, together(batch, runs), strict=True):
-        assert (a.place.tolist(), a.cost, a.tried) == (b.place.tolist(), b.cost, b.tried)
-    assert calls[0] == {0, 1, 2}
-
-
-def test_a_search_that_fails_ends_all():
-    def fails(cost_of):
-        cost_of(np.zeros((1, 1)))
-        raise ZeroDivisionError("its own")
-
-    def goes_on(cost_of):
-        while True:
-            cost_of(np.zeros((1, 1)))
-
-    with pytest.raises(ZeroDivisionError, match="its own"):
-        together(lambda whose, places: places[:, 0], [goes_on, fails, goes_on])
-
-
-def test_a_batch_that_fails_ends_all():
-    def broken(whose, places):
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        together(broken, [lambda cost_of: cost_of(np.zeros((2, 3)))] * 3)
+def test_a_search_goes_on_from_its_populations_to_the_same_bits():
+    whole, half = (searched(PROBLEMS, [[0.5, 0.5]], count) for count in (12, 5))
+    again = searched(PROBLEMS, [[0.5, 0.5]], 12, half)
+    for one, other in zip(whole, again, strict=True):
+        assert np.array_equal(one, other)
 
 
 # the rule -------------------------------------------------------------------------------------------------

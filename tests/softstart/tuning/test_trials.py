@@ -14,7 +14,7 @@ from softstart.tuning.trials import Trials
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
-def trials(name, drive=CRANE, tolerances=None, **change):
+def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
     recipe = recipe_of(name)
     asked = {
         "drive": drive, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
@@ -22,7 +22,7 @@ def trials(name, drive=CRANE, tolerances=None, **change):
         "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
         "population": 8, "generations": 2,
     }  # fmt: skip
-    return Trials(Question(**(asked | change)))
+    return Trials(Question(**(asked | change)), robust)
 
 
 @pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback", "s-curve"])
@@ -31,11 +31,8 @@ def test_each_candidate_is_the_start_that_simulate_makes(name):
     assert tried.compiled
     places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
     cells = np.array([0, 3, 1])
-    values = {
-        one.name: one.value(places[:, k], tried.own_defaults[one.name][cells])
-        for k, one in enumerate(tried.question.ranges)
-    }
-    judged = tried.of_pairs(values, cells)
+    values = tried.values(cells, places)
+    judged = tried.judged(cells, values)
     for k, cell in enumerate(cells):
         drive = tried.question.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
@@ -47,20 +44,20 @@ def test_each_candidate_is_the_start_that_simulate_makes(name):
 
 
 def test_one_set_is_set_up_for_the_nominal_drive():
-    tried = trials("acceleration-delay")
-    judged = tried.of_set({"torque": np.array([12.0, 20.0])})
+    tried = trials("acceleration-delay", robust=True)
+    judged = tried.judged(np.zeros(2, dtype=int), {"torque": np.array([12.0, 20.0])})
     for k, torque in enumerate((12.0, 20.0)):
         for cell in range(4):
             drive = tried.question.drive_of(cell)
             run = simulate(drive, "acceleration-delay", parameters={"torque": torque}, fitted_to=CRANE)
-            assert judged.metric[k, cell, 0] == pytest.approx(run.k_dyn, rel=1e-12)
-            assert judged.start_time[k, cell, 0] == pytest.approx(run.start_time, rel=1e-12)
+            assert judged.metric[k, cell] == pytest.approx(run.k_dyn, rel=1e-12)
+            assert judged.start_time[k, cell] == pytest.approx(run.start_time, rel=1e-12)
 
 
 def test_what_follows_from_a_gain_follows_the_candidate():
     """The default delay is the length of stage 2 under the candidate's torque, not under the default's."""
     tried = trials("acceleration-delay", ranges=ranges_of(make_controller("acceleration-delay"), ["torque"]))
-    judged = tried.of_pairs({"torque": np.array([20.0])}, [3])
+    judged = tried.judged(np.array([3]), {"torque": np.array([20.0])})
     run = simulate(tried.question.drive_of(3), "acceleration-delay", parameters={"torque": 20.0})
     assert judged.metric[0, 0] == run.k_dyn
 
@@ -68,7 +65,7 @@ def test_what_follows_from_a_gain_follows_the_candidate():
 def test_a_candidate_that_its_controller_refuses_is_the_worst_and_alone():
     tried = trials("s-curve")
     values = {"rounding": np.array([0.5, 1.5, 1.0])}  # a share
-    judged = tried.of_pairs(values, [0, 0, 0])
+    judged = tried.judged(np.zeros(3, dtype=int), values)
     assert np.isnan(judged.metric[:, 0]).tolist() == [False, True, False]
     run = simulate(tried.question.drive_of(0), "s-curve", parameters={"rounding": 0.5})
     assert judged.metric[0, 0] == run.k_dyn

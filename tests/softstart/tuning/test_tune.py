@@ -13,6 +13,7 @@ from softstart.controller import controller_class, controller_names, make_contro
 from softstart.parallel import Pool
 from softstart.start.recommendation import Row
 from softstart.tuning.ranges import tunable
+from softstart.tuning.trials import Trials
 from softstart.views.tuning import conclusions
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -162,28 +163,26 @@ def test_the_same_seed_gives_the_same_bits(alone):
 
 @pytest.mark.parametrize("threads", [True, False])
 def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
-    monkeypatch.setattr("softstart.tuning.work.WORTH_SHARING", 0)
-    monkeypatch.setattr("softstart.tuning.gains.LARGEST_BLOCK", 3)  # so that there is something to share
-    monkeypatch.setattr("softstart.tuning.gains.STARTS_A_CALL", 48)
-    begun = []
+    parts = []
     results = Pool.results
 
     def noted(pool, *arguments):
-        begun.append((pool.count, pool.threads))
-        return results(pool, *arguments)
+        for one, found in results(pool, *arguments):
+            parts.append((pool.count, pool.threads))
+            yield one, found
 
     monkeypatch.setattr(Pool, "results", noted)
     if not threads:
-        monkeypatch.setattr("softstart.tuning.solving.pool_for", lambda *asked: Pool(2))
+        monkeypatch.setattr("softstart.tuning.solving._pool_for", lambda *trials, **asked: Pool(2))
     shared = tune(CRANE, "ramp", **GRID, **(SMALL | {"workers": 2}), **SURE)
     assert told(shared) == told(alone)
-    assert len(begun) > 10
-    assert set(begun) == {(2, threads)}
+    assert len(parts) > 10
+    assert set(parts) == {(2, threads)}
 
 
-@pytest.mark.parametrize("word", ["schedule, searches 5", "neighbours", "robust set, search 2"])
+@pytest.mark.parametrize("word", ["schedule, generation 2", "robust set, generation 1"])
 def test_an_interrupted_tuning_goes_on_where_it_was(alone, tmp_path, word, monkeypatch):
-    monkeypatch.setattr("softstart.tuning.gains.LARGEST_BLOCK", 3)
+    monkeypatch.setattr("softstart.tuning.gains.KEPT_EACH", 0.0)
     kept = tmp_path / "deep" / "tuning.sqlite"
     options = {**GRID, **SMALL, **SURE, "save_to": kept}
 
@@ -193,11 +192,11 @@ def test_an_interrupted_tuning_goes_on_where_it_was(alone, tmp_path, word, monke
 
     with pytest.raises(StopError):
         tune(CRANE, "ramp", **options, progress=stops)
-    before = parts_in(kept)
-    assert len(before) > 3
+    done = [one["done"][0] for one in parts_in(kept)]
+    assert done == ([2] if "schedule" in word else [1, 3])  # generations, of the set and of the schedule
     second = tune(CRANE, "ramp", **options)
     assert told(second) == told(alone)
-    assert all(part in parts_in(kept) for part in before)
+    assert second.starts < alone.starts
     third = tune(CRANE, "ramp", **options)
     assert told(third) == told(alone)
     assert third.starts == 0
@@ -381,36 +380,39 @@ def test_gains_that_are_tuned_already_are_not_tuned_again(alone):
         tune(CRANE, alone.robust.controller, **GRID, **SMALL)
 
 
-def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(tmp_path):
-    kept = tmp_path / "tuning.sqlite"
+def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(monkeypatch):
     grid = {"gaps": [0.5, 1.0, 2.0], "inertias": ["2 J1", "3 J1", "5 J1"]}
-    options = SMALL | {"restarts": 1, "robust": False, "free": ["time", "initial"], "save_to": kept}
-    tuned = tune(CRANE, "ramp", **grid, **options)
-    parts = parts_in(kept)
-    cells = range(9)
-    best = [min((p for p in parts if p["part"][1] == cell), key=lambda p: p["cost"]) for cell in cells]
-    found = tuned.schedule.k_dyn.to_numpy().ravel()
-    assert np.all(found <= np.array([p["cost"] for p in best]) * (1.0 + 1.001e-3))
+    options = SMALL | {"restarts": 1, "robust": False, "free": ["time", "initial"]}
+    smooth = tune(CRANE, "ramp", **grid, **options)
+    monkeypatch.setattr("softstart.tuning.gains.SMOOTHINGS", 0)
+    rough = tune(CRANE, "ramp", **grid, **options)
+    assert bool((smooth.schedule.k_dyn <= rough.schedule.k_dyn * (1.0 + 1.001e-3)).all())
+    free = smooth.question.ranges
 
-    def roughness(places):
-        return sum(
-            np.abs(places[cell] - places[other]).sum()
-            for cell in cells
-            for other in tuned.question.neighbours(cell)
-        )
+    def roughness(table):
+        places = [
+            one.place(table[one.name].to_numpy(), table[f"{one.name}_default"].to_numpy()) for one in free
+        ]
+        return sum(np.abs(np.diff(one, axis=axis)).sum() for one in places for axis in (0, 1))
 
-    defaults = {
-        one.name: tuned.schedule[f"{one.name}_default"].to_numpy().ravel() for one in tuned.question.ranges
+    assert roughness(smooth.schedule) < roughness(rough.schedule)
+
+
+def test_the_tuner_equals_brute_force():
+    """20 x 20 candidates of two parameters, in a cell and for all cells: no one is better, nor far worse."""
+    asked = {
+        "gaps": [0.5, 1.0],
+        "inertias": ["5 J1"],
+        "start_time": "1.2x",
+        "free": ["torque", "full_torque"],
     }
-    after = np.stack(
-        [
-            one.place(tuned.schedule[one.name].to_numpy().ravel(), defaults[one.name])
-            for one in tuned.question.ranges
-        ],
-        axis=1,
-    )
-    before = np.array([p["place"] for p in best])
-    assert roughness(after) < roughness(before)
+    found = tune(CRANE, "reduced-first-stage", **asked, certified=False, workers=1)
+    best = {False: found.schedule.k_dyn.to_numpy().ravel(), True: [found.robust.worst]}
+    places = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 20)] * 2), axis=-1).reshape(-1, 2)
+    for robust, jobs in best.items():
+        for job, least in enumerate(jobs):
+            brute = Trials(found.question, robust).costs(np.full(400, job), places).min()
+            assert 0.95 * brute <= least <= brute * (1.0 + 1.001e-3)
 
 
 # the margin to the limits -----------------------------------------------------------------------------------

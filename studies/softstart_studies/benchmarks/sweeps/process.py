@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from softstart.errors import SimulationError
-from softstart.sweeping.results import STATUS
-from softstart.sweeping.store import LIST
+from softstart.sweeping.store import LIST, STATUS
 
 SOFTSTART = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
 GLANCE = 0.02  # s, between looks at the finished chunks
@@ -88,11 +87,11 @@ def finished(results: Path) -> dict[str, int]:
     """The files of the finished chunks in a folder of results, and when each was written."""
     try:
         with closing(sqlite3.connect(f"file:{results / LIST}?immutable=1", uri=True)) as base:
-            records = [json.loads(text) for (text,) in base.execute("SELECT record FROM parts")]
+            parts = [json.loads(text).get("part") for (text,) in base.execute("SELECT record FROM parts")]
     except sqlite3.Error:  # it is being written
         return {}
-    files = (name for one in records if isinstance(one.get("part"), list) for name in one["files"])
-    return {name: (results / name).stat().st_mtime_ns for name in files if name.startswith(STATUS)}
+    files = ("/".join([STATUS, "c", *map(str, index)]) for index in parts if isinstance(index, list))
+    return {name: (results / name).stat().st_mtime_ns for name in files}
 
 
 def _last_words(child: subprocess.Popen[bytes]) -> str:

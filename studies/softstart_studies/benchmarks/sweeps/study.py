@@ -13,7 +13,7 @@ import numpy as np
 
 from softstart.errors import SimulationError
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
-from softstart.sweeping.summary import plan_of
+from softstart.sweeping.summary import pieces, plan_of
 from softstart_studies.benchmarks import lsoda
 from softstart_studies.benchmarks.contest import condition_table, rounded, version_of
 from softstart_studies.benchmarks.sweeps import process
@@ -223,11 +223,10 @@ def _by_lsoda(results: xarray.Dataset, count: int) -> Peer:
 
 def _same(one: xarray.Dataset, other: xarray.Dataset) -> bool:
     """Whether two sweeps are the same to the bit, read chunk by chunk."""
-    plan = plan_of(one)
     return one.sizes == other.sizes and all(
-        np.array_equal(_bits(one[name][place].values), _bits(other[name][place].values))
+        np.array_equal(_bits(values), _bits(other[name][place].values))
         for name in one.data_vars
-        for place in map(plan.place, range(plan.chunks))
+        for place, values in pieces(one, str(name))
     )
 
 
