@@ -36,14 +36,15 @@ from softstart import Drive, Identification, identify, plan_experiments, records
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS
 from softstart.errors import InputError
-from softstart.identification.fitting import usual
 from softstart.identification.planning import (
+    Bench,
     Experiment,
-    _Bench,
-    _edges,
+    edges_of,
     made_up_log,
 )  # fmt: skip
+from softstart.identification.unknowns import usual
 from softstart.start.batch import prepared
+from softstart.start.comparison import INTERVAL
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
@@ -86,10 +87,10 @@ def told(found: Identification, seconds: float) -> dict[str, Any]:
 
 def bounds_of(drive: Drive, one: Experiment, period: float) -> dict[str, float]:
     """The Cramer-Rao bound of the relative rms error of each parameter, for a torque error that is known."""
-    bench = _Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)), "angle", (), lambda _: None)
-    edges = _edges(one)
+    bench = Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)))
+    edges = edges_of(one)
     found = bench.experiment(one.name, np.diff([*edges, one.end]), one.profile.at(edges))
-    return {name: width / bench.quantile for name, width in found.widths.items()}
+    return {name: width / INTERVAL.quantile for name, width in found.widths.items()}
 
 
 def covered(

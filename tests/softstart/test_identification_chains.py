@@ -54,7 +54,7 @@ def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: 
     )
     log = made_up_log(drive, REVERSE, log_period=2e-3, torque_is=torque_is, signal=signal)  # type: ignore[arg-type]
     whole = chain_log(chain_of(drive), log, 0.0)
-    assert whole.values == pytest.approx(LogModel(log, drive).signals([{}])[0], abs=1e-11)
+    assert whole.values == pytest.approx(LogModel.of(log, drive).signals([{}])[0], abs=1e-11)
 
 
 def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None:

@@ -14,13 +14,13 @@ from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.identification.logs import TURN, Log
+from softstart.identification.model import knots_of, unlimited
 from softstart.identification.result import Estimate
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
-WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it
 
 
 def reduced_drive(machine: Any) -> Drive:
@@ -47,24 +47,13 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
 
     It starts in mid-gap where its position is unknown.
     """
-    limit = WIDE * float(np.max(np.abs(log.torque)))
-    free: dict[str, Any] = {
-        "starting_torque": limit,
-        "maximum_torque": limit,
-        "minimum_torque": -limit,
-        "encoder_lines": 0.0,
-    }
-    if log.torque_is == "measured":
-        free |= {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0}
     one = chain.positions.get("mid-gap", next(iter(chain.positions.values())))
     if one.motor is None:
         raise InputError("[motor] is missing: a drive needs its starting torque; add it to the chain.")
-    one = replace(one, motor=replace(one.motor, **free))
+    one = replace(one, motor=replace(one.motor, **unlimited(log)))
     times = log.time - log.time[0]
-    if log.torque_is == "demand":
-        profile = TorqueProfile(np.repeat(times, 2)[1:], np.repeat(log.torque, 2)[:-1])
-    else:
-        profile = TorqueProfile(times, log.torque)
+    knots, owners = knots_of(log)
+    profile = TorqueProfile(knots, log.torque[owners])
     run = simulate(one, make_controller("profile", {"profile": profile}), until=float(times[-1]))
     states = run.at(times)
     angle = states["phi"][:, one.motor_index] - states["phi"][0, one.motor_index]

@@ -194,6 +194,22 @@ class Log:
         lines += [f"{t:.9g},{u:.9g},{'' if math.isnan(value) else f'{value:.12g}'}" for t, u, value in rows]
         write_whole(Path(path), lambda stream: stream.write("\n".join(lines) + "\n"))
 
+    @classmethod
+    def planned(cls, time: Vector, torque: Vector, kind: Kind) -> Log:
+        """A demand whose motion is not known yet."""
+        one = object.__new__(cls)
+        vars(one).update(
+            time=time, torque=torque, values=np.zeros(time.size), kind=kind, torque_is="demand", name="plan",
+            count=0.0, notes=(),
+        )  # fmt: skip
+        return one
+
+    def with_values(self, values: Vector, count: float) -> Log:
+        """A planned log with a motion, and the step that it will be rounded to."""
+        one = self.first(self.time.size)
+        vars(one).update(values=values, count=count)
+        return one
+
     def first(self, count: int) -> Log:
         """The first samples of the log, as they are."""
         one = object.__new__(Log)
