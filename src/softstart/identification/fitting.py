@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import brentq, least_squares, lsq_linear, minimize
 from scipy.stats import qmc
@@ -68,7 +69,7 @@ Errors = tuple[Vector, ...]  # the torque error of each log, one number for each
 class Data(NamedTuple):
     """What a log tells: its samples that count, their values, and the deviations of their rounding."""
 
-    rows: Vector
+    rows: NDArray[np.bool_]
     values: Vector
     root: Vector
 
@@ -480,11 +481,12 @@ class Fitter:
     def end(self, i: int, sign: float, half: float, best: Point, others: Sequence[Point]) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half of it, were f linear.
 
-        Where the restricted likelihood, all else refitted, is larger than the least by the square of the
-        quantile; or a bound, if it is not as large there. It is sought from the best point and from other
-        explanations, and the farthest is the end. None lies nearer than the linear one.
+        Where `restricted`, with all else refitted, is larger than at the best point by `threshold`; or a
+        bound, if it is not as large there. It is sought from the best point and from other explanations, and
+        the farthest is the end. None lies nearer than the linear one.
         """
-        far = float(best.x[i]) + sign * half
+        bound = float((self.upper if sign > 0.0 else self.lower)[i])
+        far = sign * min(sign * float(best.x[i]) + half, sign * bound)
         for about in (best, *others):
             far = sign * max(sign * far, sign * self._end_from(i, sign, far, about, best))
         return far
@@ -515,17 +517,16 @@ class Fitter:
             return outside  # no nearer than from the best point
         return float(brentq(over, inside, outside, xtol=0.5 * NEAR * abs(outside - middle)))
 
-    def explanations(self, best: Point) -> tuple[Point, list[Point]]:
-        """The best point, and other places where the logs are explained nearly as well.
+    def explanations(self, best: Point, seek: bool) -> tuple[Point, list[Point]]:
+        """The best point, and other places where the logs are explained nearly as well, if they are sought.
 
         A start that begins at the flank and one that crosses the gap first are two valleys: no step along
         one of them finds the other. So positions begin in mid-gap with the load torque at values over its
         range, all else is fitted, then the load torque too; and again from the flank.
         """
-        best = self.valued(best, best)
         places = [i for i, one in enumerate(self.unknowns) if one.kind == "position"]
         loads = [i for i, one in enumerate(self.unknowns) if one.name == "load_torque"]
-        if not places or not loads:
+        if not seek or not places or not loads:
             return best, []
         (load,) = loads
         starts: list[tuple[Vector, int | None]] = []

@@ -466,7 +466,7 @@ class Bench:
         signal = model.signals([values_of(unknowns, x, 0)])[0]
         count = 2.0 * math.pi / (4.0 * float(self.drive.encoder_lines)) if self.drive.encoder_lines else 0.0
         count = count if self.signal == "angle" else count / period
-        model = replace(model, log=log.with_values(signal, count))
+        model = replace(model, log=log.changed(values=signal, count=count))
         logged = np.round(signal / count) * count if count else signal
         fitter = Fitter((model,), unknowns, (data_of(model, logged),))
         spot = fitter.spot(x, 0, np.zeros(model.blocks), derivatives=True)

@@ -156,10 +156,8 @@ def identify(
         timed = replace(fitter, progress=_until(deadline, fitter.progress))
         try:
             timed.progress("other explanations")
-            best, others = (
-                timed.explanations(best) if _untold(timed, best) else (timed.valued(best, best), [])
-            )
-            doubts = misfits(fitter, best) if others else []
+            best, others = timed.explanations(timed.valued(best, best), bool(_untold(timed, best)))
+            doubts = misfits(fitter, best)
             estimates = [] if doubts else _estimates(timed, best, others)
         except _TimeIsUpError:
             doubts = [
