@@ -133,7 +133,11 @@ def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
     chain = Chain.load("crane-4-mass", also=also)
     drive = reduced_drive(chain)
     plan = made_up_log(drive, REVERSE, log_period=4e-3)
-    note = reduction_note(chain, drive, plan, lambda one: identify(one, drive, searches=1).shared)
+    fitted = {
+        one.name: one.value
+        for one in identify(chain_log(chain, plan, float(drive.encoder_lines)), drive, searches=1).shared
+    }
+    note = reduction_note(chain, drive, plan, lambda _: fitted)
     moved = {name: float(text) for name, text in moved_by(note).items()}
     assert -7.0 < moved["motor_inertia"] < -4.0
     assert -40.0 < moved["gap"] < -20.0

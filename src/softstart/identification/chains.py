@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
@@ -15,7 +14,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.identification.logs import TURN, Log
 from softstart.identification.model import knots_of, unlimited
-from softstart.identification.result import Estimate
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
@@ -67,13 +65,11 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
     return Log(times, log.torque, angle=angle, torque_is=log.torque_is, name="chain")
 
 
-def reduction_note(
-    chain: Chain, drive: Drive, log: Log, fitted: Callable[[Log], tuple[Estimate, ...]]
-) -> str:
+def reduction_note(chain: Chain, drive: Drive, log: Log, told: Callable[[Log], dict[str, float]]) -> str:
     """What the reduction leaves out, and how far it moves each value.
 
     The second follows from a fit of two masses to the start of the whole chain, as it was given, under the
-    torque of the log: what comes out beside what the reduction says.
+    torque of the log: what that has `told` beside what the reduction says.
     """
     found = reduce_chain(chain, force=True)
     first, *rest = (found.vibration.Omega[1:] / TURN).tolist()
@@ -85,13 +81,13 @@ def reduction_note(
         f"with {period:.3g} s between samples {may}). "
     )
     try:
-        each = fitted(chain_log(chain, log, float(drive.encoder_lines)))
+        found_of_chain = told(chain_log(chain, log, float(drive.encoder_lines)))
     except (InputError, SimulationError) as error:
         return f"{said}How far that moves the values could not be predicted: {error}"
     moved = [
-        f"{one.name} {100.0 * (one.value / float(getattr(drive, one.name)) - 1.0):+.2g} %"
-        for one in each
-        if (one.known or math.isnan(one.upper)) and float(getattr(drive, one.name, 0.0))
+        f"{name} {100.0 * (value / given - 1.0):+.2g} %"
+        for name, value in found_of_chain.items()
+        if (given := float(getattr(drive, name, 0.0)))
     ]
     return (
         f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was "

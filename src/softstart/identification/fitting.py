@@ -185,7 +185,7 @@ class Fitter:
 
     def residual(self, x: Vector, log: int, error: Vector | None = None) -> Vector:
         """Model minus log in the samples that count, in units of their rounding."""
-        return self._residuals([x], log, error)[0]
+        return np.asarray(self._residuals([x], log, error)[0])
 
     def jacobian(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """The derivatives of the residual, by differences."""
@@ -280,11 +280,11 @@ class Fitter:
             pull = np.zeros((0, x.size)) if last else np.eye(x.size)
             plain = self._plain(share)
             found = least_squares(
-                lambda at, x=x, pull=pull, plain=plain: np.concatenate(  # type: ignore[misc]
+                lambda at, x=x, pull=pull, plain=plain: np.concatenate(
                     [*(plain.residual(at, i) for i in range(len(plain.models))), pull @ (at - x)]
                 ),
                 x,
-                jac=lambda at, pull=pull, plain=plain: np.vstack(  # type: ignore[misc]
+                jac=lambda at, pull=pull, plain=plain: np.vstack(
                     [*(plain.jacobian(at, i) for i in range(len(plain.models))), pull]
                 ),
                 bounds=(self.lower, self.upper), max_nfev=60 if last else 25, xtol=1e-10,

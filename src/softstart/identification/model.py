@@ -120,7 +120,7 @@ class LogModel:
         )[1][:, 0]  # fmt: skip
         if smoothed:
             found = filtered(self._fine, found.T, lag).T[::FINE]
-        return found / math.sqrt(self.block)
+        return np.asarray(found / math.sqrt(self.block))
 
     def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Recorded:
         """The start under the torque of the log and this error of it."""

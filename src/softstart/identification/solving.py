@@ -165,10 +165,19 @@ def identify(
                 "may explain the logs as well. Remedy: a longer --time-limit, or fewer samples."
             ]
     estimates = estimates or _without_intervals(unknowns, best.x)
+
+    def told(log: Log) -> dict[str, float]:
+        """What another log tells, by the fit alone."""
+        other = Fitter.of([LogModel.of(log, base)], unknowns_of(asked, drive, [log], [moving]), progress)
+        point = other.refined(other.search(1, seed)[0][0])
+        lost = [] if misfits(other, point) else _untold(other, point)
+        each = enumerate(zip(other.unknowns, point.x.tolist(), strict=True))
+        return {one.name: one.value(x) for i, (one, x) in each if one.log is None and i not in lost}
+
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     notes = [
         *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
-        *_reduction(machine, drive, read[0], free, progress),
+        *([reduction_note(machine, drive, read[0], told)] if len(machine.mass_names) > 2 else []),
         *doubts,
         *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
         *_other_scale(drive, drive.replace(**changes)),
@@ -203,23 +212,6 @@ def _until(deadline: float, progress: Progress) -> Progress:
         progress(text)
 
     return timed
-
-
-def _reduction(
-    machine: Any, drive: Drive, log: Log, free: Iterable[str] | None, progress: Progress | None
-) -> list[str]:
-    """What the reduction of more masses leaves out, and how far that moves what is found."""
-    if len(machine.mass_names) == 2:
-        return []
-    asked = None if free is None else list(free)
-    return [
-        reduction_note(
-            machine,
-            drive,
-            log,
-            lambda one: identify(one, drive, free=asked, searches=1, progress=progress).shared,
-        )
-    ]
 
 
 def _source(drive: Drive, logs: Sequence[Log]) -> str:
@@ -446,10 +438,10 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
             column.append(spot.rotation @ shape / np.sqrt(spot.variance(best.sizes)))
     found, amount, error = "", 0.0, 1.0 / SURE
     for name, parts in columns.items():
-        column = np.concatenate(parts)
-        alone = column - jacobian @ np.linalg.lstsq(jacobian, column, rcond=None)[0]
+        shape = np.concatenate(parts)
+        alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
         strength = float(alone @ alone)
-        if strength < 1e-6 * float(column @ column):
+        if strength < 1e-6 * float(shape @ shape):
             continue
         size, deviation = -float(alone @ residual) / strength, 1.0 / math.sqrt(strength)
         drives = size < -had.get(name, math.inf)
