@@ -9,7 +9,7 @@ import pytest
 from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
-from softstart.identification.chains import chain_log, reduced_drive, reduction_note
+from softstart.identification.chains import chain_log, reduced_drive, reduction_notes
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
 from softstart_studies.paper_r.lever import lever
@@ -137,7 +137,7 @@ def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
         one.name: one.value
         for one in identify(chain_log(chain, plan, float(drive.encoder_lines)), drive, searches=1).shared
     }
-    note = reduction_note(chain, drive, plan, lambda _: fitted)
+    (note,) = reduction_notes(chain, drive, plan, lambda _: fitted)
     moved = {name: float(text) for name, text in moved_by(note).items()}
     assert -7.0 < moved["motor_inertia"] < -4.0
     assert -40.0 < moved["gap"] < -20.0

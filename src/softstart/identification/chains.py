@@ -65,12 +65,14 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
     return Log(times, log.torque, angle=angle, torque_is=log.torque_is, name="chain")
 
 
-def reduction_note(chain: Chain, drive: Drive, log: Log, told: Callable[[Log], dict[str, float]]) -> str:
-    """What the reduction leaves out, and how far it moves each value.
+def reduction_notes(chain: Any, drive: Drive, log: Log, told: Callable[[Log], dict[str, float]]) -> list[str]:
+    """What the reduction of more than two masses leaves out, and how far it moves each value.
 
     The second follows from a fit of two masses to the start of the whole chain, as it was given, under the
     torque of the log: what that has `told` beside what the reduction says.
     """
+    if len(chain.mass_names) <= 2:
+        return []
     found = reduce_chain(chain, force=True)
     first, *rest = (found.vibration.Omega[1:] / TURN).tolist()
     period = float(np.median(np.diff(log.time)))
@@ -83,13 +85,13 @@ def reduction_note(chain: Chain, drive: Drive, log: Log, told: Callable[[Log], d
     try:
         found_of_chain = told(chain_log(chain, log, float(drive.encoder_lines)))
     except (InputError, SimulationError) as error:
-        return f"{said}How far that moves the values could not be predicted: {error}"
+        return [f"{said}How far that moves the values could not be predicted: {error}"]
     moved = [
         f"{name} {100.0 * (value / given - 1.0):+.2g} %"
         for name, value in found_of_chain.items()
         if (given := float(getattr(drive, name, 0.0)))
     ]
-    return (
+    return [
         f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was "
         f"given, under this torque: {', '.join(moved)}. The intervals do not hold this error."
-    )
+    ]

@@ -98,8 +98,9 @@ class Spot(NamedTuple):
 
     def innovations(self, sizes: Sizes) -> Vector:
         """What is left in each sample that the samples before it did not tell, of unit size."""
-        # V = upper' upper, without the product that rounding would break
+        # V = upper' upper, without the product that rounding would break, and with a positive diagonal
         upper = np.linalg.qr(np.sqrt(self.variance(sizes))[:, None] * self.rotation, mode="r")
+        upper *= np.sign(np.diag(upper))[:, None]
         return np.asarray(solve_triangular(upper, self.rotation.T @ self.residual, trans=1))
 
     def likely_error(self, residual: Vector, sizes: Sizes) -> Vector:

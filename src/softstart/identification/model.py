@@ -88,7 +88,7 @@ class LogModel:
     @property
     def times(self) -> Vector:
         """Instants of the samples after the first, s."""
-        return self.log.time - self.log.time[0]
+        return np.asarray(self.log.time - self.log.time[0])
 
     @property
     def blocks(self) -> int:

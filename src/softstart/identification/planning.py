@@ -38,14 +38,15 @@ SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
 PLACE: Final = -0.6  # position in the gap for which widths are stated
 CHECKED: Final = 257  # start positions from which an experiment is simulated first, see `largest`
-COARSE: Final = 4  # of these every fourth while a torque is designed
+DESIGN, COARSE = 2, 4  # of these every second while a torque is designed, and every fourth for the travel
 KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
 EXACT: Final = 1e-9  # relative error of a largest value
 SHORTEST: Final = 1e-13  # of the gap, between positions
 PIECES: Final = 9  # levels of a designed torque at least
-ROUGH: Final = 150, 50  # samples, and blocks of the torque error, at most while a torque is designed
+ROUGH: Final = 150  # samples at most while a torque is designed
 DRAWS: Final = 40  # random torques, from the best of which
-TRIALS: Final = 150  # torques are then tried in search of a better one
+TRIALS: Final = 200  # torques are then tried in search of a better one
+EXACTLY, EVERY = 10, 4  # so many of these, one in so many of the best, are computed exactly
 SPREAD: Final = 0.15  # of the largest level: the first steps
 WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may go
 NEAR: Final = 0.01  # relative distance of a design to its limits: for positions between those checked then
@@ -402,6 +403,11 @@ def _player(profile: TorqueProfile) -> Controller:
 
 
 def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
+    """The torque of these levels, and when it ends.
+
+    >>> steps_of(np.array([0.1, 0.2]), np.array([30.0, 10.0]))[1].__round__(12)
+    0.3
+    """
     edges = np.concatenate([[0.0], np.cumsum(durations)])
     return TorqueProfile.steps(edges, levels), float(edges[-1])
 
@@ -453,8 +459,7 @@ class Bench:
         """What these levels would tell; roughly, for a design."""
         self.progress(name)
         profile, end = steps_of(durations, levels)
-        samples, blocks = ROUGH if rough else (SAMPLES, SAMPLES)
-        period = max(self.period, end / samples)
+        period = max(self.period, end / (ROUGH if rough else SAMPLES))
         time = np.arange(0.0, end + 0.5 * period, period)
         log = Log.planned(time, profile.at(time), self.signal)
         unknowns = unknowns_of(self.free, self.drive, [log], [self.moving])
@@ -462,7 +467,7 @@ class Bench:
         x = np.array([
             one.number(float(numbers.get(one.name, getattr(self.drive, one.name, 0.0)))) for one in unknowns
         ])  # fmt: skip
-        model = LogModel.of(log, _at_rest(self.drive), blocks)
+        model = LogModel.of(log, _at_rest(self.drive), SAMPLES)
         signal = model.signals([values_of(unknowns, x, 0)])[0]
         count = 2.0 * math.pi / (4.0 * float(self.drive.encoder_lines)) if self.drive.encoder_lines else 0.0
         count = count if self.signal == "angle" else count / period
@@ -514,17 +519,19 @@ class Bench:
 
     def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> float:
         """By which share the worst of some positions exceeds the limits, below 0 where all keep them."""
-        places = self.places[::COARSE]
+        places = self.places[::DESIGN]
         found = float(self.peaks(profile, end, places)[0].max()) / torque
         if travel < math.inf:
-            found = max(found, float(self.travels(profile, end, places[::COARSE])[0].max()) / travel)
+            found = max(
+                found, float(self.travels(profile, end, self.places[:: 4 * COARSE])[0].max()) / travel
+            )
         return found - 1.0
 
     def keeping(self, one: Experiment, torque: float, travel: float) -> Experiment | None:
         """The experiment, its levels made smaller until it keeps the limits."""
         edges = edges_of(one)
         durations = np.diff([*edges, one.end])
-        for share in (1.0, 0.99, 0.97, 0.93, *0.85 ** np.arange(1, 20)):
+        for share in (1.0, 0.99, 0.98, 0.97, 0.95, 0.93, *0.85 ** np.arange(1, 20)):
             levels = share * one.profile.at(edges)
             if self.excess(*steps_of(durations, levels), torque, travel) > 0.0:
                 continue
@@ -557,15 +564,22 @@ class Bench:
                 shares = shares * (1.0 - NEAR) / (1.0 + over)
             return np.asarray(shares)
 
+        tried: list[tuple[float, Vector]] = []
+
         def score(shares: Vector) -> float:
-            return math.log(self.experiment("planned", durations, scale * limited(shares), rough=True).score)
+            kept = scale * limited(shares)
+            tried.append((self.experiment("planned", durations, kept, rough=True).score, kept))
+            return math.log(tried[-1][0])
 
         generator = np.random.default_rng(0)
         draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
-        found = minimize(score, min(draws, key=score), method="COBYLA",
-                         options={"rhobeg": SPREAD, "maxiter": TRIALS})  # fmt: skip
-        exact = self.experiment("planned", durations, scale * limited(found.x))
-        best = min((seed, self.keeping(exact, torque, travel) or seed), key=lambda one: one.score)
+        options = {"rhobeg": SPREAD, "maxiter": TRIALS}
+        minimize(score, min(draws, key=score), method="COBYLA", options=options)
+        tried.sort(key=lambda one: one[0])
+        best = seed
+        for _, each in tried[: EVERY * EXACTLY : EVERY]:
+            exact = self.keeping(self.experiment("planned", durations, each), torque, travel)
+            best = min((one for one in (best, exact) if one is not None), key=lambda one: one.score)
         by = f'"{seed.name}"' if best is seed else f'COBYLA, from "{seed.name}"'
         return replace(best, name="planned", found_by=by)
 
@@ -574,7 +588,7 @@ class Bench:
         edges = np.append(edges_of(seed), seed.end)
         each = math.ceil(PIECES / (edges.size - 1))
         cut = np.concatenate([np.linspace(*ends, each, endpoint=False) for ends in pairwise(edges)])
-        period = max(self.period, seed.end / ROUGH[0])
+        period = max(self.period, seed.end / ROUGH)
         cut = np.unique(np.round(cut / period)) * period
         return np.diff(np.append(cut, seed.end)), seed.profile.at(cut)
 

@@ -16,7 +16,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError, listed
-from softstart.identification.chains import reduced_drive, reduction_note
+from softstart.identification.chains import reduced_drive, reduction_notes
 from softstart.identification.fitting import (
     MOST_RIPPLE,
     STEP,
@@ -67,8 +67,8 @@ def identify(
     each log from its beginning over longer and longer parts, from the guess and from points up to a factor of
     4 around it, until two searches end at the same minimum. Then the squares are weighted by the covariance
     of what the encoder rounds and of a torque error that the plant integrates, both of a size that restricted
-    maximum likelihood finds; intervals allow for not knowing that size, and follow the likelihood itself
-    where they are wide.
+    maximum likelihood finds. The ends of intervals are where the likelihood, with all else and that size
+    fitted again, has dropped.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def identify(
 
     References
     ----------
-    D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; M. G. Kenward, J. H. Roger, Biometrics 53
-    (1997) 983-997; docs/identification.md.
+    D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
+    Analysis, 1988; docs/identification.md.
     """
     began = time.perf_counter()
     drive = load_machine(drive) if isinstance(drive, str) else drive
@@ -177,7 +177,7 @@ def identify(
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     notes = [
         *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
-        *([reduction_note(machine, drive, read[0], told)] if len(machine.mass_names) > 2 else []),
+        *reduction_notes(machine, drive, read[0], told),
         *doubts,
         *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
         *_other_scale(drive, drive.replace(**changes)),
