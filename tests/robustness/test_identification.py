@@ -36,14 +36,10 @@ from softstart import Drive, Identification, identify, plan_experiments, records
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS
 from softstart.errors import InputError
-from softstart.identification.fitting import usual
-from softstart.identification.planning import (
-    Experiment,
-    _Bench,
-    _edges,
-    made_up_log,
-)  # fmt: skip
+from softstart.identification.planning import Bench, Experiment, edges_of, made_up_log
+from softstart.identification.unknowns import usual
 from softstart.start.batch import prepared
+from softstart.start.comparison import INTERVAL
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
@@ -86,10 +82,10 @@ def told(found: Identification, seconds: float) -> dict[str, Any]:
 
 def bounds_of(drive: Drive, one: Experiment, period: float) -> dict[str, float]:
     """The Cramer-Rao bound of the relative rms error of each parameter, for a torque error that is known."""
-    bench = _Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)), "angle", (), lambda _: None)
-    edges = _edges(one)
+    bench = Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)))
+    edges = edges_of(one)
     found = bench.experiment(one.name, np.diff([*edges, one.end]), one.profile.at(edges))
-    return {name: width / bench.quantile for name, width in found.widths.items()}
+    return {name: width / INTERVAL.quantile for name, width in found.widths.items()}
 
 
 def covered(
@@ -145,10 +141,7 @@ def planned(number: int) -> dict[str, Any]:
             "k_dyn": run.k_dyn, "over": run.peak_torque / limit - 1.0, "by": one.found_by,
             "above": run.peak_torque / one.peak - 1.0,
         }  # fmt: skip
-    return {
-        "scores": {one.name: one.score for one in plan.experiments}, "runs": runs,
-        "gap": plan.experiments[-1].widths.get("gap"), "travel": plan.experiments[-1].travel,
-    }  # fmt: skip
+    return {"scores": {one.name: one.score for one in plan.experiments}, "runs": runs}
 
 
 def plans_of(rows: list[dict[str, Any]]) -> str:
@@ -157,19 +150,16 @@ def plans_of(rows: list[dict[str, Any]]) -> str:
     ratios = []
     for row in done:
         scores = dict(row["scores"])
-        rest = {name: scores.pop(name) for name in list(scores) if name.startswith("planned")}
-        ratios.append(rest["planned"] / min(scores.values()))
+        ratios.append(scores.pop("planned") / min(scores.values()))
     over = [row["runs"]["planned"]["over"] for row in done]
     above = [run["above"] for row in done for run in row["runs"].values()]
-    still = sum(row["travel"] == 0.0 for row in done)
     return (
         f"{len(done)} of {len(rows)} drives planned; as informative as every standard one or more: "
         f"{sum(ratio <= 1.0 for ratio in ratios)}; half intervals {100 * np.median(ratios):.0f} % of the "
         f"best of those in the median, {100 * min(ratios):.0f} to {100 * max(ratios):.0f} %\n"
         f"shaft torque and K_dyn beyond the limit, from {2 * PLACES} positions: "
         f"{sum(one > 1e-9 for one in over)}, {100 * max(over):.2g} % at most; beyond the peak that the plan "
-        f"has: {sum(one > 1e-9 for one in above)} of {len(above)} experiments, {100 * max(above):.2g} % at "
-        f"most; the load at rest throughout in {still}\n"
+        f"has: {sum(one > 1e-9 for one in above)} of {len(above)} experiments, {100 * max(above):.2g} %\n"
         + "\n".join(row["error"] for row in rows if "error" in row)
     )
 

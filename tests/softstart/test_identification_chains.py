@@ -9,7 +9,7 @@ import pytest
 from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
-from softstart.identification.chains import chain_log, reduced_drive, reduction_note
+from softstart.identification.chains import chain_log, reduced_drive, reduction_notes
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
 from softstart_studies.paper_r.lever import lever
@@ -54,7 +54,7 @@ def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: 
     )
     log = made_up_log(drive, REVERSE, log_period=2e-3, torque_is=torque_is, signal=signal)  # type: ignore[arg-type]
     whole = chain_log(chain_of(drive), log, 0.0)
-    assert whole.values == pytest.approx(LogModel(log, drive).signals([{}])[0], abs=1e-11)
+    assert whole.values == pytest.approx(LogModel.of(log, drive).signals([{}])[0], abs=1e-11)
 
 
 def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None:
@@ -133,7 +133,11 @@ def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
     chain = Chain.load("crane-4-mass", also=also)
     drive = reduced_drive(chain)
     plan = made_up_log(drive, REVERSE, log_period=4e-3)
-    note = reduction_note(chain, drive, plan, lambda one: identify(one, drive, searches=1).shared)
+    fitted = {
+        one.name: one.value
+        for one in identify(chain_log(chain, plan, float(drive.encoder_lines)), drive, searches=1).shared
+    }
+    (note,) = reduction_notes(chain, drive, plan, lambda _: fitted)
     moved = {name: float(text) for name, text in moved_by(note).items()}
     assert -7.0 < moved["motor_inertia"] < -4.0
     assert -40.0 < moved["gap"] < -20.0

@@ -28,7 +28,8 @@ def replayed(time: Vector, demand: Vector, position: float, seed: int, ripple: f
     generator = np.random.default_rng(seed)
     torque = demand + ripple * generator.standard_normal(time.size)
     blank = Log(time, torque, angle=900.0 * (time - time[0]) ** 2.1, torque_is="demand")
-    states = LogModel(blank, TRUTH.replace(start_position="mid-gap")).states({"position": position})
+    model = LogModel.of(blank, TRUTH.replace(start_position="mid-gap"))
+    states = model.motion({"position": position}).at(model.times)
     count = 2.0 * math.pi / 4096.0
     angle = np.floor(states["phi"][:, 0] / count + generator.uniform()) * count
     return Log(time, demand, angle=angle, torque_is="demand", name=f"seed {seed}")
@@ -56,7 +57,7 @@ def holds(found, width: float = 2.0) -> bool:  # type: ignore[no-untyped-def]
 def test_the_origin_of_the_clock_does_not_matter(log: Log) -> None:
     later = Log(log.time + 86400.0, log.torque, angle=log.values, torque_is="demand")
     drive = TRUTH.replace(start_position="mid-gap")
-    one, two = (LogModel(each, drive).signals([{"position": 0.3}])[0] for each in (log, later))
+    one, two = (LogModel.of(each, drive).signals([{"position": 0.3}])[0] for each in (log, later))
     assert two == pytest.approx(one, abs=1e-7)  # a day in float64 has instants of 1.5e-11 s
 
 
@@ -257,6 +258,13 @@ def test_a_measurement_file_is_the_log_that_was_written(log: Log, tmp_path: Path
             Log.load(path, columns=columns)
 
 
+def speed_of(log: Log) -> Vector:
+    """The motor's speed under the torque of a log."""
+    model = LogModel.of(log, TRUTH.replace(start_position="mid-gap"))
+    found: Vector = model.motion({}).at(model.times)["w"][:, 0]
+    return found
+
+
 @pytest.mark.parametrize("torque_is", ["demand", "measured"])
 def test_channels_with_instants_of_their_own_tell_what_common_ones_tell(
     torque_is: str, tmp_path: Path
@@ -269,9 +277,7 @@ def test_channels_with_instants_of_their_own_tell_what_common_ones_tell(
     read = Log.load(path, torque_is=torque_is)  # type: ignore[arg-type]
     assert any("different instants" in note for note in read.notes)
     # the plant under the merged log moves as under the torque alone, sampled at the instants of the angle
-    whole = Log(coarse, torque, angle=900.0 * coarse**2.1, torque_is=torque_is)  # type: ignore[arg-type]
-    drive = TRUTH.replace(start_position="mid-gap")
-    merged = LogModel(read, drive).states({})["w"][:, 0]
+    merged = speed_of(read)
     first = float(read.time[0])
     assert first == pytest.approx(0.0007)
     # from the same start: the torque before the first common instant is cut off in both
@@ -279,11 +285,10 @@ def test_channels_with_instants_of_their_own_tell_what_common_ones_tell(
     begin = np.interp(first, coarse, torque) if torque_is == "measured" else torque[0]
     cut = Log(np.r_[first, late], np.r_[begin, torque[coarse > first]], angle=np.r_[0.0, late] ** 2.1,
               torque_is=torque_is)  # type: ignore[arg-type]  # fmt: skip
-    alone = LogModel(cut, drive).states({})["w"][:, 0]
+    alone = speed_of(cut)
     common = np.isin(read.time, cut.time)
     assert common.sum() == (cut.time <= read.time[-1]).sum()
     assert merged[common] == pytest.approx(alone[: common.sum()], rel=1e-11, abs=1e-12)
-    assert whole.time.size == coarse.size
     assert int(np.isfinite(read.values).sum()) == fine.size
 
 

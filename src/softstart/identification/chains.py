@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
@@ -14,13 +13,12 @@ from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.identification.logs import TURN, Log
-from softstart.identification.result import Estimate
+from softstart.identification.model import knots_of, unlimited
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
-WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it
 
 
 def reduced_drive(machine: Any) -> Drive:
@@ -47,24 +45,13 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
 
     It starts in mid-gap where its position is unknown.
     """
-    limit = WIDE * float(np.max(np.abs(log.torque)))
-    free: dict[str, Any] = {
-        "starting_torque": limit,
-        "maximum_torque": limit,
-        "minimum_torque": -limit,
-        "encoder_lines": 0.0,
-    }
-    if log.torque_is == "measured":
-        free |= {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0}
     one = chain.positions.get("mid-gap", next(iter(chain.positions.values())))
     if one.motor is None:
         raise InputError("[motor] is missing: a drive needs its starting torque; add it to the chain.")
-    one = replace(one, motor=replace(one.motor, **free))
+    one = replace(one, motor=replace(one.motor, **unlimited(log)))
     times = log.time - log.time[0]
-    if log.torque_is == "demand":
-        profile = TorqueProfile(np.repeat(times, 2)[1:], np.repeat(log.torque, 2)[:-1])
-    else:
-        profile = TorqueProfile(times, log.torque)
+    knots, owners = knots_of(log)
+    profile = TorqueProfile(knots, log.torque[owners])
     run = simulate(one, make_controller("profile", {"profile": profile}), until=float(times[-1]))
     states = run.at(times)
     angle = states["phi"][:, one.motor_index] - states["phi"][0, one.motor_index]
@@ -78,14 +65,14 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
     return Log(times, log.torque, angle=angle, torque_is=log.torque_is, name="chain")
 
 
-def reduction_note(
-    chain: Chain, drive: Drive, log: Log, fitted: Callable[[Log], tuple[Estimate, ...]]
-) -> str:
-    """What the reduction leaves out, and how far it moves each value.
+def reduction_notes(chain: Any, drive: Drive, log: Log, told: Callable[[Log], dict[str, float]]) -> list[str]:
+    """What the reduction of more than two masses leaves out, and how far it moves each value.
 
     The second follows from a fit of two masses to the start of the whole chain, as it was given, under the
-    torque of the log: what comes out beside what the reduction says.
+    torque of the log: what that has `told` beside what the reduction says.
     """
+    if len(chain.mass_names) <= 2:
+        return []
     found = reduce_chain(chain, force=True)
     first, *rest = (found.vibration.Omega[1:] / TURN).tolist()
     period = float(np.median(np.diff(log.time)))
@@ -96,15 +83,15 @@ def reduction_note(
         f"with {period:.3g} s between samples {may}). "
     )
     try:
-        each = fitted(chain_log(chain, log, float(drive.encoder_lines)))
+        found_of_chain = told(chain_log(chain, log, float(drive.encoder_lines)))
     except (InputError, SimulationError) as error:
-        return f"{said}How far that moves the values could not be predicted: {error}"
+        return [f"{said}How far that moves the values could not be predicted: {error}"]
     moved = [
-        f"{one.name} {100.0 * (one.value / float(getattr(drive, one.name)) - 1.0):+.2g} %"
-        for one in each
-        if (one.known or math.isnan(one.upper)) and float(getattr(drive, one.name, 0.0))
+        f"{name} {100.0 * (value / given - 1.0):+.2g} %"
+        for name, value in found_of_chain.items()
+        if (given := float(getattr(drive, name, 0.0)))
     ]
-    return (
+    return [
         f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was "
         f"given, under this torque: {', '.join(moved)}. The intervals do not hold this error."
-    )
+    ]

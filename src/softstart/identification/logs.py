@@ -109,23 +109,17 @@ class Log:
         if kind == "angle":
             values = _unwrapped(values, notes)
         values = _without_spikes(values, notes)
-        set_field = object.__setattr__
-        set_field(self, "time", seconds)
-        set_field(self, "torque", torques)
-        set_field(self, "values", values)
-        set_field(self, "kind", kind)
-        set_field(self, "torque_is", torque_is)
-        set_field(self, "name", name)
-        set_field(self, "count", _count(values))
+        vars(self).update(
+            time=seconds, torque=torques, values=values, kind=kind, torque_is=torque_is, name=name,
+            count=_count(values),
+        )  # fmt: skip
         self._check_motion()
         rows = int(np.isfinite(values).sum())
         if rows > MOST_ROWS:
             every = math.ceil(rows / MOST_ROWS)
-            kept = np.full(values.size, math.nan)
-            kept[::every] = values[::every]
-            set_field(self, "values", kept)
+            values = np.where(np.arange(values.size) % every == 0, values, math.nan)
             notes.append(f"the fit looks at every sample in {every} of the {kind}, and at all of the torque")
-        set_field(self, "notes", tuple(notes))
+        vars(self).update(values=values, notes=tuple(notes))
 
     @classmethod
     def load(
@@ -183,8 +177,7 @@ class Log:
         notes = list(found.notes)
         if constant is not None:
             notes.append(f"the torque is {constant:g} N m/A times the current")
-        object.__setattr__(log, "notes", (*notes, *log.notes))
-        return log
+        return log.changed(notes=(*notes, *log.notes))
 
     def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
         """Write the log to a CSV file that `load` reads; `about` goes into a comment above it."""
@@ -194,12 +187,24 @@ class Log:
         lines += [f"{t:.9g},{u:.9g},{'' if math.isnan(value) else f'{value:.12g}'}" for t, u, value in rows]
         write_whole(Path(path), lambda stream: stream.write("\n".join(lines) + "\n"))
 
+    @classmethod
+    def planned(cls, time: Vector, torque: Vector, kind: Kind) -> Log:
+        """A demand whose motion is not known yet."""
+        blank = object.__new__(cls)
+        return blank.changed(
+            time=time, torque=torque, values=np.zeros(time.size), kind=kind, torque_is="demand", name="plan",
+            count=0.0, notes=(),
+        )  # fmt: skip
+
+    def changed(self, **fields: Any) -> Log:
+        """The log with other fields, which are not checked again."""
+        one = object.__new__(Log)
+        vars(one).update(vars(self) | fields)
+        return one
+
     def first(self, count: int) -> Log:
         """The first samples of the log, as they are."""
-        one = object.__new__(Log)
-        for key, value in vars(self).items():
-            object.__setattr__(one, key, value[:count] if isinstance(value, np.ndarray) else value)
-        return one
+        return self.changed(time=self.time[:count], torque=self.torque[:count], values=self.values[:count])
 
     def summed(self, lines: float) -> Log:
         """The angle, if the speed is the difference of the counts of an encoder with so many lines.
@@ -217,8 +222,7 @@ class Log:
         angle = np.concatenate([[0.0], np.cumsum(self.values[1:] * steps)])
         one = Log(self.time, self.torque, angle=angle, torque_is=self.torque_is, name=self.name)
         told = "the speed is the difference of encoder counts, and was summed to the angle"
-        object.__setattr__(one, "notes", (*self.notes, told))
-        return one
+        return one.changed(notes=(*self.notes, told))
 
     @property
     def floor(self) -> float:

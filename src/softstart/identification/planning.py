@@ -1,4 +1,8 @@
-"""What an experiment would tell, before it is run: Fisher information, and a torque that tells more."""
+"""What an experiment would tell, before it is run: Fisher information, and a torque that tells more.
+
+`plan_experiments` answers which experiment to run: expected intervals of the standard ones, and of one torque
+whose levels are chosen for this drive.
+"""
 
 from __future__ import annotations
 
@@ -8,49 +12,44 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
 
-import casadi as ca
 import numpy as np
-from scipy.stats import norm
+from scipy.optimize import minimize
 
 from softstart.arrays import Vector
 from softstart.chain.machines import records
 from softstart.controller import Controller, make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import POWERS, Fitter, Space, chosen, covariance_of, root_of, usual
+from softstart.identification.fitting import Fitter, Point, Sizes, data_of
 from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
-from softstart.identification.result import CONFIDENCE
 from softstart.identification.traces import FEWEST, Kind
+from softstart.identification.unknowns import chosen, unknowns_of, usual, values_of
+from softstart.kernel.records import S_PHI
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
 from softstart.start.batch import prepared
+from softstart.start.comparison import INTERVAL
 from softstart.start.engine import ended
 from softstart.start.rows import MAX_EVENTS
 
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
+PLACE: Final = -0.6  # position in the gap for which widths are stated
 CHECKED: Final = 257  # start positions from which an experiment is simulated first, see `largest`
-COARSE: Final = 4  # of these every fourth while a torque is designed
+DESIGN, COARSE = 2, 4  # of these every second while a torque is designed, and every fourth for the travel
 KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
 EXACT: Final = 1e-9  # relative error of a largest value
 SHORTEST: Final = 1e-13  # of the gap, between positions
 PIECES: Final = 9  # levels of a designed torque at least
-ROUGH: Final = 150, 50  # samples, and blocks of the torque error, at most while a torque is designed
-DRAWS: Final = 30  # random torques before the programs, and as many steps from the best one behind them
-SPREAD: Final = 0.15  # of the largest level
-ITERATIONS: Final = 8
-STEP: Final = 2e-3  # of the largest level, for derivatives
+ROUGH: Final = 150  # samples at most while a torque is designed
+DRAWS: Final = 40  # random torques, from the best of which
+TRIALS: Final = 200  # torques are then tried in search of a better one
+EXACTLY, EVERY = 10, 4  # so many of these, one in so many of the best, are computed exactly
+SPREAD: Final = 0.15  # of the largest level: the first steps
 WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may go
 NEAR: Final = 0.01  # relative distance of a design to its limits: for positions between those checked then
-RESTING: Final = 0.9  # of the load torque: what the shaft may have where the load must not move
-TRIED: Final = 4  # torques beyond a limit that are pulled back to it
-QUIET: Final[dict[str, Any]] = {
-    "qpsol": "qrqp", "qpsol_options": {"print_iter": False, "print_header": False, "error_on_fail": False},
-    "hessian_approximation": "limited-memory", "max_iter": ITERATIONS, "tol_du": 1e-3, "error_on_fail": False,
-    "print_iteration": False, "print_header": False, "print_time": False, "print_status": False,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +116,7 @@ class Plan:
     drive : Drive
         The drive as it is thought to be.
     experiments : tuple of Experiment
-        The standard ones, then the planned one, and last one that leaves the load at rest.
+        The standard ones, then the planned one.
     log_period, ripple : float
         Sample period of the log, s; torque error in each sample, N m.
 
@@ -201,13 +200,10 @@ def plan_experiments(
     load is reactive.
 
     The planned torque has at least nine levels, on edges of the best standard experiment that keeps the
-    limits, and its duration. The levels minimise `Experiment.score` (CasADi, sequential quadratic programs,
-    derivatives by differences of the exact plant), the peak of the shaft torque from each position and the
-    travel within the limits. Torques beyond a limit are pulled back to it, random ones follow, and the best
-    that keeps all limits on the exact plant is returned: never less than the best standard experiment tells
-    within them. It is a local optimum. Where the load has a reactive torque, another one keeps the shaft
-    below 0.9 of it, so that the load stays at rest;
-    it is to tell the gap, unless `wanted` names something else.
+    limits, and its duration. From the best of 40 random torques the levels are improved by linear
+    approximations (COBYLA: M. J. D. Powell), minimising `Experiment.score` with the peak of the shaft torque
+    from each position and the travel within the limits. The best torque that keeps all limits on the exact
+    plant is returned: never less than the best standard experiment tells within them. It is a local optimum.
 
     Parameters
     ----------
@@ -265,7 +261,7 @@ def plan_experiments(
             f"ripple = {show(ripple)}: the torque error of a sample is above 0 and at most the "
             f"starting torque, {float(drive.Ms):.4g} N m."
         )
-    shortest = min(float(np.sum(durations)) for durations, _ in _standard(drive, level).values())
+    shortest = min(float(np.sum(durations)) for durations, _ in standard_levels(drive, level).values())
     if period > shortest / FEWEST:
         raise InputError(
             f"log_period = {show(log_period)}: the shortest experiment lasts {shortest:.3g} s, and a "
@@ -277,22 +273,16 @@ def plan_experiments(
             near = nearest(name, asked)
             hint = f"did you mean {near}?" if near else f"those are {', '.join(asked)}."
             raise InputError(f"wanted = {show(name)}: it is no parameter that is to be found; {hint}")
-    bench = _Bench(drive, period, error, asked, signal, tuple(wanted), progress or (lambda _: None))
-    standard = [bench.experiment(name, *levels) for name, levels in _standard(drive, level).items()]
-    usual = (
-        max(one.peak for one in standard) if drive.permissible_torque is None else drive.permissible_torque
-    )
-    torque = float(to_si(usual if max_torque is None else max_torque, "N*m", name="max_torque"))
+    bench = Bench(drive, period, error, asked, signal, tuple(wanted), progress or (lambda _: None))
+    standard = [bench.experiment(name, *levels) for name, levels in standard_levels(drive, level).items()]
+    usual_peak = max(one.peak for one in standard)
+    usual_peak = usual_peak if drive.permissible_torque is None else drive.permissible_torque
+    torque = float(to_si(usual_peak if max_torque is None else max_torque, "N*m", name="max_torque"))
     travel = math.inf if max_travel is None else float(to_si(max_travel, "rad", name="max_travel"))
     for key, limit, given in (("max_torque", torque, max_torque), ("max_travel", travel, max_travel)):
         if not limit > 0.0:
             raise InputError(f"{key} = {show(given)}: a limit is above 0.")
-    planned = [bench.designed("planned", standard, torque, travel)] if optimise else []
-    if optimise and drive.load_kind == "reactive" and "gap" in asked and float(drive.Mc) != 0.0:
-        bench.wanted = bench.wanted or ("gap",)  # of the rest a load that does not move tells little
-        planned.append(
-            bench.designed("planned, load at rest", bench.resting(), RESTING * abs(float(drive.Mc)), travel)
-        )
+    planned = [bench.designed(standard, torque, travel)] if optimise else []
     return Plan(drive, (*standard, *planned), period, error, float(drive.encoder_lines))
 
 
@@ -317,19 +307,20 @@ def made_up_log(
     >>> made_up_log(crane, "start").kind
     'angle'
     """
-    levels = _standard(drive, _level(drive))
+    levels = standard_levels(drive, _level(drive))
     if isinstance(experiment, Experiment):
         profile, end = experiment.profile, experiment.end
     elif experiment in levels:
-        profile, end = _profile(*levels[experiment])
+        profile, end = steps_of(*levels[experiment])
     else:
         raise InputError(f"experiment = {show(experiment)}: it is none of {', '.join(levels)}.")
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
     generator = np.random.default_rng(seed)
     played = demand + ripple * generator.standard_normal(time.size)
-    model = LogModel(_demand(time, played, signal), _at_rest(drive))
-    states = model.states({POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {})
+    model = LogModel.of(Log.planned(time, played, signal), _at_rest(drive))
+    start = {POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {}
+    states = model.motion(start).at(time)
     angle = states["phi"][:, 0] - states["phi"][0, 0]
     count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
     if count:
@@ -338,16 +329,6 @@ def made_up_log(
     torque = demand if torque_is == "demand" else states["u"]
     values = {signal: speed if signal == "speed" else angle}
     return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
-
-
-def _demand(time: Vector, torque: Vector, kind: Kind) -> Log:
-    """A log whose motion is not known yet."""
-    one = object.__new__(Log)
-    vars(one).update(
-        time=time, torque=torque, values=np.zeros(time.size), kind=kind, torque_is="demand", name="plan",
-        count=0.0, notes=(),
-    )  # fmt: skip
-    return one
 
 
 def _moving(drive: Drive) -> bool:
@@ -372,7 +353,7 @@ def _level(drive: Drive) -> float:
     return max(LEVEL * Ms, min(Ms, 1.5 * Mc))
 
 
-def _standard(drive: Drive, level: float) -> dict[str, tuple[Vector, Vector]]:
+def standard_levels(drive: Drive, level: float) -> dict[str, tuple[Vector, Vector]]:
     """Durations and levels of the standard experiments."""
     crossing = math.sqrt(2.0 * float(drive.gap) * float(drive.J1) / level)
     part = 1.5 * crossing + 2.0 * float(drive.elastic_period) + 4.0 * float(drive.torque_lag)
@@ -421,70 +402,91 @@ def _player(profile: TorqueProfile) -> Controller:
     return make_controller("profile", {"profile": profile})
 
 
-def _profile(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
+def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
+    """The torque of these levels, and when it ends.
+
+    >>> steps_of(np.array([0.1, 0.2]), np.array([30.0, 10.0]))[1].__round__(12)
+    0.3
+    """
     edges = np.concatenate([[0.0], np.cumsum(durations)])
     return TorqueProfile.steps(edges, levels), float(edges[-1])
 
 
-class _Bench:
-    """A drive, an inverter's log and an encoder: what any torque would tell."""
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A drive, an inverter's log and an encoder: what any torque would tell.
 
-    def __init__(
-        self,
-        drive: Drive,
-        period: float,
-        ripple: float,
-        free: tuple[str, ...],
-        signal: Kind,
-        wanted: tuple[str, ...],
-        progress: Callable[[str], None],
-    ) -> None:
-        self.drive, self.period, self.ripple, self.free = drive, period, ripple, free
-        self.signal, self.wanted, self.progress = signal, wanted, progress
-        self.moving = _moving(drive) and float(drive.gap) > 0.0
-        self.base = _at_rest(drive)
-        self.count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
-        self.quantile = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
-        limit = 10.0 * float(drive.Ms)
-        self.wide = self.base.replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
-        half = 0.5 * float(drive.gap)
-        self.places = np.linspace(-half, half, CHECKED) if self.moving else np.zeros(1)
+    Attributes
+    ----------
+    drive : Drive
+        The drive as it is thought to be.
+    period, ripple : float
+        Sample period of the log, s; torque error in each sample, N m.
+    free, wanted : tuple of str
+        What is to be found, and what of it `Experiment.score` is about.
+    signal : {"angle", "speed"}
+        What the log holds.
+    progress : callable
+        Called with the name of each experiment.
+    """
+
+    drive: Drive
+    period: float
+    ripple: float
+    free: tuple[str, ...]
+    signal: Kind = "angle"
+    wanted: tuple[str, ...] = ()
+    progress: Callable[[str], None] = lambda _: None
+
+    @property
+    def moving(self) -> bool:
+        """Whether the position in the gap is unknown."""
+        return _moving(self.drive) and float(self.drive.gap) > 0.0
+
+    @property
+    def wide(self) -> Drive:
+        """The drive with a motor that has the torque of any design."""
+        limit = 10.0 * float(self.drive.Ms)
+        return _at_rest(self.drive).replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
+
+    @property
+    def places(self) -> Vector:
+        """Positions of the motor in the gap, rad."""
+        half = 0.5 * float(self.drive.gap)
+        return np.linspace(-half, half, CHECKED) if self.moving else np.zeros(1)
 
     def experiment(self, name: str, durations: Vector, levels: Vector, rough: bool = False) -> Experiment:
         """What these levels would tell; roughly, for a design."""
         self.progress(name)
-        profile, end = _profile(durations, levels)
-        samples, blocks = ROUGH if rough else (SAMPLES, SAMPLES)
-        period = max(self.period, end / samples)
+        profile, end = steps_of(durations, levels)
+        period = max(self.period, end / (ROUGH if rough else SAMPLES))
         time = np.arange(0.0, end + 0.5 * period, period)
-        model = LogModel(_demand(time, profile.at(time), self.signal), self.base)
-        model.block = max(model.block, math.ceil(time.size / blocks))
-        space = Space.of(self.free, self.drive, [self.moving], [self.signal == "angle"])
-        x = np.array(
-            space.point(self.drive)
-            + ([root_of(-0.6)] if self.moving else [])
-            + ([0.0] if self.signal == "angle" else [])
-        )
-        states = model.states(space.values(x, 0))
-        angle = states["phi"][:, 0] - states["phi"][0, 0]
-        vars(model.log)["values"] = angle if self.signal == "angle" else states["w"][:, 0]
-        vars(model.log)["count"] = self.count if self.signal == "angle" else self.count / period
-        fitter = Fitter([model], space)
+        log = Log.planned(time, profile.at(time), self.signal)
+        unknowns = unknowns_of(self.free, self.drive, [log], [self.moving])
+        numbers = {POSITION: PLACE, "offset": 0.0}
+        x = np.array([
+            one.number(float(numbers.get(one.name, getattr(self.drive, one.name, 0.0)))) for one in unknowns
+        ])  # fmt: skip
+        model = LogModel.of(log, _at_rest(self.drive), SAMPLES)
+        signal = model.signals([values_of(unknowns, x, 0)])[0]
+        count = 2.0 * math.pi / (4.0 * float(self.drive.encoder_lines)) if self.drive.encoder_lines else 0.0
+        count = count if self.signal == "angle" else count / period
+        model = replace(model, log=log.changed(values=signal, count=count))
+        logged = np.round(signal / count) * count if count else signal
+        fitter = Fitter((model,), unknowns, (data_of(model, logged),))
+        spot = fitter.spot(x, 0, np.zeros(model.blocks), derivatives=True)
         # a longer period stands for samples left out: the same error of the torque in each of them
-        ripple = self.ripple * math.sqrt(self.period / period)
-        sizes = np.sqrt(np.diag(covariance_of(fitter.foreseen(x, ripple), space)))[: len(self.free)]
-        half = np.minimum(self.quantile * sizes, 50.0)
-        widths = np.array(
-            [
-                space.share(i, x[i], one) if name in POWERS else math.sinh(one)
-                for i, (name, one) in enumerate(zip(self.free, half.tolist(), strict=True))
-            ]
-        )
-        if not rough:  # a design needs their slope
-            widths[[not space.known(i, x[i], one) for i, one in enumerate(half.tolist())]] = math.inf
-        peak, travel = self.load(profile, end) if not rough else (math.nan, math.nan)
-        told = dict(zip(self.free, widths.tolist(), strict=True))
-        return Experiment(name, profile, end, told, peak, travel, self.wanted)
+        sizes = Sizes(1.0, self.ripple * math.sqrt(self.period / period))
+        variances = np.diag(fitter.covariance(Point(x, sizes, (spot,), np.zeros(x.size))))
+        widths = {}
+        for one, number, variance in zip(unknowns, x.tolist(), variances.tolist(), strict=True):
+            half = min(INTERVAL.quantile * math.sqrt(variance), 50.0)
+            if one.log is None:
+                width = math.sinh(half) if one.kind == "logarithm" else one.share(number, half)
+                # a design needs the slope of what is unknown
+                widths[one.name] = width if rough or one.known(number, half) else math.inf
+        peak, travel = (math.nan, math.nan) if rough else self.load(profile, end)
+        return Experiment(name, profile, end, widths, peak, travel, self.wanted)
 
     def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
@@ -500,45 +502,45 @@ class _Bench:
         return notes.peaks[:, 0], notes["gap_events"]
 
     def travels(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
-        """Travel of the load from each of these positions, and how often the gap opens and closes."""
+        """Travel of the load from each of these positions, and how often the gap opens and closes.
+
+        Seen at events and samples: exact for a reactive load, which turns at events only.
+        """
         times = np.union1d(profile.time[profile.time < end], end)
         if self.drive.load_kind != "reactive":
             times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
-        model = LogModel(_demand(times, profile.at(times), self.signal), self.base)
-        shares = places / (0.5 * float(self.drive.gap) or 1.0)
-        found = model.travels([{POSITION: share} if self.moving else {} for share in shares.tolist()])
-        return found[:, 0], found[:, 1]
+        model = LogModel.of(Log.planned(times, profile.at(times), self.signal), _at_rest(self.drive))
+        found = np.empty((2, places.size))
+        for i, share in enumerate((places / (0.5 * float(self.drive.gap) or 1.0)).tolist()):
+            motion = model.motion({POSITION: share} if self.moving else {})
+            angles = motion.states[:, S_PHI]
+            found[:, i] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
+        return found[0], found[1]
 
-    def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> Vector:
-        """By which share each of some positions exceeds the limits, below 0 where it keeps them."""
-        places = self.places[::COARSE]
-        found = [self.peaks(profile, end, places)[0] / torque]
+    def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> float:
+        """By which share the worst of some positions exceeds the limits, below 0 where all keep them."""
+        places = self.places[::DESIGN]
+        found = float(self.peaks(profile, end, places)[0].max()) / torque
         if travel < math.inf:
-            found.append(self.travels(profile, end, places[::COARSE])[0] / travel)
-        return np.concatenate(found) - 1.0
-
-    def resting(self) -> list[Experiment]:
-        """A push to and fro that leaves the load at rest, by the energy of the motor at a flank."""
-        drive, most = self.drive, RESTING * abs(float(self.drive.Mc))
-        # u + sqrt(u^2 + 2 c u gap) = most, undamped against a load that rests
-        push = most**2 / (2.0 * (float(drive.c * drive.gap) + most))
-        part = 1.3 * math.sqrt(2.0 * float(drive.gap * drive.J1) / push) + 4.0 * float(drive.torque_lag)
-        return [self.experiment("push", np.full(4, part), push * np.array([1.0, -1.0, 1.0, -1.0]))]
+            found = max(
+                found, float(self.travels(profile, end, self.places[:: 4 * COARSE])[0].max()) / travel
+            )
+        return found - 1.0
 
     def keeping(self, one: Experiment, torque: float, travel: float) -> Experiment | None:
         """The experiment, its levels made smaller until it keeps the limits."""
-        edges = _edges(one)
-        for share in (1.0, 0.99, 0.97, 0.93, *0.85 ** np.arange(1, 20)):
+        edges = edges_of(one)
+        durations = np.diff([*edges, one.end])
+        for share in (1.0, 0.99, 0.98, 0.97, 0.95, 0.93, *0.85 ** np.arange(1, 20)):
             levels = share * one.profile.at(edges)
-            played = _profile(np.diff([*edges, one.end]), levels)
-            if self.excess(*played, torque, travel).max() > 0.0:
+            if self.excess(*steps_of(durations, levels), torque, travel) > 0.0:
                 continue
-            found = one if share == 1.0 else self.experiment(one.name, np.diff([*edges, one.end]), levels)
+            found = one if share == 1.0 else self.experiment(one.name, durations, levels)
             if found.peak <= torque and found.travel <= travel:
                 return found
         return None
 
-    def designed(self, name: str, seeds: Sequence[Experiment], torque: float, travel: float) -> Experiment:
+    def designed(self, seeds: Sequence[Experiment], torque: float, travel: float) -> Experiment:
         """The torque within the limits that tells most, from the best of the seeds."""
         kept = [one for one in (self.keeping(seed, torque, travel) for seed in seeds) if one is not None]
         if not kept:
@@ -551,117 +553,46 @@ class _Bench:
         scale = float(np.max(np.abs(levels)))
         lower = max(min(float(levels.min()), float(self.drive.minimum_torque)) / scale, -WIDER)
         upper = min(float(self.drive.Ms) / scale, WIDER)
-        tried: list[tuple[float, float, Vector]] = []
 
-        def evaluated(shares: Vector) -> Vector:
-            shares = np.clip(shares, lower, upper)  # a quadratic program that failed may leave them
-            one = self.experiment(name, durations, scale * shares, rough=True)
-            over = self.excess(one.profile, one.end, torque, travel)
-            tried.append((math.log(one.score), float(over.max()), shares))
-            return np.concatenate([[tried[-1][0]], over])
+        def limited(shares: Vector) -> Vector:
+            """Levels within the bounds, made smaller until some positions keep the limits."""
+            shares = np.clip(shares, lower, upper)
+            for _ in range(3):
+                over = self.excess(*steps_of(durations, scale * shares), torque, travel) + NEAR
+                if over <= 0.0:
+                    break
+                shares = shares * (1.0 - NEAR) / (1.0 + over)
+            return np.asarray(shares)
 
-        rows = evaluated(levels / scale).size
-        self._wander(evaluated, tried, lower, upper, anywhere=True)
-        first = best_of(tried)[2]
-        design = _Design(evaluated, first.size, rows)
-        shares = ca.MX.sym("shares", first.size)
-        found = design(shares)
-        program: dict[str, Any] = {"x": shares, "f": found[0], "g": found[1:]}
-        search = ca.nlpsol("plan", "sqpmethod", program, QUIET)
-        search(x0=first, lbx=lower, ubx=upper, lbg=-ca.inf, ubg=-NEAR)
-        pulled = self._pulled(tried, first, durations, scale, torque, travel)
-        for point in pulled:
-            evaluated(point)
-        self._wander(evaluated, tried, lower, upper, anywhere=False)
-        within = sorted((one for one in tried if one[1] <= 0.0), key=lambda one: one[0])[:TRIED]
-        exact = [self.experiment(name, durations, scale * point) for _, _, point in within]
-        exact = [one for each in exact if (one := self.keeping(each, torque, travel)) is not None]
-        best = [seed, *exact]
-        chosen = min(best, key=lambda one: one.score)
-        by = f'"{seed.name}"' if chosen is seed else f'CasADi, from "{seed.name}"'
-        return replace(chosen, name=name, found_by=by)
+        tried: list[tuple[float, Vector]] = []
+
+        def score(shares: Vector) -> float:
+            kept = scale * limited(shares)
+            tried.append((self.experiment("planned", durations, kept, rough=True).score, kept))
+            return math.log(tried[-1][0])
+
+        generator = np.random.default_rng(0)
+        draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
+        options = {"rhobeg": SPREAD, "maxiter": TRIALS}
+        minimize(score, min(draws, key=score), method="COBYLA", options=options)
+        tried.sort(key=lambda one: one[0])
+        best = seed
+        for _, each in tried[: EVERY * EXACTLY : EVERY]:
+            exact = self.keeping(self.experiment("planned", durations, each), torque, travel)
+            best = min((one for one in (best, exact) if one is not None), key=lambda one: one.score)
+        by = f'"{seed.name}"' if best is seed else f'COBYLA, from "{seed.name}"'
+        return replace(best, name="planned", found_by=by)
 
     def _pieces(self, seed: Experiment) -> tuple[Vector, Vector]:
         """Durations and levels of a seed, cut into more pieces with edges on samples."""
-        edges = np.append(_edges(seed), seed.end)
+        edges = np.append(edges_of(seed), seed.end)
         each = math.ceil(PIECES / (edges.size - 1))
         cut = np.concatenate([np.linspace(*ends, each, endpoint=False) for ends in pairwise(edges)])
-        period = max(self.period, seed.end / ROUGH[0])
+        period = max(self.period, seed.end / ROUGH)
         cut = np.unique(np.round(cut / period)) * period
         return np.diff(np.append(cut, seed.end)), seed.profile.at(cut)
 
-    def _pulled(
-        self,
-        tried: Sequence[tuple[float, float, Vector]],
-        seed: Vector,
-        durations: Vector,
-        scale: float,
-        torque: float,
-        travel: float,
-    ) -> list[Vector]:
-        """Torques beyond the limits, pulled back towards the best one within them."""
-        within = [one for one in tried if one[1] <= 0.0]
-        anchor = min(within, key=lambda one: one[0])[2] if within else seed
-        beyond = sorted((one for one in tried if one[1] > 0.0), key=lambda one: one[0] + 2.0 * one[1])
-        found = []
-        for _, _, point in beyond[:: seed.size][:TRIED]:
-            inside, outside = 0.0, 1.0
-            for _ in range(8):
-                middle = 0.5 * (inside + outside)
-                played = _profile(durations, scale * (anchor + middle * (point - anchor)))
-                keeps = self.excess(*played, torque, travel).max() <= 0.0
-                inside, outside = (middle, outside) if keeps else (inside, middle)
-            found.append(anchor + inside * (point - anchor))
-        return found
 
-    @staticmethod
-    def _wander(
-        evaluated: Callable[[Vector], Vector],
-        tried: Sequence[tuple[float, float, Vector]],
-        lower: float,
-        upper: float,
-        *,
-        anywhere: bool,
-    ) -> None:
-        """Random torques anywhere, or steps from the best: there are many optima, and kinks of peaks."""
-        generator, spread = np.random.default_rng(0), SPREAD
-        for _ in range(DRAWS):
-            best = best_of(tried)
-            point = best[2] + spread * generator.standard_normal(best[2].size)
-            if anywhere:
-                point = generator.uniform(lower, upper, best[2].size)
-            found = evaluated(np.clip(point, lower, upper))
-            if (over := float(found[1:].max())) > 0.0:
-                found = evaluated(tried[-1][2] * (1.0 - NEAR) / (1.0 + over))
-            if not anywhere:
-                spread *= 1.5 if found[0] < best[0] and bool(np.all(found[1:] <= 0.0)) else 0.9
-
-
-def best_of(tried: Sequence[tuple[float, float, Vector]]) -> tuple[float, float, Vector]:
-    """The torque within the limits that tells most; the first one if none is within them."""
-    return min((one for one in tried if one[1] <= 0.0), key=lambda one: one[0], default=tried[0])
-
-
-class _Design(ca.Callback):
-    """What a torque tells and loads, as CasADi calls it; derivatives are differences."""
-
-    def __init__(self, evaluated: Callable[[Vector], Vector], levels: int, rows: int) -> None:
-        ca.Callback.__init__(self)
-        self.evaluated, self.levels, self.rows = evaluated, levels, rows
-        self.construct(
-            "design", {"enable_fd": True, "fd_method": "forward", "fd_options": {"h": STEP, "h_iter": 0}}
-        )
-
-    def get_sparsity_in(self, _: int) -> Any:
-        return ca.Sparsity.dense(self.levels)
-
-    def get_sparsity_out(self, _: int) -> Any:
-        return ca.Sparsity.dense(self.rows)
-
-    def eval(self, given: Any) -> list[Any]:
-        return [ca.DM(self.evaluated(np.array(given[0]).ravel()))]
-
-
-def _edges(one: Experiment) -> Vector:
-    """Where the levels of an experiment begin."""
+def edges_of(one: Experiment) -> Vector:
+    """Where the levels of an experiment begin, s."""
     return np.unique(np.concatenate([[0.0], one.profile.time]))[: None if one.profile.end < one.end else -1]

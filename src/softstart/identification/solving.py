@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
-from functools import partial
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,36 +15,25 @@ from scipy.stats import chi2
 from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
-from softstart.errors import InputError, listed
-from softstart.identification.chains import reduced_drive, reduction_note
+from softstart.errors import InputError, SimulationError, listed
+from softstart.identification.chains import reduced_drive, reduction_notes
 from softstart.identification.fitting import (
-    FACTOR,
-    FREE,
-    MOST_FRICTION,
     MOST_RIPPLE,
     STEP,
     Fitter,
-    Other,
+    Point,
     Progress,
-    Solution,
-    Space,
-    TimeIsUpError,
-    chosen,
-    covariance_of,
-    position_of,
-    quantile_of,
-    root_of,
-    usual,
+    agreeing,
 )  # fmt: skip
 from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.planning import plan_experiments
 from softstart.identification.result import AT_LIMIT, Estimate, Identification
+from softstart.identification.unknowns import FREE, Unknown, chosen, unknowns_of, usual, values_of
 from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
 
 CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
-MOST_LOAD: Final = 0.99  # of the starting torque
 SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
@@ -78,8 +67,8 @@ def identify(
     each log from its beginning over longer and longer parts, from the guess and from points up to a factor of
     4 around it, until two searches end at the same minimum. Then the squares are weighted by the covariance
     of what the encoder rounds and of a torque error that the plant integrates, both of a size that restricted
-    maximum likelihood finds; intervals allow for not knowing that size, and follow the likelihood itself
-    where they are wide.
+    maximum likelihood finds. The ends of intervals are where the likelihood, with all else and that size
+    fitted again, has dropped.
 
     Parameters
     ----------
@@ -133,8 +122,8 @@ def identify(
 
     References
     ----------
-    D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; M. G. Kenward, J. H. Roger, Biometrics 53
-    (1997) 983-997; docs/identification.md.
+    D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
+    Analysis, 1988; docs/identification.md.
     """
     began = time.perf_counter()
     drive = load_machine(drive) if isinstance(drive, str) else drive
@@ -156,38 +145,39 @@ def identify(
     for one in read:
         _check_inertia(one, drive)
     base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
-    space = Space.of(asked, drive, [moving for _ in read], [one.kind == "angle" for one in read])
-    fitter = Fitter([LogModel(one, base) for one in read], space, progress)
-    guess, lower, upper = _bounds(space, drive, read)
+    unknowns = unknowns_of(asked, drive, read, [moving for _ in read])
+    fitter = Fitter.of([LogModel.of(one, base) for one in read], unknowns, progress)
     limit = None if time_limit is None else float(to_si(time_limit, "s", name="time_limit"))
     deadline = math.inf if limit is None else began + limit
-    found = fitter.search(guess, lower, upper, searches, seed, deadline)
-    solution = fitter.refine(found[0][0], lower, upper)
-    doubts, estimates = _misfits(fitter, solution), list[Estimate]()
+    minima = fitter.search(searches, seed, deadline)
+    best = fitter.refined(minima[0][0])
+    doubts, estimates = misfits(fitter, best), list[Estimate]()
     if not doubts:
-        fitter.deadline = deadline
+        timed = replace(fitter, progress=_until(deadline, fitter.progress))
         try:
-            fitter.progress("other explanations")
-            solution, others = fitter.elsewhere(solution, _untold(fitter, solution, guess))
-            if not (doubts := _misfits(fitter, solution)):
-                estimates = _estimates(fitter, solution, guess, others)
-        except TimeIsUpError:
-            fitter.about(solution.errors.weights)
+            timed.progress("other explanations")
+            best, others = timed.explanations(timed.valued(best, best), bool(_untold(timed, best)))
+            doubts = misfits(fitter, best)
+            estimates = [] if doubts else _estimates(timed, best, others)
+        except _TimeIsUpError:
             doubts = [
                 f"The time limit of {limit:g} s came before the intervals: none is stated, and another drive "
                 "may explain the logs as well. Remedy: a longer --time-limit, or fewer samples."
             ]
-        fitter.deadline = math.inf
-    estimates = estimates or _without_intervals(space, solution)
-    covariance = covariance_of(solution.part.jacobian, space)
+    estimates = estimates or _without_intervals(unknowns, best.x)
+
+    def told(log: Log) -> dict[str, float]:
+        """What another log tells, by the fit alone."""
+        other = Fitter.of([LogModel.of(log, base)], unknowns_of(asked, drive, [log], [moving]), progress)
+        point = other.refined(other.search(1, seed)[0][0])
+        lost = [] if misfits(other, point) else _untold(other, point)
+        each = enumerate(zip(other.unknowns, point.x.tolist(), strict=True))
+        return {one.name: one.value(x) for i, (one, x) in each if one.log is None and i not in lost}
+
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
-    sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    kept = len(estimates)
-    sizes[len(space.shared) : kept] *= -1.0  # the further forward a position, the smaller its root
-    best = found[0][1]
     notes = [
         *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
-        *_reduction(machine, drive, read[0], free, progress),
+        *reduction_notes(machine, drive, read[0], told),
         *doubts,
         *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
         *_other_scale(drive, drive.replace(**changes)),
@@ -199,31 +189,29 @@ def identify(
         guess=drive,
         logs=tuple(read),
         estimates=tuple(estimates),
-        correlations=(covariance / np.outer(sizes, sizes))[:kept, :kept],
-        ripple=solution.errors.ripple,
-        searches=len(found),
-        agreed=sum(cost <= 1.01 * best + 1e-300 for _, cost in found),
+        correlations=_correlations(fitter, best),
+        ripple=best.sizes.ripple,
+        searches=len(minima),
+        agreed=agreeing(minima),
         seconds=time.perf_counter() - began,
         notes=tuple(notes),
-        residuals=tuple(fitter.left(solution.x)),
+        residuals=tuple(fitter.left(best)),
     )
 
 
-def _reduction(
-    machine: Any, drive: Drive, log: Log, free: Iterable[str] | None, progress: Progress | None
-) -> list[str]:
-    """What the reduction of more masses leaves out, and how far that moves what is found."""
-    if len(machine.mass_names) == 2:
-        return []
-    asked = None if free is None else list(free)
-    return [
-        reduction_note(
-            machine,
-            drive,
-            log,
-            lambda one: identify(one, drive, free=asked, searches=1, progress=progress).shared,
-        )
-    ]
+class _TimeIsUpError(Exception):
+    """The time of a fit is up."""
+
+
+def _until(deadline: float, progress: Progress) -> Progress:
+    """Progress that is refused after a deadline."""
+
+    def timed(text: str) -> None:
+        if time.perf_counter() > deadline:
+            raise _TimeIsUpError
+        progress(text)
+
+    return timed
 
 
 def _source(drive: Drive, logs: Sequence[Log]) -> str:
@@ -279,117 +267,60 @@ def _check_inertia(log: Log, drive: Drive) -> None:
     )
 
 
-def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Vector, Vector]:
-    """Where the search begins, and how far it may go."""
-    typical = float(np.median(np.diff(logs[0].time)))
-    guess: list[float] = []
-    lower: list[float] = []
-    upper: list[float] = []
-    for i, name in enumerate(space.shared):
-        value = float(getattr(drive, name, 0.0))
-        if name in FRICTIONS:
-            guess, lower, upper = [*guess, space.number(i, value)], [*lower, 0.0], [*upper, MOST_FRICTION]
-            continue
-        if value == 0.0 and name == "damping":  # a damping ratio of 2 %
-            reduced = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
-            value = 0.04 * math.sqrt(float(drive.c * reduced))
-        elif value == 0.0:
-            value = typical
-        reach = 3.0 * FACTOR
-        if name in ("damping", "torque_lag", "computing_delay", FILTER):
-            reach = 100.0
-        guess.append(space.number(i, value))
-        lower.append(space.number(i, value / reach))
-        most = value * reach
-        if name == "load_torque":  # more is no drive: it could not start
-            most = math.copysign(min(abs(most), MOST_LOAD * float(drive.Ms)), value)
-        upper.append(space.number(i, most))
-    for _ in range(sum(space.positions)):
-        guess, lower, upper = [*guess, root_of(0.0)], [*lower, 0.0], [*upper, 1.0]
-    for log in (one for one in logs if one.kind == "angle"):
-        first = float(log.values[np.isfinite(log.values)][0])
-        reach = max(20.0 * log.count, 100.0 * log.scale)
-        guess, lower, upper = [*guess, -first], [*lower, -first - reach], [*upper, -first + reach]
-    return np.array(guess), np.array(lower), np.array(upper)
+def _untold(fitter: Fitter, best: Point) -> list[int]:
+    """The numbers that the logs do not tell, were all intervals symmetric."""
+    each = enumerate(zip(fitter.unknowns, best.x, fitter.halves(best), strict=True))
+    return [i for i, (one, x, half) in each if one.kind != "offset" and not one.known(x, half, one.guess)]
 
 
-def _sizes(solution: Solution, covariance: Matrix) -> list[float]:
-    """Half the quadratic interval of each number."""
-    return [
-        quantile_of(freedom) * math.sqrt(float(variance))
-        for freedom, variance in zip(solution.freedom, np.diag(covariance), strict=True)
-    ]
-
-
-def _untold(fitter: Fitter, solution: Solution, guess: Vector) -> list[int]:
-    """The numbers that the logs do not tell, were all intervals quadratic."""
-    space = fitter.space
-    sizes = _sizes(solution, covariance_of(solution.part.jacobian, space))
-    return [
-        i
-        for i, name in enumerate(space.names)
-        if not name.startswith("offset")
-        and not space.known(i, float(solution.x[i]), sizes[i], float(guess[i]))
-    ]
-
-
-def _without_intervals(space: Space, solution: Solution) -> list[Estimate]:
+def _without_intervals(unknowns: Sequence[Unknown], x: Vector) -> list[Estimate]:
     """The best fit, of which no number is called known."""
-    x = solution.x.tolist()
-    values = [space.value(i, x[i]) for i in range(len(space.shared))]
-    values += [position_of(one) for one in x[len(values) : len(values) + sum(space.positions)]]
     return [
-        Estimate(name, value, math.nan, math.nan, known=False, reason="no interval is stated")
-        for name, value in zip(space.names, values, strict=False)
+        Estimate(one.title, one.value(number), math.nan, math.nan, False, reason="no interval is stated")
+        for one, number in zip(unknowns, x.tolist(), strict=True)
+        if one.kind != "offset"
     ]
 
 
-def _estimates(fitter: Fitter, solution: Solution, guess: Vector, others: Sequence[Other]) -> list[Estimate]:
+def _correlations(fitter: Fitter, best: Point) -> Matrix:
+    """Of the estimates; the further forward a position, the smaller its number in the fit."""
+    covariance = fitter.covariance(best)
+    signs = [-1.0 if one.kind == "position" else 1.0 for one in fitter.unknowns]
+    sizes = np.sqrt(np.diag(covariance)) * signs
+    kept = sum(one.kind != "offset" for one in fitter.unknowns)
+    return np.asarray((covariance / np.outer(sizes, sizes))[:kept, :kept])
+
+
+def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
-    space, found, lost = fitter.space, [], set[str]()
-    covariance = covariance_of(solution.part.jacobian, space)
-    sizes, untold = _sizes(solution, covariance), _untold(fitter, solution, guess)
-    told = [i not in untold for i, name in enumerate(space.names) if not name.startswith("offset")]
-    for i, (name, tells) in enumerate(zip(space.names, told, strict=False)):
-        position = i >= len(space.shared)
-        middle, half = float(solution.x[i]), sizes[i]
-        fitter.progress(f"interval of {name}")
-        ends = [fitter.end(solution, i, sign, half, others) for sign in (-1.0, 1.0)]
-        bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
-        known = tells and space.known(i, middle, 0.5 * (ends[1] - ends[0]))
-        known = known and not (position and "gap" in lost)  # a share of the gap
-        ends_there = not position and _limited(solution, i, name, ends)
-        here = not position and _limited(solution, i, name, [middle])
-        reason = AT_LIMIT if here or (known and ends_there) else "" if known else _why(i, covariance, space)
-        known = not reason
-        if not known:
-            lost.add(name)
-        of = position_of if position else partial(space.value, i)
-        middle, *ends = (of(one) for one in (middle, *ends))
-        found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
-    fitter.about(solution.errors.weights)
+    found, lost = [], set[str]()
+    halves, untold, covariance = fitter.halves(best), _untold(fitter, best), fitter.covariance(best)
+    for i, (one, x, half) in enumerate(zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)):
+        if one.kind == "offset":
+            continue
+        fitter.progress(f"interval of {one.title}")
+        ends = [fitter.end(i, sign, half, best, others) for sign in (-1.0, 1.0)]
+        bent = max(abs(ends[0] - x + half), abs(ends[1] - x - half)) > CURVED * half
+        known = i not in untold and one.known(x, 0.5 * (ends[1] - ends[0]))
+        known = known and not (one.kind == "position" and "gap" in lost)  # a share of the gap
+        limited = one.limited(x) or (known and any(map(one.limited, ends)))
+        reason = AT_LIMIT if limited else "" if known else _why(i, covariance, fitter.unknowns)
+        if reason:
+            lost.add(one.name)
+        lower, upper = sorted(map(one.value, ends))
+        found.append(Estimate(one.title, one.value(x), lower, upper, not reason, bent, reason))
     return found
 
 
-def _limited(solution: Solution, i: int, name: str, numbers: Sequence[float]) -> bool:
-    """Whether a value, or an end of its interval, is where the search ends and not where the logs say.
-
-    A friction of 0 is a limit of the drive, not of the search.
-    """
-    lower, upper = float(solution.lower[i]), float(solution.upper[i])
-    near = 1e-3 * (upper - lower)
-    return any((one < lower + near and name not in FRICTIONS) or one > upper - near for one in numbers)
-
-
-def _why(i: int, covariance: Matrix, space: Space) -> str:
+def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
     """With what an unknown number goes together, or that nothing depends on it."""
     sizes = np.sqrt(np.diag(covariance))
     ratio = np.abs(covariance[i] / (sizes[i] * sizes))
     ratio[i] = 0.0
-    names = space.names
     partner = int(np.argmax(ratio))
-    if ratio[partner] > 0.9 and not names[partner].startswith("offset"):
-        return f"the logs tell it only together with {names[partner]} (correlation {ratio[partner]:.2f})"
+    if ratio[partner] > 0.9 and unknowns[partner].kind != "offset":
+        name = unknowns[partner].title
+        return f"the logs tell it only together with {name} (correlation {ratio[partner]:.2f})"
     return "the motion of the motor hardly depends on it in these logs"
 
 
@@ -409,7 +340,7 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
     period = float(np.median(np.diff(logs[0].time)))
     try:
         tried = plan_experiments(drive, log_period=period, optimise=False).experiments
-    except InputError:  # the standard experiments are too short for a log as slow as this one
+    except (InputError, SimulationError):  # too short for a log as slow as this one, or no motion at all
         return [f"Unknown: {told}. Remedy: take samples more often than each {1e3 * period:.3g} ms."]
     would = [one for one in tried if all(one.widths.get(name, math.inf) < math.inf for name in names)]
     remedy = "give what is known of it, and leave it out of --free: no standard experiment would tell it"
@@ -433,98 +364,51 @@ def _other_scale(guess: Drive, found: Drive) -> list[str]:
     ]
 
 
-def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
+def misfits(fitter: Fitter, best: Point) -> list[str]:
     """What the logs show that the model has not, each tried as a torque of its own shape."""
-    notes, rows = [], 0
-    errors, part = solution.errors, solution.part
-    drive = fitter.models[0].guess
-    extra = [name for name in FRICTIONS if name not in fitter.space.shared]
-    had = {name: float(getattr(drive, name)) for name in extra}
-    steps = {
-        name: STEP * unit for name, unit in zip(extra, Space.of(extra, drive, (), ()).units, strict=True)
-    }
-    columns: dict[str, list[Vector]] = {}
-    unexplained = 1.0
-    for i, (model, weights) in enumerate(zip(fitter.models, errors.weights, strict=True)):
-        values = fitter.space.values(solution.x, i) | had
-        signals = model.signals([values, *(values | {name: had[name] + steps[name]} for name in extra)])
-        shapes = {
-            name: (signal - signals[0]) / steps[name] for name, signal in zip(extra, signals[1:], strict=True)
-        }
-        response = model.torque_responses(values)
-        shapes["offset"] = math.sqrt(model.block) * response.sum(axis=1)
-        size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
-        for name, shape in shapes.items():
-            columns.setdefault(name, []).append((weights.rotation @ shape[fitter.counts[i]]) / size)
-        here = slice(rows, rows := rows + size.size)
-        unexplained = min(
-            unexplained,
-            _slow_torque(
-                weights.rotation @ weights.response / size[:, None], part.jacobian[here], part.residual[here]
-            ),
+    sizes = best.sizes
+    notes = _effects(fitter, best)
+    slow = min(
+        _slow_torque(
+            one.rotation @ one.response / root[:, None], one.jacobian / root[:, None], one.residual / root
         )
-    best = ("", 0.0, 0.0)
-    for name, parts in columns.items():
-        column = np.concatenate(parts)
-        alone = column - part.jacobian @ np.linalg.lstsq(part.jacobian, column, rcond=None)[0]
-        strength = float(alone @ alone)
-        if strength < 1e-6 * float(column @ column):
-            continue
-        amount, error = -float(alone @ part.residual) / strength, 1.0 / math.sqrt(strength)
-        if amount < -had.get(name, math.inf):
-            continue  # it would drive
-        if name == "offset" and abs(amount) > fitter.largest_torque:
-            continue  # no small effect, of which alone the derivative tells
-        if abs(amount) > SURE * error and abs(amount) / error > abs(best[1]) / max(best[2], 1e-300):
-            best = (name, amount, error)
-    name, amount, error = best
-    if name in FRICTIONS:
-        one = PARAMETERS[name]
-        notes.append(
-            f"The logs show {one.meaning} of {had[name] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
-            f"the drive has {had[name]:.3g}: gap and load torque may be far off. "
-            f"Remedy: find it too, --free +{one.path}."
-        )
-    elif name:
-        notes.append(
-            f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
-            "the model has not: gap and load torque may be far off."
-        )
+        for one in best.spots
+        for root in [np.sqrt(one.variance(sizes))]
+    )
     counted = all(one.log.kind == "angle" and one.log.count for one in fitter.models)
-    excess = errors.noise**2 - 1.0 - TOO_NOISY * math.sqrt(2.0 / part.residual.size)
-    if unexplained < CHANCE or (counted and excess > 0.0):
-        notes.append(
-            (
-                f"A torque that changes slowly is left (chance {unexplained:.1g})"
-                if unexplained < CHANCE
-                else f"What is left of the angle is {errors.noise:.3g} times what the encoder rounds"
-            )
-            + ": something else moves this drive (another friction or load, cogging, a torque that was not "
-            "realised), or the times of the samples are not exact."
+    excess = sizes.noise**2 - 1.0 - TOO_NOISY * math.sqrt(2.0 / sum(one.residual.size for one in best.spots))
+    if slow < CHANCE or (counted and excess > 0.0):
+        left = (
+            f"A torque that changes slowly is left (chance {slow:.1g})"
+            if slow < CHANCE
+            else f"What is left of the angle is {sizes.noise:.3g} times what the encoder rounds"
         )
-    usual, ripple = max(fitter.largest_torque, 0.5 * float(fitter.models[0].guess.Ms)), errors.ripple
-    if ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * fitter.largest_torque):
-        share = 100.0 * ripple / fitter.largest_torque
         notes.append(
-            f"A torque error of {ripple:.3g} N m in each sample, {share:.0f} % of the largest, is needed to "
-            "explain the logs: something else moves this drive (a second gap, a cut or clipped signal, "
-            "another kind of load), or the torque signal is poor."
+            f"{left}: something else moves this drive (another friction or load, cogging, a torque that was "
+            "not realised), or the times of the samples are not exact."
         )
-    for log, left in zip(
-        (one.log for one in fitter.models),
-        [fitter.likely(solution.x, i, errors).residual for i in range(len(fitter.models))],
-        strict=True,
-    ):
-        chance = _whiteness(left)
+    largest = fitter.largest_torque
+    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
+    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
+        share = 100.0 * sizes.ripple / largest
+        notes.append(
+            f"A torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest, is "
+            "needed to explain the logs: something else moves this drive (a second gap, a cut or clipped "
+            "signal, another kind of load), or the torque signal is poor."
+        )
+    for model, spot in zip(fitter.models, best.spots, strict=True):
+        left_over = spot.innovations(sizes)
+        chance = _whiteness(left_over)
         if chance < 1e-4:
             notes.append(
-                f"{log.name}: what is left is not independent from sample to sample (chance {chance:.1g}): "
-                "the log holds something that the model has not, as a second gap, an elastic part, a filter."
+                f"{model.log.name}: what is left is not independent from sample to sample (chance "
+                f"{chance:.1g}): the log holds something that the model has not, as a second gap, an elastic "
+                "part, a filter."
             )
-        far = int(np.sum(np.abs(left) > FAR))
-        if far > 2 + 0.005 * left.size:
-            notes.append(f"{log.name}: {far} samples lie more than {FAR:g} standard deviations off.")
-    notes.extend(_unsettled(fitter, solution))
+        far = int(np.sum(np.abs(left_over) > FAR))
+        if far > 2 + 0.005 * left_over.size:
+            notes.append(f"{model.log.name}: {far} samples lie more than {FAR:g} standard deviations off.")
+    notes.extend(_unsettled(fitter, best))
     if notes:
         notes.append(
             "The drive does not explain the logs: the values are its best fit, and no interval is stated."
@@ -532,20 +416,65 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
     return notes
 
 
-def _unsettled(fitter: Fitter, solution: Solution) -> list[str]:
+def _effects(fitter: Fitter, best: Point) -> list[str]:
+    """The friction, or the offset of the torque, that explains most of what is left, if it is sure."""
+    residual, jacobian = best.white
+    names, drive = {one.name for one in fitter.unknowns}, fitter.models[0].guess
+    steps = {
+        one.name: STEP * one.scale
+        for one in unknowns_of([name for name in FRICTIONS if name not in names], drive, (), ())
+    }
+    had = {name: float(getattr(drive, name)) for name in steps}
+    columns: dict[str, list[Vector]] = {name: [] for name in (*steps, "offset")}
+    for i, (model, data, spot) in enumerate(zip(fitter.models, fitter.data, best.spots, strict=True)):
+        values = values_of(fitter.unknowns, best.x, i) | had
+        each = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
+        signals = model.signals(each, spot.error)[:, data.rows] / data.root
+        shapes = [
+            (signal - signals[0]) / step for signal, step in zip(signals[1:], steps.values(), strict=True)
+        ]
+        shapes.append(math.sqrt(model.block) * spot.response.sum(axis=1))
+        for shape, column in zip(shapes, columns.values(), strict=True):
+            column.append(spot.rotation @ shape / np.sqrt(spot.variance(best.sizes)))
+    found, amount, error = "", 0.0, 1.0 / SURE
+    for name, parts in columns.items():
+        shape = np.concatenate(parts)
+        alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
+        strength = float(alone @ alone)
+        if strength < 1e-6 * float(shape @ shape):
+            continue
+        size, deviation = -float(alone @ residual) / strength, 1.0 / math.sqrt(strength)
+        drives = size < -had.get(name, math.inf)
+        far = name == "offset" and abs(size) > fitter.largest_torque  # of a small effect alone J tells
+        if not (drives or far) and abs(size) / deviation > max(SURE, abs(amount) / error):
+            found, amount, error = name, size, deviation
+    if found == "offset":
+        return [
+            f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
+            "the model has not: gap and load torque may be far off."
+        ]
+    if found:
+        one = PARAMETERS[found]
+        return [
+            f"The logs show {one.meaning} of {had[found] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
+            f"the drive has {had[found]:.3g}: gap and load torque may be far off. "
+            f"Remedy: find it too, --free +{one.path}."
+        ]
+    return []
+
+
+def _unsettled(fitter: Fitter, best: Point) -> list[str]:
     """That the likelihood still grows from where the fit ended, beyond a limit of the search or before it."""
-    space, slope, shared = fitter.space, solution.slope, len(fitter.space.shared)
-    lower, upper = solution.lower.copy(), solution.upper.copy()
-    upper[:shared] = math.inf
-    lower[[i for i, name in enumerate(space.shared) if name not in FRICTIONS]] = -math.inf
-    step = fitter.outward(solution.x, slope, lower, upper)
-    if -float(2.0 * slope.gradient @ step + step @ slope.curvature @ step) < UNSETTLED:
+    shared = np.array([one.kind in ("logarithm", "power") for one in fitter.unknowns])
+    frictions = np.array([one.is_friction for one in fitter.unknowns])
+    reach = np.where(shared, 1e3, 0.0)
+    if fitter.step(best, beyond=(np.where(frictions, 0.0, reach), reach))[1] < UNSETTLED:
         return []
-    held = [n for i, n in enumerate(space.shared) if _limited(solution, i, n, [float(solution.x[i])])]
-    if not held:
+    limits = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
+    if not limits:
         return ["The search for the most likely drive did not settle: begin from another guess (--set)."]
     return [
-        f"The fit would be better beyond the limit of the search for {listed(held)}: begin from another "
+        f"The fit would be better beyond the limit of the search for {listed(limits)}: begin from another "
         "guess (--set), unless something else moves this drive."
     ]
 

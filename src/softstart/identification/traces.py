@@ -6,9 +6,11 @@ import csv
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,9 +19,6 @@ from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
 from softstart.input.files import ABSENT, FOLDER, read_text, refusal_of
 from softstart.quantities import RefusedError, nearest, parse, read_unit, show, with_points
-
-if TYPE_CHECKING:
-    import asammdf
 
 Kind = Literal["angle", "speed"]
 
@@ -96,10 +95,8 @@ def read_signals(
     where: str, asked: Mapping[str, Asked], cause: str, rated: float | None, held: bool
 ) -> Signals:
     """The signals of a file; `rated`: the torque at 100 %; `held`: it keeps its value between samples."""
-    if where.lower().endswith(MEASUREMENTS):
-        with _measurement(where, asked) as measurement:
-            return _signals(_channels_of(measurement, where), where, asked, cause, rated, held)
-    return _signals(_columns_of(where, asked), where, asked, cause, rated, held)
+    channels = _channels_of if where.lower().endswith(MEASUREMENTS) else _columns_of
+    return _signals(channels(where, asked), where, asked, cause, rated, held)
 
 
 # ---- which signal is which ------------------------------------------------------------------------------
@@ -422,8 +419,8 @@ def _unit_of_times(head: Sequence[Sequence[str]], data: Sequence[Sequence[str]],
 # ---- measurement files ----------------------------------------------------------------------------------
 
 
-def _measurement(where: str, asked: Mapping[str, Asked]) -> asammdf.MDF:
-    """An MDF file, opened."""
+def _channels_of(where: str, asked: Mapping[str, Asked]) -> list[_Channel]:
+    """The channels of an MDF file, each as often as there are some of its name."""
     if (reason := refusal_of(where)) in (ABSENT, FOLDER):
         raise InputError(f"log = {where}: {reason}.")
     if "time" in asked:
@@ -431,7 +428,7 @@ def _measurement(where: str, asked: Mapping[str, Asked]) -> asammdf.MDF:
     try:
         import asammdf
 
-        return asammdf.MDF(where)
+        file = asammdf.MDF(BytesIO(Path(where).read_bytes()))
     except ImportError:
         raise InputError(
             f"log = {where}: measurement files need the package asammdf; install it with "
@@ -440,29 +437,20 @@ def _measurement(where: str, asked: Mapping[str, Asked]) -> asammdf.MDF:
     except Exception as error:  # what its parser meets in a damaged file
         raise InputError(f"log = {where}: this cannot be read as an MDF file ({error}).") from None
 
-
-def _channels_of(measurement: asammdf.MDF, where: str) -> list[_Channel]:
-    """The channels of an MDF file, each as often as there are some of its name."""
-
-    def reader(name: str) -> Callable[[str, str], tuple[Vector, Vector]]:
-        def read(key: str, unit: str) -> tuple[Vector, Vector]:
-            signal = measurement.get(name)
-            factor = float(parse(f"1 {unit}" if unit else 1.0, COLUMNS[key].unit))
-            try:
-                values = np.asarray(signal.samples, dtype=np.float64)
-                times = np.asarray(signal.timestamps, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise InputError(f"log = {where}: channel {name} holds text, and no numbers.") from None
-            if values.ndim != 1:
-                raise InputError(f"log = {where}: channel {name} has more than one number in a sample.")
-            check_times(times, f"{where}, {name}")
-            return times, factor * values
-
-        return read
+    def read(name: str, key: str, unit: str) -> tuple[Vector, Vector]:
+        signal = file.get(name)
+        try:
+            times, values = (np.asarray(one, dtype=np.float64) for one in (signal.timestamps, signal.samples))
+        except (TypeError, ValueError):
+            raise InputError(f"log = {where}: channel {name} holds text, and no numbers.") from None
+        if values.ndim != 1:
+            raise InputError(f"log = {where}: channel {name} has more than one number in a sample.")
+        check_times(times, f"{where}, {name}")
+        return times, float(parse(f"1 {unit}" if unit else 1.0, COLUMNS[key].unit)) * values
 
     return [
-        _Channel(name, measurement.get_channel_unit(name, *place) or "", reader(name))
-        for name in measurement.channels_db
-        for place in measurement.whereis(name)
-        if measurement.masters_db.get(place[0]) != place[1]
+        _Channel(name, file.get_channel_unit(name, *place) or "", partial(read, name))
+        for name in file.channels_db
+        for place in file.whereis(name)
+        if file.masters_db.get(place[0]) != place[1]
     ]

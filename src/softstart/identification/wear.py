@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import varied
@@ -41,12 +42,16 @@ class Line:
         Of both, from the intervals of the gaps, wider by as much as the gaps scatter more than these say.
     chance : float
         That gaps with such intervals scatter as much about a line; 1 for two gaps.
+    quantile : float
+        Of 95 %: normal, or Student's with n - 2 degrees of freedom where the n gaps scatter more than their
+        intervals say, so that the variance is theirs.
     """
 
     start: float
     slope: float
     covariance: Matrix
     chance: float
+    quantile: float
 
     @staticmethod
     def through(years: Vector, gaps: Vector, deviations: Vector) -> Line:
@@ -62,19 +67,21 @@ class Line:
         squares = float(np.sum(((start + slope * years - gaps) / deviations) ** 2))
         freedom = gaps.size - 2
         chance = float(chi2.sf(squares, freedom)) if freedom else 1.0
-        wider = max(1.0, squares / freedom) if freedom else 1.0
-        return Line(start, slope, np.asarray(wider * covariance, dtype=np.float64), chance)
+        if squares <= freedom or not freedom:
+            return Line(start, slope, np.asarray(covariance), chance, INTERVAL.quantile)
+        quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
+        return Line(start, slope, np.asarray(squares / freedom * covariance), chance, quantile)
 
     @property
     def growth(self) -> tuple[float, float, float]:
         """Growth and its interval of 95 %, rad a year."""
-        half = INTERVAL.quantile * math.sqrt(float(self.covariance[1, 1]))
+        half = self.quantile * math.sqrt(float(self.covariance[1, 1]))
         return self.slope, self.slope - half, self.slope + half
 
     def at(self, years: Vector) -> tuple[Vector, Vector]:
         """The gap at these times, and half its interval."""
         rows = np.column_stack([np.ones_like(years), years])
-        half = INTERVAL.quantile * np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
+        half = self.quantile * np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
         return rows @ np.array([self.start, self.slope]), half
 
     def reaches(self, gap: float) -> tuple[float, float, float]:
@@ -87,7 +94,7 @@ class Line:
         >>> [round(t, 3) for t in line.reaches(0.12)]
         [4.0, 3.231, 5.352]
         """
-        (v00, v01), (_, v11) = (INTERVAL.quantile**2 * self.covariance).tolist()
+        (v00, v01), (_, v11) = (self.quantile**2 * self.covariance).tolist()
         off = self.start - gap
         middle = -off / self.slope if self.slope > 0.0 else math.nan
         # (off + slope t)^2 <= v00 + 2 v01 t + v11 t^2

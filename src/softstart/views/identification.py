@@ -118,7 +118,7 @@ def figure(found: Identification) -> Any:
             own = f"{POSITION} {i + 1}"
             position = {POSITION: estimates[own]} if own in estimates else {}
             base = found.guess.replace(start_position="mid-gap") if position else found.guess.design_drive
-            model = LogModel(log, base).signals([values | position])[0]
+            model = LogModel.of(log, base).signals([values | position])[0]
             seen, unit = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
             time, steps = log.time - log.time[0], "steps-post" if log.torque_is == "demand" else "default"
             offset = float(np.median(log.values[seen] - model[seen])) if log.kind == "angle" else 0.0
