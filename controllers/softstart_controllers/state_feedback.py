@@ -103,8 +103,8 @@ class StateFeedback(CompiledController):
     `low_torque` (`landing`). The contact and what follows are estimated (`contact`): phi1, w1, the twist z,
     w2 and 1/J2, which takes up what is wrong in the model of the load.
 
-    *Feedback.* The reference T_ref rises from the mean shaft torque under the low torque to that under 99 % of
-    `full_torque` (below it the feedback can act both ways) in the time `rise`. With M = (u J2 + Mc J1)/
+    *Feedback.* The reference T_ref rises from the mean shaft torque under the low torque to that under 99 %
+    of `full_torque` (below it the feedback can act both ways) in the time `rise`. With M = (u J2 + Mc J1)/
     (J1 + J2), the mean torque under the motor torque u, and M_y that under the torque the lagging motor has
     reached by now,
 
