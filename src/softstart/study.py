@@ -6,8 +6,9 @@ figures. It is registered in the entry-point group `softstart.studies` and run b
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -78,6 +79,22 @@ class Table:
         for index, row in enumerate(self.rows, start=1):
             if (cells := len(row)) != (columns := len(self.columns)):
                 raise ValueError(f"table {self.title}, row {index}: {cells} cells for {columns} columns.")
+
+    @classmethod
+    def of(cls, title: str, cells: Mapping[str, Iterable[Any]]) -> Table:
+        """From the cells below each heading; a number that is not finite becomes None.
+
+        >>> Table.of("Peak", {"gap, rad": [0.5, 2.0], "K_dyn": [3.1179, math.nan]}).rows
+        ((0.5, 3.1179), (2.0, None))
+        """
+        rows = zip(*(map(_plain, column) for column in cells.values()), strict=True)
+        return cls(title, tuple(cells), tuple(rows))
+
+
+def _plain(cell: Any) -> Any:
+    """A cell as JSON has it: numbers of Python, None where there is none."""
+    cell = cell.item() if hasattr(cell, "item") else cell
+    return None if isinstance(cell, float) and not math.isfinite(cell) else cell
 
 
 @dataclass(frozen=True)
