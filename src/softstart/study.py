@@ -62,6 +62,8 @@ class Claim:
 class Table:
     """A titled table; each row has one cell (text, number or None) a column. Units go into the column names.
 
+    A number that is not finite becomes None.
+
     >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5, 3.1179)]).rows
     ((0.5, 3.1179),)
     >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5,)])
@@ -75,20 +77,19 @@ class Table:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple(self.columns))
-        object.__setattr__(self, "rows", tuple(map(tuple, self.rows)))
+        object.__setattr__(self, "rows", tuple(tuple(map(_plain, row)) for row in self.rows))
         for index, row in enumerate(self.rows, start=1):
             if (cells := len(row)) != (columns := len(self.columns)):
                 raise ValueError(f"table {self.title}, row {index}: {cells} cells for {columns} columns.")
 
     @classmethod
     def of(cls, title: str, cells: Mapping[str, Iterable[Any]]) -> Table:
-        """From the cells below each heading; a number that is not finite becomes None.
+        """From the cells below each heading.
 
         >>> Table.of("Peak", {"gap, rad": [0.5, 2.0], "K_dyn": [3.1179, math.nan]}).rows
         ((0.5, 3.1179), (2.0, None))
         """
-        rows = zip(*(map(_plain, column) for column in cells.values()), strict=True)
-        return cls(title, tuple(cells), tuple(rows))
+        return cls(title, tuple(cells), tuple(zip(*cells.values(), strict=True)))
 
 
 def _plain(cell: Any) -> Any:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart import Drive
+from softstart import Drive, Run
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
 from softstart.study import Progress
-from softstart.views.drawing import COLOURS, DASHES, GREY, head
+from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CRANE = Drive.load("crane-4amtkf")  # [G]: J1 = 0.035 kg m2, J2'' = 5 J1, delta1 = 0.5 rad, Ms = 62 N m
 TARGET = 60.0  # rad/s, where start times are compared
@@ -77,3 +80,26 @@ def draw_lines(
         look = {"marker": markers[index % len(markers)], "ms": 5, "mfc": "white"}
         axes.plot(x, y, color=COLOURS[index], ls=DASHES[index], label=label, **look)
     head(axes, title, up, across)
+
+
+def starts_figure(columns: Mapping[str, Mapping[str, Run]]) -> Figure:
+    """Motor torque, shaft torque over its mean, and speeds of starts by their labels; a column each."""
+    with drawing():
+        figure, panels = new_figure(3, len(columns), (9.5, 7.8), sharex=True, sharey="row", squeeze=False)
+        for (title, runs), (motor, shaft, speed) in zip(columns.items(), panels.T, strict=True):
+            base = {name: run.peak_torque / run.k_dyn for name, run in runs.items()}
+            draw_lines(motor, {name: (run.t, run.u) for name, run in runs.items()}, title)
+            of_mean = {name: (run.t, run.T / base[name]) for name, run in runs.items()}
+            draw_lines(shaft, of_mean, "", levels=[1.0])
+            targets = {float(run.drive.target_speed) for run in runs.values()}
+            lines = {name: (run.t, run.w2) for name, run in runs.items()}
+            draw_lines(speed, lines, "", "time, s     (dots: load at its target speed)", levels=targets)
+            for index, run in enumerate(runs.values()):
+                speed.plot(run.t, run.w1, color=COLOURS[index], lw=0.8, alpha=0.8)
+                end = run.start_time, float(run.at(run.start_time)["w2"])
+                speed.plot(*end, "o", ms=5, color=COLOURS[index])
+            motor.legend(loc="upper left", handlelength=3.2, fontsize=8.5)
+        panels[0, 0].set(ylabel="motor torque, N m", ylim=(-3.0, 125.0), yticks=[0, 20, 40, 60])
+        panels[1, 0].set_ylabel("shaft torque / $M_{12avg}$")
+        panels[2, 0].set_ylabel("speed, rad/s\n(load; thin: motor; dotted: target)")
+    return figure  # type: ignore[no-any-return]

@@ -70,7 +70,7 @@ def crane(gap: float, strategy: str = "") -> Drive:
 
 def controller_of(strategy: str, drive: Drive) -> Controller:
     """The controller; a ramp takes `RAMP_TIME`, method 2 raises its torque where [G](15) says."""
-    from softstart_studies.paper_g.crane import published
+    from softstart_studies.crane import published
 
     strategy = strategy.removeprefix(DAMPED)
     given = {"time": RAMP_TIME} if strategy == "ramp" else {}

@@ -96,7 +96,7 @@ def figures() -> dict[str, list[Curve]]:
     return {
         "2": [k_dyn_curve(ratio, GAP_1, method, text) for ratio, text in inertias for method in METHODS],
         "3": [k_dyn_curve(HEAVY, gap, method, text) for gap, text in gaps for method in METHODS],
-        "4": [duration_curve(gap, *span, f"{text}, {what}") for gap, text in gaps for *span, what in spans],
+        "4": [duration_curve(gap, *span[:2], f"{text}, {span[2]}") for gap, text in gaps for span in spans],
     }
 
 

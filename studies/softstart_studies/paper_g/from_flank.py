@@ -104,8 +104,8 @@ def table() -> Table:
     """A row for each conclusion: its figure from mid-gap, as in [G], and from both flanks."""
     said, what, number = zip(*NUMBERS, strict=True)
     found = {where: [one(where) for one in number] for where in POSITIONS}
-    cells = {"": range(1, len(NUMBERS) + 1), "[G] says": said, "figure": what}
-    return Table.of("The conclusions from a flank", cells | found)
+    cells: dict[str, Sequence[object]] = {"": range(1, len(NUMBERS) + 1), "[G] says": said, "figure": what}
+    return Table.of("The conclusions from a flank", {**cells, **found})
 
 
 def claim() -> Claim:

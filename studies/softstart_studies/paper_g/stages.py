@@ -132,7 +132,8 @@ def stage_1_decides() -> Claim:
             swings.append(longer / abs(float(reduced.contact_duration - full.contact_duration)))
             whole, part = (float(one.open_duration + one.contact_duration) for one in (full, reduced))
             grown.append(f"{whole:.4f} to {part:.4f} s")
-    times = [simulated(crane(), r, method).start_time for r, method in ((1.0, 1), (SHARE, 1), (SHARE, 2))]
+    times = [simulated(crane(), 1.0, 1).start_time]
+    times += [simulated(crane(), SHARE, method).start_time for method in METHODS]
     return Claim(
         "The total time t1 + t2 is set by stage 1.",
         Verdict.CONFIRMED if min(swings) > 2.0 else Verdict.PARTLY,
