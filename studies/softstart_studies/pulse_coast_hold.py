@@ -112,7 +112,8 @@ class Grid:
     @property
     def latest(self) -> Array:
         """The longest start time of each cell, s."""
-        return self.start_time.max(axis=2, keepdims=True)
+        longest: Array = self.start_time.max(axis=2, keepdims=True)
+        return longest
 
 
 def run(
