@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from softstart.errors import InputError
-from softstart.plugins import STUDIES, load, registered
+from softstart.plugins import STUDIES, load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -144,11 +144,6 @@ class Study(ABC):
         `out` is a folder for files beyond the tables and pictures, which the caller writes; None if nothing
         is to be written. Raises InputError or SimulationError like everything else.
         """
-
-
-def study_names() -> tuple[str, ...]:
-    """Names of all installed studies, those of other packages too."""
-    return tuple(registered(STUDIES))
 
 
 def find_study(name: str) -> Study:

@@ -13,7 +13,7 @@ from tests.twin import chain_of
 
 from softstart import Drive
 from softstart.chain import Chain, natural_vibration, reduce_chain
-from softstart.study import Verdict, study_names
+from softstart.study import Verdict, find_study
 from softstart.vibration import elastic_frequencies
 from softstart_studies.paper_r import PaperR, findings, four_to_two, tables
 from softstart_studies.paper_r.findings import free, scale_gaps, tractor
@@ -180,7 +180,7 @@ def test_every_claim_of_the_tables_has_its_verdict():
     verdicts = [Verdict(claim.verdict) for claim in tables.claims()]
     assert verdicts == [Verdict.PARTLY, Verdict.CONFIRMED, Verdict.PARTLY, Verdict.CONFIRMED]
     assert "by choice" in findings.twist().evidence
-    assert "paper-r" in study_names()
+    assert isinstance(find_study("paper-r"), PaperR)
     assert len(PaperR.pictures) == 2
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
-from softstart.arrays import Vector, plain_fields
+from softstart.arrays import Vector
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.periodic_torque import PeriodicTorque
@@ -24,7 +24,6 @@ from softstart.errors import InputError
 from softstart.quantities import Value
 from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
-from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.paper_r.last_bits import natural_vibration
 
 
@@ -148,14 +147,6 @@ class Backbone:
     frequency: Vector
     two_masses: Vector
 
-    def summary(self) -> dict[str, Any]:
-        """All of it as plain data."""
-        return {"chain": self.chain.name, "assumed": self.chain.assumed, **plain_fields(self, "chain")}
-
-    def plot(self) -> Any:
-        """The frequencies, over that without gaps, against the largest torque."""
-        return backbone_figure(self)
-
 
 HELD = "inertia = inf: vibrations with gaps are those of masses that all move; leave ground out."
 
@@ -219,16 +210,6 @@ class ForcedResponse:
     without_gaps: Vector
     torque_without_gaps: Vector
     spread: Vector
-
-    def summary(self) -> dict[str, Any]:
-        """All of it as plain data."""
-        names = [mass.name for mass in self.chain.masses]
-        about = {"chain": self.chain.name, "assumed": self.chain.assumed, "masses": names}
-        return {**about, **plain_fields(self, "chain")}
-
-    def plot(self, mass: str | int = 0) -> Any:
-        """The amplitude of one mass against the frequency, with gaps and without."""
-        return response_figure(self, mass)
 
 
 def forced_response(
@@ -364,33 +345,3 @@ def _steady(
 def _height(rows: Vector) -> Vector:
     found: Vector = np.sqrt(2.0 * np.mean((rows - rows.mean(axis=0)) ** 2, axis=0))
     return found
-
-
-def backbone_figure(found: Backbone) -> Any:
-    """The frequencies, over that without gaps, against the largest torque."""
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        axes.semilogx(found.torque, found.frequency / found.Omega, "o-", color=COLOURS[0], label="chain")
-        if np.isfinite(found.two_masses).all():
-            two = found.two_masses / found.Omega
-            axes.semilogx(found.torque, two, "--", color=COLOURS[1], label="two masses, exact")
-        axes.set_xlabel("largest torque at release, N m")
-        axes.set_ylabel("frequency over that without gaps")
-        axes.set_title(f"{found.chain.name}: free vibration with gaps, mode {found.mode}")
-        axes.legend()
-    return figure
-
-
-def response_figure(found: ForcedResponse, mass: str | int) -> Any:
-    """The amplitude of one mass against the frequency, with gaps and without."""
-    index = found.chain.index(mass)
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        with_gaps = f"with gaps, {found.locking:g} N m constant"
-        axes.plot(found.frequency, found.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
-        axes.plot(found.frequency, found.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
-        axes.set_xlabel("frequency of the exciting torque, rad/s")
-        axes.set_ylabel("amplitude, rad")
-        axes.set_title(f"{found.chain.name}: forced response of {found.chain.masses[index].name}")
-        axes.legend()
-    return figure
