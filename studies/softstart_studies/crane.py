@@ -71,12 +71,12 @@ def mean_and_most(ratio: Vector) -> tuple[float, float]:
 
 def draw_lines(
     axes: Any, lines: Mapping[str, tuple[Any, Any]], title: str, across: str = "", up: str = "", *,
-    markers: Sequence[str] = ("",), levels: Iterable[float] = (), first: int = 0,
+    markers: Sequence[str] = ("",), levels: Iterable[float] = (),
 ) -> None:  # fmt: skip
-    """Lines (x, y) by their labels, a colour and dashes each from number `first` on; dotted at `levels`."""
+    """Lines (x, y) by their labels, a colour, dashes and marker each; dotted at `levels`."""
     for level in levels:
         axes.axhline(level, color=GREY, lw=0.9, ls=":", zorder=1)
-    for index, (label, (x, y)) in enumerate(lines.items(), start=first):
+    for index, (label, (x, y)) in enumerate(lines.items()):
         look = {"marker": markers[index % len(markers)], "ms": 5, "mfc": "white"}
         axes.plot(x, y, color=COLOURS[index], ls=DASHES[index], label=label, **look)
     head(axes, title, up, across)

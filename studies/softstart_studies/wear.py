@@ -21,7 +21,7 @@ from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.tuning.outcome import Tuning
-from softstart.views.drawing import GREY, drawing, entitle, panels
+from softstart.views.drawing import GREY, decade_ticks, drawing, entitle, panels
 from softstart_studies.crane import WITH_INVERTER, draw_lines, mean_and_most, published
 from softstart_studies.tuned_alike import Front, front, tuned, tuned_controllers
 
@@ -196,6 +196,9 @@ def life_figure(found: Life, over: bool) -> Figure:
             panel.set_xticks(found.extent.scheduled, [f"{gap:g}" for gap in found.extent.scheduled])
             panel.minorticks_off()
         axes[0].set_ylim(0.95 if over else 0.8, MOST)
+        if over:
+            axes[0].set_yscale("log")
+            decade_ticks(axes[0].yaxis)
         axes[0].legend(loc="upper left")
         entitle(figure, f"{label} while the gap wears ({note})")
     return figure  # type: ignore[no-any-return]

@@ -128,7 +128,7 @@ def endings_figure(found: Sequence[Endings]) -> Figure:
             draw_lines(above, lines, f"gap {one.gap:g} rad", levels=[1.0], markers="os^")
             more = {name: one.cost(name) for name in TERMINALS if name != "reached"}
             costs = {name: (list(k), [100 * (x - 1) for x in k.values()]) for name, k in more.items()}
-            draw_lines(below, costs, "", "start time, s", markers="s^", first=1)
+            draw_lines(below, costs, "", "start time, s", markers="os")
         panels[0, 0].set_ylabel(f"least {K_DYN}")
         panels[0, 0].set_ylim(bottom=0.5)
         panels[1, 0].set_ylabel(f"{K_DYN} above that of reached, %")
