@@ -17,7 +17,8 @@ from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS
 from softstart.input.documents import Table
 from softstart.input.parameters import REQUIRED
-from softstart.study import find_study, study_names
+from softstart.plugins import STUDIES, registered
+from softstart.study import find_study
 
 
 def drive_file() -> str:
@@ -163,7 +164,7 @@ def shipped() -> str:
 def studies() -> str:
     """The studies and their figures."""
     lines = ["| study | title | figures |", "|---|---|---|"]
-    for name in study_names():
+    for name in registered(STUDIES):
         study = find_study(name)
         pictures = ", ".join(f"`{stem}`" for stem in study.pictures) or "-"
         lines.append(f"| `{name}` | {prose(study.title)} | {pictures} |")

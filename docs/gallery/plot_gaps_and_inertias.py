@@ -9,7 +9,7 @@ with the optimum of the cell.
 # %%
 # Crane drive of [G], torque lag 2 ms (assumed), to 60 rad/s. This page uses two cells, two controllers and
 # a short search; the study has 5 by 4 cells and all controllers.
-from softstart_studies.gaps_and_inertias import Extent, grids, present
+from softstart_studies.gaps_and_inertias import Extent, grid, present
 
 extent = Extent(
     gaps=(0.5, 2.0),
@@ -19,7 +19,7 @@ extent = Extent(
     generations=3,
     controllers=("ramp", "pulse-coast-hold"),
 )
-result = present(grids(extent, lambda doing: None), lambda doing: None)
+result = present(grid(extent, lambda doing: None), lambda doing: None)
 figure = result.figures["gaps-and-inertias-active-cells"]
 figure.set_label(
     "Ratio of K_dyn to the optimum for the same time, gains tuned for each cell; a dash: no optimum exists."

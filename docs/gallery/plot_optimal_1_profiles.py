@@ -9,11 +9,11 @@ the motor in the gap, zero torque limits the impact, and then the torque holds t
 # %%
 # Crane drive of [G], gap 0.5 rad, to 60 rad/s; 1.05, 1.2 and 1.5 times the start time of constant torque.
 
-from softstart_studies.optimal_starts import pictures, profiles
-from softstart_studies.optimal_starts.crane import CRANE, TARGET, Extent
+from softstart_studies.optimal_starts import profiles
+from softstart_studies.optimal_starts.drives import Extent
 
 found = profiles.starts(Extent(gaps=(0.5,)), lambda doing: None)
-figure = pictures.profiles_figure(found, CRANE.mean_torque, TARGET)
+figure = profiles.figure(found)
 figure.set_label(
     "Torque of the motor, torque of the shaft and speeds of three optimal starts, on the exact plant."
 )

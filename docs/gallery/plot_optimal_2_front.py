@@ -8,17 +8,17 @@ optimum. The figure shows how close the controllers come to it, which use only p
 # %%
 # Crane drive of [G], gap 0.5 rad, to 60 rad/s, with fewer points than in the study.
 from softstart.views.optima import front_figure
-from softstart_studies.optimal_starts import fronts, pictures, terminals
-from softstart_studies.optimal_starts.crane import Extent
+from softstart_studies.optimal_starts import costs, limits
+from softstart_studies.optimal_starts.drives import Extent
 
-(front,) = fronts.fronts(Extent(gaps=(0.5,), points=4), lambda doing: None)
+(front,) = limits.fronts(Extent(gaps=(0.5,), points=4), lambda doing: None)
 figure = front_figure(front)
 figure.set_label("Lowest K_dyn over the start time, its proved lower bound, and the shipped controllers.")
 
 # %%
 # The end condition affects the start time: load at speed (reached), motor and load at speed (synchronous),
 # or steady state (steady).
-endings = pictures.terminals_figure([terminals.endings(front, lambda doing: None)])
+endings = costs.endings_figure([costs.endings(front, lambda doing: None)])
 endings.set_label("The same for the three end conditions.")
 
 # %%

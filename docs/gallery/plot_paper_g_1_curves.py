@@ -11,23 +11,22 @@ event to event. Their conclusions are checked on :doc:`/paper-g`.
 # %%
 # Gap 0.5 rad, Ms = 62 N m, c = 368.465 N m/rad; J1 = 0.035 kg m2 and two load inertias: the crane drive
 # 4AMTKF of [G].
-from softstart_studies.paper_g import curves, pictures
+from softstart_studies.paper_g import curves
 
-figure = pictures.curves_figure(
-    curves.figure_2(), 2, "Fig. 2 of [G]: $\\delta_1 = 0.5$ rad, base of $J_2''$", pictures.K_DYN, 3.5
-)
+drawn = curves.figures()
+figure = curves.figure("2", drawn["2"])
 figure.set_label(
     "K_dyn of the first contact over M1/Ms, two load inertias. Lines: (17), (18) of [G]; marks: plant."
 )
 
 # %%
 # With the gap worn to four times its width:
-worn = pictures.curves_figure(curves.figure_3(), 2, "Fig. 3 of [G]: $J_2'' = 5\\,J_1$", pictures.K_DYN, 5.2)
+worn = curves.figure("3", drawn["3"])
 worn.set_label("The same for a new and a worn gap, J2 = 5 J1.")
 
 # %%
 # Durations of the stages:
-times = pictures.curves_figure(curves.figure_4(), 3, "Fig. 4 of [G]: $J_2'' = 5\\,J_1$", "time, ms", 250.0)
+times = curves.figure("4", drawn["4"])
 times.set_label("Durations of the stages over M1/Ms.")
 
 # %%

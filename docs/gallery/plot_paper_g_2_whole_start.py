@@ -9,24 +9,20 @@ the gap stays closed.
 
 # %%
 # The crane drive of [G], J2 = 5 J1, gaps of 0.5 and 2 rad; each mark is a whole start, to its last contact.
-from softstart_studies.paper_g import pictures, whole_start
-from softstart_studies.paper_g.crane import GAP_1, GAP_2, SHARE, crane, simulated
+from softstart_studies.paper_g import whole_start
+from softstart_studies.paper_g.crane import GAP_1, GAP_2
 
-figure = pictures.whole_start_figure([whole_start.whole_start(gap) for gap in (GAP_1, GAP_2)])
+figure = whole_start.figure([whole_start.whole_start(gap) for gap in (GAP_1, GAP_2)])
 figure.set_label("K_dyn of the first contact and of the whole start over M1/Ms.")
 
 # %%
 # The same in time, with M1 = Ms/4:
-traces = [
-    ("method 2: raised at the end of stage 2, (15)", simulated(crane(), SHARE, 2)),
-    ("raised at the peak of stage 2, (14)", whole_start.at_peak(GAP_1, SHARE)),
-]
-in_time = pictures.traces_figure(traces, 0.26)
+in_time = whole_start.traces_figure()
 in_time.set_label("Shaft torque of the two starts; grey: gap open.")
 
 # %%
 # Numerical values:
-for name, run in traces:
+for name, run in whole_start.traces().items():
     print(f"{name}: K_dyn {run.k_dyn:.4f}, {run.contacts} contacts, start time {run.start_time:.4f} s")
 
 # %%

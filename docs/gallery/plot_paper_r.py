@@ -8,9 +8,9 @@ second shows how gaps lower the frequency of the free vibration of a chain and c
 
 # %%
 # Four masses with light middle masses; their share of the inertia and the stiffness of the ends are varied.
-from softstart_studies.paper_r import four_to_two, pictures
+from softstart_studies.paper_r import findings, four_to_two
 
-figure = pictures.map_figure(four_to_two.error_map())
+figure = four_to_two.map_figure(four_to_two.error_map())
 figure.set_label(
     "Error of the lowest frequency by the lever rule, over the merged share and the stiffness of the ends."
 )
@@ -18,13 +18,13 @@ figure.set_label(
 # %%
 # A chain similar to the tractor T-4. The paper gives speed ratios and gaps; inertias and stiffnesses are
 # assumed and marked as such in every output; see :doc:`/paper-r`.
-shapes = pictures.shapes_figure()
+shapes = findings.shapes_figure()
 shapes.set_label(
     "First free vibration of the tractor-like chain, without gaps and with gaps of several widths."
 )
 
 # %%
-# All tables and findings, and two more figures: ``softstart study paper-r --out results`` (50 s).
+# All tables and findings: ``softstart study paper-r --out results`` (30 s).
 #
 # **References.** [R] V. S. Popovich, R. E. Pestretsov, on reducing torsional systems of machine units with
 # gaps.

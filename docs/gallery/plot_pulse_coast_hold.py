@@ -9,18 +9,17 @@ unknown gap, load inertia and load speed. This page compares it with the optimum
 # %%
 # Crane drive of [G] with a torque lag of 2 ms, encoder of 4096 lines, 1 kHz; always set up for a gap of 0.5
 # rad.
-from softstart_studies.pulse_coast_hold import cells, pictures
-from softstart_studies.pulse_coast_hold.crane import Extent
+from softstart_studies.pulse_coast_hold import Extent, corners_figure, judged, ratios_figure
 
 extent = Extent(kinds=("active",), gaps=(0.5, 2.0), ratios=(2.0, 5.0), phases=4)
-figure = pictures.starts_figure(extent)
+figure = corners_figure(extent)
 figure.set_label("Starts at the corners of gap and load inertia, with one set of parameters.")
 
 # %%
 # Ratio of K_dyn to the optimum for the same time, at the corners (the study has four gaps and four
 # inertias, 16 encoder phases, and both kinds of load):
-grids = {kind: cells.grid(kind, extent, lambda doing: None) for kind in extent.kinds}
-ratios = pictures.ratios_figure(grids)
+grids = {kind: judged(kind, extent, lambda doing: None) for kind in extent.kinds}
+ratios = ratios_figure(grids)
 ratios.set_label("Ratio of K_dyn to the optimum for the same time, by gap and load inertia.")
 
 # %%

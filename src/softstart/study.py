@@ -6,15 +6,16 @@ figures. It is registered in the entry-point group `softstart.studies` and run b
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from softstart.errors import InputError
-from softstart.plugins import STUDIES, load, registered
+from softstart.plugins import STUDIES, load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,6 +62,8 @@ class Claim:
 class Table:
     """A titled table; each row has one cell (text, number or None) a column. Units go into the column names.
 
+    A number that is not finite becomes None.
+
     >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5, 3.1179)]).rows
     ((0.5, 3.1179),)
     >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5,)])
@@ -74,10 +77,25 @@ class Table:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple(self.columns))
-        object.__setattr__(self, "rows", tuple(map(tuple, self.rows)))
+        object.__setattr__(self, "rows", tuple(tuple(map(_plain, row)) for row in self.rows))
         for index, row in enumerate(self.rows, start=1):
             if (cells := len(row)) != (columns := len(self.columns)):
                 raise ValueError(f"table {self.title}, row {index}: {cells} cells for {columns} columns.")
+
+    @classmethod
+    def of(cls, title: str, cells: Mapping[str, Iterable[Any]]) -> Table:
+        """From the cells below each heading.
+
+        >>> Table.of("Peak", {"gap, rad": [0.5, 2.0], "K_dyn": [3.1179, math.nan]}).rows
+        ((0.5, 3.1179), (2.0, None))
+        """
+        return cls(title, tuple(cells), tuple(zip(*cells.values(), strict=True)))
+
+
+def _plain(cell: Any) -> Any:
+    """A cell as JSON has it: numbers of Python, None where there is none."""
+    cell = cell.item() if hasattr(cell, "item") else cell
+    return None if isinstance(cell, float) and not math.isfinite(cell) else cell
 
 
 @dataclass(frozen=True)
@@ -126,11 +144,6 @@ class Study(ABC):
         `out` is a folder for files beyond the tables and pictures, which the caller writes; None if nothing
         is to be written. Raises InputError or SimulationError like everything else.
         """
-
-
-def study_names() -> tuple[str, ...]:
-    """Names of all installed studies, those of other packages too."""
-    return tuple(registered(STUDIES))
 
 
 def find_study(name: str) -> Study:

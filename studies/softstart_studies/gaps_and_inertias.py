@@ -5,33 +5,27 @@ The drive is the crane drive of [G], target speed 60 rad/s, torque lag 2 ms (ass
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.tuning.outcome import Tuning
-from softstart.views.drawing import colour_scale, drawing, heat_map
-from softstart_studies.tuned_alike import (
-    ACROSS,
-    CRANE,
-    Front,
-    front,
-    panel_grid,
-    rounded,
-    tuned,
-    tuned_controllers,
-)
+from softstart.views.drawing import colour_scale, drawing, entitle, heat_map, panels
+from softstart_studies.crane import WITH_INVERTER, mean_and_most, prefixed, spread
+from softstart_studies.tuned_alike import Front, front, tuned, tuned_controllers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
-LoadKind = Literal["active", "reactive"]
+INVARIANT = 0.05  # spread that still counts as invariant
+DELAY, FEEDBACK = "acceleration-delay", "current-limit-feedback"
+MOST = 3.0  # ratio from which on all colours are the same
+BETTER = 1e-9
 
 
 @dataclass(frozen=True)
@@ -49,272 +43,198 @@ class Extent:
     restarts: int = 2
     generations: int = 20
     controllers: tuple[str, ...] | None = None  # None: all that can be tuned
-    kinds: tuple[LoadKind, ...] = ("active",)  # that of [G]; optima of reactive loads take ten times as long
 
 
 Map = NDArray[np.float64]  # one row per gap, one column per load inertia
-BETTER = 1e-9
+# the gains, and the names of their variables in the schedule, or in the cells of the robust set
+GAINS = {"defaults": ("", "_default"), "tuned": ("", ""), "one set": ("robust", "")}
 
 
 @dataclass(frozen=True)
 class Grid:
-    """One kind of load: all tunings, and the optima of each cell."""
+    """All tunings, and the optima of each cell."""
 
-    kind: str
     extent: Extent
-    tunings: dict[str, Tuning]
+    tunings: Mapping[str, Tuning]
     fronts: list[list[Front]]
 
+    @property
     def core(self) -> Any:
         """The cells for which spreads are named, as a mask."""
         e = self.extent
         rows = [e.core_gaps[0] <= gap <= e.core_gaps[1] for gap in e.gaps]
-        columns = [e.core_inertias[0] <= inertia <= e.core_inertias[1] for inertia in e.inertias]
-        return np.outer(rows, columns)
+        return np.outer(rows, [e.core_inertias[0] <= one <= e.core_inertias[1] for one in e.inertias])
 
-    def values(self, name: str, what: str) -> Map:
-        """A map of one controller: a variable of its schedule, or of the cells of its robust set."""
-        tuning = self.tunings[name]
-        table, _, variable = what.rpartition(".")
+    @property
+    def where(self) -> str:
+        """The core, in words."""
+        (gap, wide), (light, heavy) = self.extent.core_gaps, self.extent.core_inertias
+        return f"gaps {gap:g}-{wide:g} rad and inertias {light:g}-{heavy:g} J1"
+
+    def values(self, name: str, gains: str, what: str) -> Map:
+        """A map of one controller: "k_dyn", "start_time", or the "excess" over the time of the defaults."""
+        (table, suffix), tuning = GAINS[gains], self.tunings[name]
         assert tuning.schedule is not None
         assert tuning.robust is not None
-        source = tuning.robust.cells if table == "robust" else tuning.schedule
-        return np.asarray(source[variable], dtype=np.float64)
+        source = tuning.robust.cells if table else tuning.schedule
+        return np.asarray(source[what if what == "excess" else f"{what}{suffix}"], dtype=np.float64)
 
-    def ratio(self, name: str, prefix: str = "", suffix: str = "") -> Map:
+    def ratio(self, name: str, gains: str) -> Map:
         """K_dyn over the least K_dyn of any start in the same time; NaN where there is no such start."""
-        k, times = (self.values(name, f"{prefix}{what}{suffix}") for what in ("k_dyn", "start_time"))
-        least = [
-            [front.at(time) for front, time in zip(row, own, strict=True)]
-            for row, own in zip(self.fronts, times, strict=True)
-        ]
+        k, times = (self.values(name, gains, what) for what in ("k_dyn", "start_time"))
+        least = [[self.fronts[i][j].at(times[i, j]) for j in range(k.shape[1])] for i in range(k.shape[0])]
         return np.asarray(k / np.array(least))
 
-    def late(self, name: str, prefix: str = "") -> Any:
+    def late(self, name: str, gains: str) -> Any:
         """Where a start is slower than with the defaults."""
-        return self.values(name, f"{prefix}excess") > 0.0
+        return (gains != "defaults") & (self.values(name, gains, "excess") > 0.0)
+
+    def spread(self, name: str) -> float:
+        """Of K_dyn with one set of gains, over the core: largest over least, less 1."""
+        return spread(self.values(name, "one set", "k_dyn")[self.core])
 
     def never_worse(self, name: str) -> bool:
         """Whether every cell is at least as gentle and as quick as with the defaults."""
-        k, k_default = self.values(name, "k_dyn"), self.values(name, "k_dyn_default")
-        return bool(np.all(~self.late(name) & (k <= k_default * (1.0 + BETTER))))
+        k, k_default = (self.values(name, gains, "k_dyn") for gains in ("tuned", "defaults"))
+        return bool(np.all(~self.late(name, "tuned") & (k <= k_default * (1.0 + BETTER))))
 
 
-def grids(extent: Extent, progress: Progress) -> list[Grid]:
-    """One for each kind of load."""
-    names = extent.controllers or tuned_controllers()
-    found = []
-    for kind in extent.kinds:
-        drive = CRANE.replace(load_kind=kind, name=f"Crane of [G], {kind} load")
-        inertias = [ratio * float(drive.J1) for ratio in extent.inertias]
-        report = _prefixed(progress, kind)
-        tunings = tuned(drive, names, extent.gaps, inertias, extent.restarts, extent.generations, report)
-        grid = Grid(kind, extent, tunings, [])
-        for i, gap in enumerate(extent.gaps):
-            row = []
-            for j, J2 in enumerate(inertias):
-                report(f"optima at gap {gap:g} rad, J2 = {extent.inertias[j]:g} J1")
-                times = [
-                    float(grid.values(name, what)[i, j])
-                    for name in names
-                    for what in (
-                        "start_time_default",
-                        "start_time",
-                        "robust.start_time_default",
-                        "robust.start_time",
-                    )
-                ]
-                row.append(front(drive.replace(gap=gap, load_inertia=J2), times, extent.front_points))
-            grid.fronts.append(row)
-        found.append(grid)
+def grid(extent: Extent, progress: Progress) -> Grid:
+    """All tunings and optima."""
+    names, drive = extent.controllers or tuned_controllers(), WITH_INVERTER
+    inertias = [ratio * float(drive.J1) for ratio in extent.inertias]
+    report = prefixed(progress, "active load")
+    tunings = tuned(drive, names, extent.gaps, inertias, extent.restarts, extent.generations, report)
+    found = Grid(extent, tunings, [])
+    times = [found.values(name, gains, "start_time") for name in names for gains in GAINS]
+    for i, gap in enumerate(extent.gaps):
+        report(f"optima at gap {gap:g} rad")
+        cells = [drive.replace(gap=gap, load_inertia=J2) for J2 in inertias]
+        row = [front(one, [k[i, j] for k in times], extent.front_points) for j, one in enumerate(cells)]
+        found.fronts.append(row)
     return found
 
 
-def _prefixed(progress: Progress, what: str) -> Progress:
-    return lambda text: progress(f"{what} load, {text}")
+# tables --------------------------------------------------------------------------------------------------
 
 
-# name, prefix and suffix of the variables
-GAINS = (("defaults", "", "_default"), ("tuned", "", ""), ("one set", "robust.", ""))
-
-
-def tables(found: Sequence[Grid]) -> tuple[Table, ...]:
-    """All tables, one kind of load after the other."""
-    return tuple(table for grid in found for table in (_controllers(grid), *_cells(grid)))
-
-
-def _controllers(grid: Grid) -> Table:
-    """Each controller over the whole grid, and over its usual part."""
-    core = grid.core()
-    rows = []
-    for name in grid.tunings:
-        for way, prefix, suffix in GAINS:
-            k = grid.values(name, f"{prefix}k_dyn{suffix}")
-            ratio = grid.ratio(name, prefix, suffix)
-            known = ratio[np.isfinite(ratio)]
-            low, high = float(np.min(k[core])), float(np.max(k[core]))
-            late = 0 if suffix else int(np.sum(grid.late(name, prefix)))
-            rows.append(
-                (
-                    name, way, rounded(np.mean(k)), rounded(np.max(k)),
-                    rounded(np.mean(known)) if known.size else None,
-                    rounded(np.max(known)) if known.size else None,
-                    rounded(low), rounded(high), rounded(100.0 * (high / low - 1.0), 1), late,
-                )
-            )  # fmt: skip
-    e = grid.extent
-    return Table(
-        f"{grid.kind} load, gaps {e.gaps[0]:g}-{e.gaps[-1]:g} rad, inertias {e.inertias[0]:g}-"
-        f"{e.inertias[-1]:g} J1; core: gaps {e.core_gaps[0]:g}-{e.core_gaps[1]:g} rad, inertias "
-        f"{e.core_inertias[0]:g}-{e.core_inertias[1]:g} J1",
-        (
-            "strategy", "gains", "K_dyn mean", "worst", "over optimum mean", "worst", "core least", "largest",
-            "spread, %", "late cells",
-        ),
-        rows,
-    )  # fmt: skip
-
-
-def _cells(grid: Grid) -> list[Table]:
-    """K_dyn in every cell, and how far it is from the optimum."""
-    made = []
-    for way, prefix, suffix in GAINS:
-        for what, maps in (
-            ("K_dyn", {name: grid.values(name, f"{prefix}k_dyn{suffix}") for name in grid.tunings}),
-            ("K_dyn over optimum", {name: grid.ratio(name, prefix, suffix) for name in grid.tunings}),
-        ):
-            rows = [
-                (gap, inertia, *(rounded(values[i, j]) for values in maps.values()))
-                for i, gap in enumerate(grid.extent.gaps)
-                for j, inertia in enumerate(grid.extent.inertias)
-            ]
-            made.append(Table(f"{grid.kind} load, {way}: {what}", ("gap, rad", "J2/J1", *maps), rows))
-    return made
-
-
-INVARIANT = 5.0  # percent of spread that still counts as invariant
-DELAY, FEEDBACK = "acceleration-delay", "current-limit-feedback"
-
-
-def claims(found: Sequence[Grid]) -> tuple[Claim, ...]:
-    """All claims."""
-    made = [never_worse(found), nearest(found)]
-    if all(FEEDBACK in grid.tunings for grid in found):
-        made.append(feedback_is_invariant(found))
-    if all(DELAY in grid.tunings for grid in found):
-        made.append(delay_holds(found))
+def tables(found: Grid) -> tuple[Table, ...]:
+    """Each controller over the whole grid and its core; K_dyn and its ratio to the optimum in every cell."""
+    gaps, inertias = np.meshgrid(found.extent.gaps, found.extent.inertias, indexing="ij")
+    made = [_controllers(found)]
+    for gains in GAINS:
+        for what in ("K_dyn", "K_dyn over optimum"):
+            cells = {"gap, rad": gaps.ravel(), "J2/J1": inertias.ravel()}
+            for name in found.tunings:
+                one = found.ratio(name, gains) if "over" in what else found.values(name, gains, "k_dyn")
+                cells[name] = one.ravel()
+            made.append(Table.of(f"active load, {gains}: {what}", cells))
     return tuple(made)
 
 
-def never_worse(found: Sequence[Grid]) -> Claim:
+def _controllers(found: Grid) -> Table:
+    core, e = found.core, found.extent
+    rows = []
+    for name in found.tunings:
+        for gains in GAINS:
+            k = found.values(name, gains, "k_dyn")
+            over, inside = mean_and_most(found.ratio(name, gains)), k[core]
+            of_core = inside.min(), inside.max(), 100 * spread(inside)
+            late = np.sum(found.late(name, gains))
+            rows.append((name, gains, k.mean(), k.max(), *over, *of_core, late))
+    columns = ("strategy", "gains", "K_dyn mean", "K_dyn worst", "over optimum mean", "over optimum worst",
+               "core least", "core largest", "spread, %", "late cells")  # fmt: skip
+    return Table(
+        f"active load, gaps {e.gaps[0]:g}-{e.gaps[-1]:g} rad, inertias {e.inertias[0]:g}-{e.inertias[-1]:g} "
+        f"J1; core: {found.where.replace(' and', ',')}",
+        columns,
+        rows,
+    )
+
+
+# claims --------------------------------------------------------------------------------------------------
+
+
+def claims(found: Grid) -> tuple[Claim, ...]:
+    """All claims; those on the two strategies of [G] where these were tuned."""
+    made = [never_worse(found), nearest(found)]
+    made += [feedback_is_invariant(found)] if FEEDBACK in found.tunings else []
+    made += [delay_holds(found)] if DELAY in found.tunings else []
+    return tuple(made)
+
+
+def never_worse(found: Grid) -> Claim:
     """In every cell, for every controller."""
-    worse = [f"{name} ({grid.kind})" for grid in found for name in grid.tunings if not grid.never_worse(name)]
-    cells = sum(grid.core().size * len(grid.tunings) for grid in found)
+    worse = [f"{name} (active)" for name in found.tunings if not found.never_worse(name)]
     return Claim(
         "Tuned for a cell, no controller is harder or slower there than with its defaults.",
-        Verdict.REFUTED if worse else Verdict.CONFIRMED,
-        f"{cells} cells and controllers compared. Worse: {', '.join(worse) or 'none'}.",
+        Verdict.of(not worse),
+        f"{found.core.size * len(found.tunings)} cells and controllers compared. Worse: "
+        f"{', '.join(worse) or 'none'}.",
     )
 
 
-def nearest(found: Sequence[Grid]) -> Claim:
+def nearest(found: Grid) -> Claim:
     """Which controller comes nearest to the optimum within the same time, gap and load unknown."""
-    said, best = [], set()
-    for grid in found:
-        means = {}
-        for name in grid.tunings:
-            ratio = grid.ratio(name, "robust.")
-            if np.isfinite(ratio).any():
-                means[name] = float(np.mean(ratio[np.isfinite(ratio)]))
-        order = sorted(means, key=means.__getitem__)
-        best.add(order[0])
-        listed = ", ".join(f"{name} {means[name]:.2f}" for name in order)
-        said.append(f"{grid.kind} load: {listed}")
-    one = len(best) == 1
+    means = {name: mean_and_most(found.ratio(name, "one set"))[0] for name in found.tunings}
+    order = sorted((name for name in means if np.isfinite(means[name])), key=means.__getitem__)
+    listed = ", ".join(f"{name} {means[name]:.2f}" for name in order)
     return Claim(
         "With one set of gains, one controller is nearest to the optimum on every kind of load tried.",
-        Verdict.CONFIRMED if one else Verdict.REFUTED,
-        f"Mean over the grid of K_dyn over the least K_dyn of any start in the same time: {'; '.join(said)}.",
+        Verdict.CONFIRMED,
+        "Mean over the grid of K_dyn over the least K_dyn of any start in the same time: active load: "
+        f"{listed}.",
     )
 
 
-def feedback_is_invariant(found: Sequence[Grid]) -> Claim:
+def feedback_is_invariant(found: Grid) -> Claim:
     """[G]'s best: a regulator on the current limit."""
-    said, spreads = [], []
-    for grid in found:
-        inside = grid.values(FEEDBACK, "robust.k_dyn")[grid.core()]
-        spread = 100.0 * (float(np.max(inside)) / float(np.min(inside)) - 1.0)
-        spreads.append(spread)
-        others = {}
-        for name in grid.tunings:
-            k = grid.values(name, "robust.k_dyn")[grid.core()]
-            others[name] = 100.0 * (float(np.max(k)) / float(np.min(k)) - 1.0)
-        least = min(others, key=others.__getitem__)
-        said.append(
-            f"{grid.kind} load: K_dyn {np.min(inside):.3f} to {np.max(inside):.3f}, {spread:.0f} % apart "
-            f"(smallest spread of all: {least}, {others[least]:.0f} %)"
-        )
+    inside = found.values(FEEDBACK, "one set", "k_dyn")[found.core]
+    spreads = {name: found.spread(name) for name in found.tunings}
+    least = min(spreads, key=spreads.__getitem__)
     return Claim(
         "Regulators acting on the current-limit level are invariant to the gap and the other mechanical "
         "parameters.",
-        Verdict.CONFIRMED if max(spreads) < INVARIANT else Verdict.REFUTED,
-        f"One set of gains, tuned for the worst case, {_core(found[0])}: {'; '.join(said)}.",
+        Verdict.of(spreads[FEEDBACK] < INVARIANT),
+        f"One set of gains, tuned for the worst case, {found.where}: active load: K_dyn {inside.min():.3f} "
+        f"to {inside.max():.3f}, {100 * spreads[FEEDBACK]:.0f} % apart (smallest spread of all: {least}, "
+        f"{100 * spreads[least]:.0f} %).",
     )
 
 
-def delay_holds(found: Sequence[Grid]) -> Claim:
+def delay_holds(found: Grid) -> Claim:
     """[G]: acceleration and delay fit where the elastic frequency stays within 10-20 %."""
-    said, gains = [], []
-    for grid in found:
-        own, one = grid.values(DELAY, "k_dyn")[grid.core()], grid.values(DELAY, "robust.k_dyn")[grid.core()]
-        gains.append(float(np.max(one / own)))
-        said.append(
-            f"{grid.kind} load: tuned for each cell {np.min(own):.3f} to {np.max(own):.3f}, one set "
-            f"{np.min(one):.3f} to {np.max(one):.3f}"
-        )
-    ratio = np.sqrt(
-        (1.0 + 1.0 / found[0].extent.core_inertias[0]) / (1.0 + 1.0 / found[0].extent.core_inertias[1])
-    )
+    own, one = (found.values(DELAY, gains, "k_dyn")[found.core] for gains in ("tuned", "one set"))
+    gain = float(np.max(one / own))
+    light, heavy = found.extent.core_inertias
+    change = float(np.sqrt((1.0 + 1.0 / light) / (1.0 + 1.0 / heavy))) - 1.0
     return Claim(
         "Torque reduced until the acceleration drops, then for a delay, fits where the elastic frequency "
         "stays within 10-20 %.",
-        Verdict.CONFIRMED if max(gains) < 1.2 else Verdict.PARTLY,
-        f"{_core(found[0])}, over which the elastic frequency changes by {100 * (ratio - 1):.0f} %: "
-        f"{'; '.join(said)}. Not knowing the cell costs a factor of up to {max(gains):.2f}.",
+        Verdict.CONFIRMED if gain < 1.2 else Verdict.PARTLY,
+        f"{found.where}, over which the elastic frequency changes by {100 * change:.0f} %: active load: "
+        f"tuned for each cell {own.min():.3f} to {own.max():.3f}, one set {one.min():.3f} to "
+        f"{one.max():.3f}. Not knowing the cell costs a factor of up to {gain:.2f}.",
     )
 
 
-def _core(grid: Grid) -> str:
-    e = grid.extent
-    return (
-        f"gaps {e.core_gaps[0]:g}-{e.core_gaps[1]:g} rad and inertias "
-        f"{e.core_inertias[0]:g}-{e.core_inertias[1]:g} J1"
-    )
+# figures and the study -----------------------------------------------------------------------------------
 
 
-MOST = 3.0  # ratio from which on all colours are the same
-
-
-def maps_figure(grid: Grid, prefix: str, heading: str) -> Figure:
+def maps_figure(found: Grid, gains: str, heading: str) -> Figure:
     """K_dyn of every controller over its optimum; `heading` says which gains."""
-    panels = [(name, grid.ratio(name, prefix), grid.late(name, prefix)) for name in grid.tunings]
-    finite = np.concatenate([values[np.isfinite(values)] for _, values, _ in panels])
-    scale = colour_scale(np.array([1.0, min(float(np.max(finite, initial=1.1)), MOST)]))
-    ratios, gaps = ([f"{v:g}" for v in axis] for axis in (grid.extent.inertias, grid.extent.gaps))
+    maps = {name: found.ratio(name, gains) for name in found.tunings}
+    known = np.concatenate([one[np.isfinite(one)] for one in maps.values()])
+    scale = colour_scale(np.array([1.0, min(float(np.max(known, initial=1.1)), MOST)]))
+    ratios, gaps = ([f"{v:g}" for v in axis] for axis in (found.extent.inertias, found.extent.gaps))
     with drawing():
-        figure, axes = panel_grid(len(panels), (3.0, 2.2))
-        for panel, (name, values, late) in zip(axes.flat, panels, strict=False):
-            heat_map(panel, ratios, gaps, values, scale, decimals=2, struck=late & np.isfinite(values))
+        figure, axes = panels(len(maps), (3.0, 2.2), 3, "J2/J1", "gap, rad")
+        for panel, (name, values) in zip(axes, maps.items(), strict=True):
+            struck = found.late(name, gains) & np.isfinite(values)
+            heat_map(panel, ratios, gaps, values, scale, decimals=2, struck=struck)
             panel.set_title(name, loc="left")
-        for row in axes:
-            row[0].set_ylabel("gap, rad")
-        for panel in axes.flat[max(0, len(panels) - ACROSS) : len(panels)]:
-            panel.set_xlabel("J2/J1")
-        figure.suptitle(
-            f"$K_{{dyn}}$ over the optimum in the same time, {grid.kind} load, {heading} "
-            "(struck through: slower than the defaults)",
-            x=0.01, ha="left", fontsize=11,
-        )  # fmt: skip
+        entitle(figure, f"$K_{{dyn}}$ over the optimum in the same time, active load, {heading} (struck "
+                        "through: slower than the defaults)")  # fmt: skip
     return figure  # type: ignore[no-any-return]
 
 
@@ -327,27 +247,24 @@ class GapsAndInertias(Study):
 
     name: ClassVar[str] = "gaps-and-inertias"
     title: ClassVar[str] = "All controllers tuned alike over gaps and load inertias of the crane drive of [G]"
-    pictures: ClassVar[tuple[str, ...]] = tuple(
-        f"gaps-and-inertias-{kind}-{which}" for kind in Extent().kinds for which in ("cells", "one-set")
+    pictures: ClassVar[tuple[str, ...]] = (
+        "gaps-and-inertias-active-cells",
+        "gaps-and-inertias-active-one-set",
     )
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """All of it; `out` receives each controller's schedule (CSV) and robust set (TOML)."""
-        found = grids(Extent(), progress)
+        found = grid(Extent(), progress)
         if out is not None:
-            for grid in found:
-                for name, tuning in grid.tunings.items():
-                    tuning.to_csv(out / f"{grid.kind}-{name}-schedule.csv")
-                    tuning.to_toml(out / f"{grid.kind}-{name}-robust.toml", "robust")
+            for name, tuning in found.tunings.items():
+                tuning.to_csv(out / f"active-{name}-schedule.csv")
+                tuning.to_toml(out / f"active-{name}-robust.toml", "robust")
         return present(found, progress)
 
 
-def present(found: Sequence[Grid], progress: Progress) -> StudyResult:
+def present(found: Grid, progress: Progress) -> StudyResult:
     """Tables, claims and figures of what was found."""
     progress("drawing")
-    figures = {}
-    for grid in found:
-        stem = f"gaps-and-inertias-{grid.kind}"
-        figures[f"{stem}-cells"] = maps_figure(grid, "", "tuned for each cell")
-        figures[f"{stem}-one-set"] = maps_figure(grid, "robust.", "one set for all cells")
-    return StudyResult(tables=tables(found), claims=claims(found), figures=figures)
+    headings = {"tuned": "tuned for each cell", "one set": "one set for all cells"}
+    figures = [maps_figure(found, *one) for one in headings.items()]
+    return GapsAndInertias.result(tables(found), claims(found), figures)

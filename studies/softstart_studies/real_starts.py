@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from softstart import Drive, Fatigue, Run, fatigue, optimize, simulate
 from softstart.controller import ready_controller_names
@@ -22,6 +25,7 @@ from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.start.fatigue import damped, impacts, worst_damage
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, new_figure
+from softstart_studies.crane import spread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +69,7 @@ class Case:
     runs: Mapping[str, Run]
     lives: Fatigue
     optimum: Optimum | None
-    seconds: tuple[float, float]  # of the starts, and of their lives
+    seconds: tuple[float, ...]  # of the starts, and of their lives: turning points, cycles, damage, impacts
 
     @property
     def direct(self) -> Run:
@@ -102,6 +106,11 @@ class Findings:
         """The drives, in order."""
         return tuple(dict.fromkeys(name for name, _ in self.cases))
 
+    @property
+    def strategies(self) -> tuple[str, ...]:
+        """The strategies, in order."""
+        return tuple(next(iter(self.cases.values())).runs)
+
 
 def find(extent: Extent, progress: Progress) -> Findings:
     """All of it."""
@@ -127,25 +136,31 @@ def _case(drive: Drive, names: Sequence[str], optimum: bool) -> Case:
     lives = fatigue(list(runs.values()))
     best = None
     if optimum:
-        try:
+        with suppress(InfeasibleError, OptimumError, InputError):
             best = optimize(drive, SLOWER * runs["direct"].start_time, terminal="reached")
-        except (InfeasibleError, OptimumError, InputError):
-            best = None
-    return Case(drive, runs, lives, best, _seconds(drive, names, lives))
 
+    def start() -> None:
+        for name in names:
+            simulate(drive, name)
 
-def _seconds(drive: Drive, names: Sequence[str], lives: Fatigue) -> tuple[float, float]:
-    """Best of three: the starts, and turning points, cycles, damage and impacts of them."""
-    best = [math.inf, math.inf]
-    for _ in range(3):
-        begun = time.perf_counter()
-        runs = [simulate(drive, name) for name in names]
-        started = time.perf_counter()
-        for run in runs:
+    def judge() -> None:
+        for run in runs.values():
             worst_damage(run, lives.curve)
             impacts(run)
-        best = [min(best[0], started - begun), min(best[1], time.perf_counter() - started)]
-    return best[0], best[1]
+
+    return Case(drive, runs, lives, best, least_times(start, judge))
+
+
+def least_times(*works: Callable[[], object]) -> tuple[float, ...]:
+    """Processor time of each in s, in turns; the least of TURNS."""
+    turns = []
+    for _ in range(TURNS):
+        times = [time.process_time()]
+        for work in works:
+            work()
+            times.append(time.process_time())
+        turns.append(np.diff(times))
+    return tuple(np.min(turns, axis=0).tolist())
 
 
 # tables --------------------------------------------------------------------------------------------------
@@ -156,62 +171,47 @@ def tables(found: Findings) -> tuple[Table, ...]:
     return (*(_strategies(found, name) for name in found.drives), _optima(found), _order(found))
 
 
-def _round(value: float, digits: int = 4) -> float | None:
-    return None if not math.isfinite(value) else float(f"{value:.{digits}g}")
-
-
 def _strategies(found: Findings, name: str) -> Table:
     cases = found.of(name)
-    columns = ["strategy"]
-    for where in cases:
-        columns += [f"{where}: {what}" for what in ("K_dyn", "time over direct", "life over direct")]
-    rows = []
-    for one in next(iter(cases.values())).runs:
-        row: list[object] = [one]
-        for case in cases.values():
-            run = case.runs[one]
-            later = run.start_time / case.direct.start_time
-            row += [_round(run.k_dyn), _round(later), _round(case.life(one), 3)]
-        rows.append(row)
-    return Table(f"The {name} from each position", columns, rows)
+    names = found.strategies
+    cells: dict[str, Sequence[object]] = {"strategy": names}
+    for where, case in cases.items():
+        runs, direct = [case.runs[one] for one in names], case.direct.start_time
+        cells[f"{where}: K_dyn"] = [run.k_dyn for run in runs]
+        cells[f"{where}: time over direct"] = [run.start_time / direct for run in runs]
+        cells[f"{where}: life over direct"] = [case.life(one) for one in names]
+    return Table.of(f"The {name} from each position", cells)
 
 
 def _optima(found: Findings) -> Table:
     rows: list[tuple[object, ...]] = []
     for (name, where), case in found.cases.items():
         best, gentlest = case.optimum, case.gentlest()
-        known = (None, None) if best is None else (_round(best.k_dyn), _round(best.bound.k_dyn))
-        rows.append(
-            (name, where, *known, gentlest, _round(case.runs[gentlest].k_dyn), _round(case.direct.k_dyn))
-        )
+        known = (None, None) if best is None else (best.k_dyn, best.bound.k_dyn)
+        rows.append((name, where, *known, gentlest, case.runs[gentlest].k_dyn, case.direct.k_dyn))
     for name, profile in found.unknown.items():
-        bound = _round(profile.bound.k_dyn)
-        rows.append((name, "unknown: one profile for all", _round(profile.k_dyn), bound, None, None, None))
-    return Table(
-        f"Least K_dyn in {SLOWER} times the start time of direct",
-        ("drive", "position", "optimum", "its bound", "gentlest strategy in time", "its K_dyn", "direct"),
-        rows,
+        known = profile.k_dyn, profile.bound.k_dyn
+        rows.append((name, "unknown: one profile for all", *known, None, None, None))
+    columns = (
+        "drive",
+        "position",
+        "optimum",
+        "its bound",
+        "gentlest strategy in time",
+        "its K_dyn",
+        "direct",
     )
+    return Table(f"Least K_dyn in {SLOWER} times the start time of direct", columns, rows)
 
 
 def _order(found: Findings) -> Table:
-    rows = []
-    for (name, where), case in found.cases.items():
-        same, pairs = concordance(case)
-        best = max(case.runs, key=case.life)
-        rows.append((name, where, case.gentlest(), best, same, pairs))
-    return Table(
-        "Order by K_dyn and by life",
-        (
-            "drive",
-            "position",
-            "gentlest in time",
-            "longest life",
-            "pairs of strategies in the same order",
-            "of",
-        ),
-        rows,
-    )
+    rows = [
+        (*place, case.gentlest(), max(case.runs, key=case.life), *concordance(case))
+        for place, case in found.cases.items()
+    ]
+    columns = ("drive", "position", "gentlest in time", "longest life",
+               "pairs of strategies in the same order", "of")  # fmt: skip
+    return Table("Order by K_dyn and by life", columns, rows)
 
 
 def concordance(case: Case) -> tuple[int, int]:
@@ -240,41 +240,38 @@ def claims(found: Findings) -> tuple[Claim, ...]:
 
 def position_decides(found: Findings) -> Claim:
     """How much the position alone changes the K_dyn of one strategy."""
-    spreads = {}
+    parts: list[str] = []
+    all_spreads: list[float] = []
     for name in found.drives:
-        cases = found.of(name)
-        for one in next(iter(cases.values())).runs:
-            k = [case.runs[one].k_dyn for case in cases.values()]
-            spreads[name, one] = max(k) / min(k)
-    parts = []
-    for name in found.drives:
-        own = {one: value for (drive, one), value in spreads.items() if drive == name}
-        least, most = min(own, key=own.__getitem__), max(own, key=own.__getitem__)
-        parts.append(f"{name} {own[least]:.2f} ({least}) to {own[most]:.2f} ({most})")
+        cases = found.of(name).values()
+        spreads = {one: 1.0 + spread([case.runs[one].k_dyn for case in cases]) for one in found.strategies}
+        least, most = (extreme(spreads, key=spreads.__getitem__) for extreme in (min, max))
+        parts.append(f"{name} {spreads[least]:.2f} ({least}) to {spreads[most]:.2f} ({most})")
+        all_spreads += spreads.values()
     return Claim(
         "Where a start begins changes the peak of a strategy by more than a tenth.",
-        Verdict.of(*(value > 1.1 for value in spreads.values())),
+        Verdict.of(*(value > 1.1 for value in all_spreads)),
         f"Largest over least K_dyn of a strategy over the positions: {'; '.join(parts)}.",
     )
 
 
 def promises_are_kept(found: Findings) -> Claim:
     """K_dyn of the worst position beside that of mid-gap, where strategies are usually judged."""
-    kept: list[tuple[float, str]] = []
-    broken: list[tuple[float, str]] = []
+    ratios = []
     for name in found.drives:
         cases = found.of(name)
-        for one, run in cases["mid-gap"].runs.items():
-            worst = max(cases, key=lambda where: cases[where].runs[one].k_dyn)
-            ratio = cases[worst].runs[one].k_dyn / run.k_dyn
-            text = f"{one} on the {name} {ratio:.2f} from {worst}"
-            (kept if ratio <= KEPT else broken).append((ratio, text))
-    worse = "; ".join(text for _, text in sorted(broken, reverse=True)[:4])
+        for one in found.strategies:
+            k = {where: case.runs[one].k_dyn for where, case in cases.items()}
+            worst = max(k, key=k.__getitem__)
+            ratio = k[worst] / k["mid-gap"]
+            ratios.append((ratio, f"{one} on the {name} {ratio:.2f} from {worst}"))
+    kept = [ratio <= KEPT for ratio, _ in ratios]
+    worse = "; ".join(text for ratio, text in sorted(ratios, reverse=True)[:4] if ratio > KEPT)
     return Claim(
         f"The K_dyn of a start in mid-gap holds from every position, within {100 * (KEPT - 1):.0f} %.",
-        Verdict.of(bool(kept), not broken),
-        f"Of {len(kept) + len(broken)} strategies and drives {len(kept)} keep it. "
-        + (f"Largest ratios: {worse}." if broken else ""),
+        Verdict.of(*kept),
+        f"Of {len(kept)} strategies and drives {sum(kept)} keep it. "
+        + (f"Largest ratios: {worse}." if worse else ""),
     )
 
 
@@ -304,8 +301,8 @@ def strategies_reach_the_optimum(found: Findings) -> Claim:
     return Claim(
         "From every position some strategy is within 10 % of the optimum in the same time.",
         Verdict.of(*(value <= 1.1 for value in ratios.values())),
-        f"Gentlest strategy over optimum: {ratios[least]:.3f} ({least}) to {ratios[most]:.3f} ({most}). "
-        f"The optima lie at most {100.0 * max(gaps):.2g} % above their bounds.",
+        f"Gentlest strategy over optimum: {ratios[least]:.3f} ({least}) to {ratios[most]:.3f} ({most}). The "
+        f"optima lie at most {100.0 * max(gaps):.2g} % above their bounds.",
     )
 
 
@@ -317,13 +314,13 @@ def a_sensor_is_worth_it(found: Findings) -> Claim:
         known = max(case.optimum.k_dyn for case in cases.values() if case.optimum is not None)
         feedback = min(
             max(case.runs[one].k_dyn for case in cases.values())
-            for one in next(iter(cases.values())).runs
+            for one in found.strategies
             if all(one in case.in_time() for case in cases.values())
         )
         gains.append(profile.k_dyn / known)
         parts.append(
-            f"{name}: one profile {profile.k_dyn:.3f}, optima of known positions at most {known:.3f}, "
-            f"best strategy that is not told the position {feedback:.3f}"
+            f"{name}: one profile {profile.k_dyn:.3f}, optima of known positions at most {known:.3f}, best "
+            f"strategy that is not told the position {feedback:.3f}"
         )
     return Claim(
         "To know the position lowers the worst K_dyn of a prescribed torque by more than a tenth.",
@@ -349,8 +346,8 @@ def life_ranks_as_k_dyn(found: Findings) -> Claim:
         low, load = float(row.turning_points[:, 1].min()), float(case.drive.Mc)
         text = (
             f" {one} on the {name} from {where} has K_dyn {case.runs[one].k_dyn:.3f} where direct has "
-            f"{case.direct.k_dyn:.3f}, and {life:.2g} of its life: meanwhile its torque falls to "
-            f"{low:.0f} N m (load {load:.0f} N m)."
+            f"{case.direct.k_dyn:.3f}, and {life:.2g} of its life: meanwhile its torque falls to {low:.0f} "
+            f"N m (load {load:.0f} N m)."
         )
     return Claim(
         "Life and K_dyn put the strategies in the same order.",
@@ -361,47 +358,36 @@ def life_ranks_as_k_dyn(found: Findings) -> Claim:
 
 def life_costs_little(found: Findings) -> Claim:
     """The time to count and judge cycles and impacts, beside that of the starts."""
-    ratios = {
-        name: sum(case.seconds[1] for case in found.of(name).values())
-        / sum(case.seconds[0] for case in found.of(name).values())
-        for name in found.drives
-    }
+    ratios = {}
+    for name in found.drives:
+        starts, lives = np.sum([case.seconds for case in found.of(name).values()], axis=0)
+        ratios[name] = lives / starts
+    said = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in ratios.items())
     return Claim(
         "Life adds at most 20 % to the time of a start.",
         Verdict.of(*(value <= 0.2 for value in ratios.values())),
-        "Over all strategies and positions, on this machine: "
-        + ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in ratios.items())
-        + ".",
+        f"Over all strategies and positions, on this machine: {said}.",
     )
 
 
 def unknown_costs_three(found: Findings) -> Claim:
     """The time of starts from an unknown position, beside that of the three known ones, in turns."""
+
+    def starts(drive: Drive) -> Callable[[], object]:
+        return lambda: [simulate(drive, one) for one in found.strategies]
+
     ratios = {}
     for name in found.drives:
-        own = found.of(name)
-        unknown = next(iter(own.values())).drive.replace(start_position="unknown")
-        strategies = list(next(iter(own.values())).runs)
-        turns = [
-            [_processor_time(one, strategies) for one in (unknown, *unknown.positions.values())]
-            for _ in range(TURNS)
-        ]
-        worst, *known = (min(column) for column in zip(*turns, strict=True))
+        unknown = next(iter(found.of(name).values())).drive.replace(start_position="unknown")
+        worst, *known = least_times(*map(starts, (unknown, *unknown.positions.values())))
         ratios[name] = len(known) * worst / sum(known)
+    said = ", ".join(f"{name} {value:.2f}" for name, value in ratios.items())
     return Claim(
         "The worst of three positions takes at most 3.2 times the time of one.",
         Verdict.of(*(value <= 3.2 for value in ratios.values())),
-        "Processor time of the starts of all strategies, over the mean of the three positions by themselves: "
-        + ", ".join(f"{name} {value:.2f}" for name, value in ratios.items())
-        + ".",
+        "Processor time of the starts of all strategies, over the mean of the three positions by "
+        f"themselves: {said}.",
     )
-
-
-def _processor_time(drive: Drive, strategies: Sequence[str]) -> float:
-    begun = time.process_time()
-    for name in strategies:
-        simulate(drive, name)
-    return time.process_time() - begun
 
 
 # pictures ------------------------------------------------------------------------------------------------
@@ -409,20 +395,17 @@ def _processor_time(drive: Drive, strategies: Sequence[str]) -> float:
 
 def positions_figure(found: Findings) -> Figure:
     """K_dyn of each strategy from each position, a panel a drive."""
+    places = range(len(found.strategies))
     with drawing():
         figure, axes = new_figure(1, len(found.drives), (11.0, 4.2), sharey=True, squeeze=False)
         for panel, name in zip(axes[0], found.drives, strict=True):
-            cases = found.of(name)
-            strategies = list(next(iter(cases.values())).runs)
-            for index, (where, case) in enumerate(cases.items()):
-                k = [case.runs[one].k_dyn for one in strategies]
-                panel.plot(
-                    k, range(len(strategies)), MARKERS[index], color=COLOURS[index], ms=7, mfc="none",
-                    mew=1.6, label=where,
-                )  # fmt: skip
+            points = {
+                where: ([case.runs[one].k_dyn for one in found.strategies], places)
+                for where, case in found.of(name).items()
+            }
+            _draw_points(panel, name, points, "", "K_dyn")
             panel.axvline(1.0, color=GREY, lw=0.8, ls=":")
-            panel.set_yticks(range(len(strategies)), strategies)
-            head(panel, name, "", "K_dyn")
+        axes[0, 0].set_yticks(places, found.strategies)
         axes[0, 0].invert_yaxis()
         axes[0, 0].legend(fontsize=8)
     return figure  # type: ignore[no-any-return]
@@ -433,17 +416,26 @@ def life_figure(found: Findings) -> Figure:
     with drawing():
         figure, axes = new_figure(1, len(found.drives), (11.0, 3.8), squeeze=False)
         for panel, name in zip(axes[0], found.drives, strict=True):
-            for index, (where, case) in enumerate(found.of(name).items()):
-                points = [(run.k_dyn / case.direct.k_dyn, case.life(one)) for one, run in case.runs.items()]
-                panel.plot(
-                    *zip(*points, strict=True), MARKERS[index], color=COLOURS[index], mfc="none", label=where
+            points = {
+                where: (
+                    [run.k_dyn / case.direct.k_dyn for run in case.runs.values()],
+                    [case.life(one) for one in case.runs],
                 )
+                for where, case in found.of(name).items()
+            }
+            _draw_points(panel, name, points, "life over that of direct", "K_dyn over that of direct")
             panel.axhline(1.0, color=GREY, lw=0.8, ls=":")
             panel.axvline(1.0, color=GREY, lw=0.8, ls=":")
             panel.set_yscale("log")
-            head(panel, name, "life over that of direct", "K_dyn over that of direct")
         axes[0, 0].legend(fontsize=8)
     return figure  # type: ignore[no-any-return]
+
+
+def _draw_points(panel: Any, name: str, points: Mapping[str, tuple[Any, Any]], up: str, across: str) -> None:
+    for index, (where, (x, y)) in enumerate(points.items()):
+        look = {"color": COLOURS[index], "mfc": "none", "mew": 1.6, "label": where}
+        panel.plot(x, y, MARKERS[index], **look)
+    head(panel, name, up, across)
 
 
 class RealStarts(Study):

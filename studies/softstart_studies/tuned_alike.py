@@ -1,11 +1,10 @@
-"""What the studies of tuning share: the crane drive as it is sold, the controllers, the optimum."""
+"""What the studies of tuning share: all controllers tuned alike, and the optimum over the start time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -20,14 +19,7 @@ from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
 from softstart.tuning.solving import tune
-from softstart.views.drawing import new_figure
-from softstart_studies.paper_g.crane import published
-
-ACROSS = 3  # panels
-TARGET = 60.0  # rad/s
-LAG = 0.002  # s, of the torque of an inverter
-# [G]: J1 = 0.035 kg m2, Ms = 62 N m, Mc = 7.16 N m; encoder of 4096 lines; the lag is assumed
-CRANE = Drive.load("crane-4amtkf").replace(target_speed=TARGET, torque_lag=LAG)
+from softstart_studies.crane import prefixed, published
 
 
 def tuned_controllers() -> tuple[str, ...]:
@@ -51,11 +43,9 @@ def tuned(
     """All of them tuned alike: the same grid, effort and seed, and no start slower than with the defaults."""
     found = {}
     for number, name in enumerate(names, start=1):
-        head = f"{name} ({number} of {len(names)})"
         found[name] = tune(
             drive, published(name), gaps, inertias, certified=False, restarts=restarts,
-            generations=generations,
-            progress=lambda text, head=head: progress(f"{head}: {text}"),  # type: ignore[misc]
+            generations=generations, progress=prefixed(progress, f"{name} ({number} of {len(names)})"),
         )  # fmt: skip
     return found
 
@@ -95,23 +85,3 @@ def front(drive: Drive, times: Sequence[float], points: int) -> Front:
             continue
     solved = np.array(found).reshape(-1, 2)
     return Front(solved[:, 0], solved[:, 1])
-
-
-def rounded(value: Any, digits: int = 3) -> float | None:
-    """A number for a table; None where there is none.
-
-    >>> rounded(1.23456), rounded(float("nan"))
-    (1.235, None)
-    """
-    return round(float(value), digits) if np.isfinite(value) else None
-
-
-def panel_grid(count: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
-    """A figure with `count` panels of this size (inches), three across, and its axes by row and column."""
-    rows = math.ceil(count / ACROSS)
-    figure, axes = new_figure(
-        rows, ACROSS, (size[0] * ACROSS, 0.6 + size[1] * rows), squeeze=False, **options
-    )
-    for unused in axes.flat[count:]:
-        unused.set_axis_off()
-    return figure, axes

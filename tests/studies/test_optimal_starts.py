@@ -11,17 +11,17 @@ import pytest
 from softstart import TorqueProfile, optimize, simulate
 from softstart.study import Verdict, find_study
 from softstart.views.optima import front_figure
-from softstart_studies.optimal_starts import OptimalStarts, find, limits, pictures, present, sensor, smooth
-from softstart_studies.optimal_starts.crane import (
+from softstart_studies.crane import TARGET
+from softstart_studies.optimal_starts import OptimalStarts, costs, find, limits, present, profiles, sensor
+from softstart_studies.optimal_starts.drives import (
     DAMPING,
-    TARGET,
     Extent,
     crane,
     direct_time,
     front_times,
     shortest_time,
 )
-from softstart_studies.optimal_starts.fronts import any_contacts_bound
+from softstart_studies.optimal_starts.limits import any_contacts_bound
 
 PART = Extent(
     gaps=(0.5,),
@@ -110,10 +110,10 @@ def test_controllers_lie_above_both_limits(found):
 def test_a_stricter_terminal_is_never_gentler(found):
     (one,) = found.endings
     for terminal in ("synchronous", "steady"):
-        for _, cost in one.costs(terminal):
+        for cost in one.cost(terminal).values():
             assert cost >= 1.0 - 5e-4  # what the linear program's grid may be worth
-    last = one.by_terminal["steady"][-1]
-    assert last.k_dyn >= one.at("synchronous", last.start_time_bound).k_dyn
+    last, k_dyn = list(one.k_dyn("steady").items())[-1]
+    assert k_dyn >= one.k_dyn("synchronous")[last]
 
 
 def test_one_torque_for_several_gaps_is_above_the_own_optima(found):
@@ -150,18 +150,6 @@ def test_a_limited_torque_rate_costs_something(found):
     ideal, limited = found.prices
     assert ideal.k_dyn == pytest.approx(0.90924724, abs=1e-6)
     assert ideal.k_dyn < limited.k_dyn < 1.05 * ideal.k_dyn
-    assert ideal.steepest == math.inf
-
-
-def test_steepest_demand_leaves_out_what_follows_the_start():
-    best = optimize(crane(), 1.2 * direct_time(0.5))
-    assert smooth.steepest(best) == math.inf
-    ramp = TorqueProfile([0.0, 0.1, 0.3], [0.0, 10.0, 16.0])
-
-    class Ramped:
-        profile, end_time = ramp, 0.1
-
-    assert smooth.steepest(Ramped()) == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize("gap", [0.5, 2.0])
@@ -208,11 +196,10 @@ def test_all_announced_pictures_are_there(result):
 
 def test_profiles_drawn_are_the_runs(found):
     start = found.profiles[1]
-    figure = pictures.profiles_figure(found.profiles, 52.86, TARGET)
-    motor, shaft, speed = figure.axes
+    motor, shaft, speed = profiles.figure(found.profiles).axes
     assert np.array_equal(motor.lines[0].get_ydata(), start.run.u)
-    assert np.array_equal(shaft.lines[1].get_ydata(), start.run.T)
-    assert np.array_equal(speed.lines[0].get_ydata(), start.run.w2)
+    np.testing.assert_allclose(shaft.lines[1].get_ydata(), start.run.T / crane().mean_torque, rtol=1e-12)
+    assert np.array_equal(speed.lines[1].get_ydata(), start.run.w2)
     assert "0.9 x: infeasible" in motor.get_title(loc="left")
 
 
@@ -223,19 +210,10 @@ def test_fronts_drawn_are_the_points(found):
     assert any(curve.shape == expected.shape and np.allclose(curve, expected) for curve in curves)
 
 
-def test_sensor_and_smoothness_drawn_are_the_numbers(found):
-    (panel,) = pictures.sensor_figure(found.sensed).axes
-    drawn = {line.get_label(): tuple(line.get_ydata()) for line in panel.lines}
-    assert drawn["one torque, blind"] == found.sensed[0].blind
-    assert drawn["own optimum of each gap"] == found.sensed[0].alone
-    left = pictures.smooth_figure(found.prices).axes[0]
-    (curve,) = [line for line in left.lines if line.get_label() == "no lag"]
-    assert curve.get_xydata().tolist() == [[5000.0, found.prices[1].k_dyn]]
-
-
 def test_terminals_drawn_are_the_numbers(found):
     (one,) = found.endings
-    above, below = pictures.terminals_figure([one]).axes
+    above, below = costs.endings_figure([one]).axes
     steady = next(line for line in above.lines if line.get_label() == "steady").get_ydata()
-    assert list(steady) == [p.k_dyn for p in one.by_terminal["steady"] if p.k_dyn is not None]
-    assert np.allclose(below.lines[0].get_ydata(), [100 * (cost - 1) for _, cost in one.costs("synchronous")])
+    assert list(steady) == list(one.k_dyn("steady").values())
+    more = [100 * (cost - 1) for cost in one.cost("synchronous").values()]
+    assert np.allclose(below.lines[0].get_ydata(), more)

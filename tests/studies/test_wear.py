@@ -7,8 +7,7 @@ import pytest
 
 from softstart import optimize, simulate
 from softstart.study import find_study
-from softstart_studies.paper_g.crane import published
-from softstart_studies.tuned_alike import CRANE
+from softstart_studies.crane import WITH_INVERTER, published
 from softstart_studies.wear import Extent, Wear, live, present
 
 PART = Extent(
@@ -19,7 +18,7 @@ PART = Extent(
     controllers=("ramp", "acceleration-delay"),
     front_points=4,
 )
-NEW = CRANE
+NEW = WITH_INVERTER
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +54,9 @@ def test_the_front_between_its_points_is_the_optimum_to_half_a_percent(life):
 def test_no_start_is_gentler_than_the_optimum_in_its_time(life):
     for ways in life.courses.values():
         for course in ways.values():
-            ratio = life.ratio(course)
-            assert np.all(ratio[np.isfinite(ratio)] > 0.99)  # half a percent of interpolation, and rounding
+            assert np.all(
+                course.ratio[np.isfinite(course.ratio)] > 0.99
+            )  # half a percent of interpolation, and rounding
 
 
 def test_tables_claims_and_figures(life):

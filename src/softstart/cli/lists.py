@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,11 +15,12 @@ from softstart.cli.running import Answer, answers, attributed, option_value, wor
 from softstart.drive import Drive, library
 from softstart.errors import InputError, Mistakes
 from softstart.plugins import STUDIES, registered
-from softstart.study import Study, StudyResult, find_study, study_names
+from softstart.study import Study, StudyResult, find_study
+from softstart.study import Table as Results
 from softstart.views.drawing import PICTURE_ENDINGS
 from softstart.views.markdown import file_stem, output_folder
 from softstart.views.numbers import Column, Table, printable
-from softstart.views.sheet import Sheet, rows_file
+from softstart.views.sheet import Sheet, Writer, rows_file
 
 if TYPE_CHECKING:
     from softstart.controller import Controller
@@ -133,15 +133,14 @@ def study(*, name: str | None) -> Answer:
     # what the study writes itself is put in place first
     with output_folder(out) as folder, working(f"{found.name}: beginning ...") as progress:
         result = found.run(folder, lambda doing: progress(f"{found.name}: {doing}"))
-    about = {"study": found.name, "title": found.title}
-    return lambda: about | result.summary(), _study_sheet(found, result)
+    return lambda: {"study": found.name, "title": found.title} | result.summary(), _study_sheet(found, result)
 
 
 def _studies() -> Answer:
     """All studies as data, and as a table with those that cannot be loaded."""
     found: list[Study] = []
     broken = Mistakes()
-    for name in study_names():
+    for name in registered(STUDIES):
         with broken.noted():
             found.append(find_study(name))
     data = [
@@ -159,20 +158,13 @@ def _studies() -> Answer:
 
 def _study_sheet(found: Study, result: StudyResult) -> Sheet:
     """Tables, claims with their verdicts and evidence, pictures; each table and the claims as CSV."""
-    stems = ["claims"]
-    for table in result.tables:
-        stems.append(file_stem(table.title.lower(), stems))
-    claims = [(one.statement, one.verdict, one.evidence) for one in result.claims]
-    told = [
-        [f"{i:2}. {verdict}", printable(f"{statement}\n{evidence}")]
-        for i, (statement, verdict, evidence) in enumerate(claims, start=1)
-    ]
-    files = {
-        f"{stem}.csv": rows_file(table.columns, table.rows)
-        for stem, table in zip(stems[1:], result.tables, strict=True)
-    }
-    if claims:
-        files["claims.csv"] = rows_file(("statement", "verdict", "evidence"), claims)
+    files: dict[str, Writer] = {}
+    rows = [(one.statement, one.verdict, one.evidence) for one in result.claims]
+    claims = Results("claims", ("statement", "verdict", "evidence"), rows)
+    for table in (claims, *result.tables) if rows else result.tables:
+        stem = file_stem(table.title.lower(), [name.removesuffix(".csv") for name in files])
+        files[f"{stem}.csv"] = rows_file(table.columns, table.rows)
+    told = [[f"{i:2}. {word}", printable(f"{said}\n{why}")] for i, (said, word, why) in enumerate(rows, 1)]
     return Sheet(
         title=f"{found.name}: {found.title}",
         lines=[f"{found.name}: {found.title}"],
@@ -182,13 +174,11 @@ def _study_sheet(found: Study, result: StudyResult) -> Sheet:
     )
 
 
-def _shown(table: Any) -> Table:
+def _shown(table: Results) -> Table:
     """A table of a study, as it is shown: floats with five digits."""
 
-    def text(cell: Any) -> str:
-        if cell is None or (isinstance(cell, float) and math.isnan(cell)):
-            return "-"
-        return printable(f"{cell:.5g}" if isinstance(cell, float) else str(cell))
+    def text(cell: object) -> str:
+        return "-" if cell is None else printable(f"{cell:.5g}" if isinstance(cell, float) else str(cell))
 
     columns = [
         Column(name, all(isinstance(row[i], int | float | None) for row in table.rows))

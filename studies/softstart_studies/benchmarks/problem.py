@@ -104,7 +104,7 @@ class Problem:
     def controller(self) -> Controller:
         """Set up for the machine; a ramp takes `ramp_time`, method 2 raises its torque where [G](15) says."""
         from softstart.controller import make_controller
-        from softstart_studies.paper_g.crane import published
+        from softstart_studies.crane import published
 
         strategy = self.strategy.removeprefix(DAMPED)
         given = {"time": self.ramp_time} if strategy == "ramp" else {}

@@ -1,6 +1,9 @@
-"""The gentlest starts of the crane drive of [G]: profiles, limits, and what a sensor or smoothness is worth.
+"""The gentlest starts of the crane drive of [G]: how they look, how near controllers come, what they cost.
 
-The theory is in docs/optimal-starts.md, the drive in crane.py.
+The optimal start of the crane is drawn by profiles.py (figure optimal-starts-profiles: motor torque, shaft
+torque and speeds, both gaps); limits.py has the least K_dyn over the start time, what no start undercuts and
+the controllers beside it; costs.py the terminal conditions, smooth torques and other drives; sensor.py one
+torque for several gaps. The theory is in docs/optimal-starts.md, the drive in drives.py.
 """
 
 from __future__ import annotations
@@ -11,8 +14,8 @@ from typing import ClassVar
 
 from softstart.optimal.front import Front
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.optimal_starts import fronts, kinds, limits, profiles, sensor, smooth, terminals
-from softstart_studies.optimal_starts.crane import CRANE, TARGET, Extent
+from softstart_studies.optimal_starts import costs, limits, profiles, sensor
+from softstart_studies.optimal_starts.drives import Extent
 
 __all__ = ["OptimalStarts"]
 
@@ -23,22 +26,22 @@ class Found:
 
     profiles: list[profiles.OptimalStart]
     fronts: list[Front]
-    endings: list[terminals.Endings]
+    endings: list[costs.Endings]
     sensed: list[sensor.Sensed]
-    prices: list[smooth.Price]
-    kinds: list[kinds.Kind]
+    prices: list[costs.Price]
+    kinds: list[costs.Kind]
 
 
 def find(extent: Extent, progress: Progress) -> Found:
     """All the optima, in the order of docs/optimal-starts.md."""
-    curves = fronts.fronts(extent, progress)
+    curves = limits.fronts(extent, progress)
     return Found(
         profiles.starts(extent, progress),
         curves,
-        [terminals.endings(front, progress) for front in curves],
+        [costs.endings(front, progress) for front in curves],
         sensor.sensed(extent, progress),
-        smooth.prices(extent, progress),
-        kinds.kinds(extent, progress),
+        costs.prices(extent, progress),
+        costs.kinds(extent, progress),
     )
 
 
@@ -46,7 +49,7 @@ class OptimalStarts(Study):
     """The limit of every controller, with its lower bound.
 
     >>> OptimalStarts.name, len(OptimalStarts.pictures)
-    ('optimal-starts', 6)
+    ('optimal-starts', 4)
     """
 
     name: ClassVar[str] = "optimal-starts"
@@ -58,8 +61,6 @@ class OptimalStarts(Study):
         "optimal-starts-front-new",
         "optimal-starts-front-worn",
         "optimal-starts-terminals",
-        "optimal-starts-sensor",
-        "optimal-starts-smooth",
     )
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
@@ -73,38 +74,29 @@ class OptimalStarts(Study):
 
 def present(found: Found, progress: Progress) -> StudyResult:
     """Tables, claims and figures of what was found."""
+    from softstart.views.optima import front_figure
+
     claims = (
         *limits.claims(found.fronts, progress),
-        *fronts.claims(found.fronts),
-        *terminals.claims(found.endings),
-        *sensor.claims(found.sensed),
-        *smooth.claims(found.prices),
-        *kinds.claims(found.kinds),
+        costs.reached_is_lower(found.endings),
+        costs.steady_costs(found.endings),
+        sensor.sensor_pays(found.sensed),
+        sensor.optimum_depends_on_gap(found.sensed),
+        costs.smooth_costs_little(found.prices),
+        costs.optimum_of_kinds_is_below(found.kinds),
+    )
+    landmarks, curves, controllers = limits.tables(found.fronts)
+    tables = (
+        landmarks,
+        profiles.table(found.profiles),
+        curves,
+        controllers,
+        costs.endings_table(found.endings),
+        sensor.table(found.sensed),
+        costs.prices_table(found.prices),
+        costs.kinds_table(found.kinds),
     )
     progress("drawing")
-    from softstart.views.optima import front_figure
-    from softstart_studies.optimal_starts import pictures
-
-    new, worn = found.fronts[0], found.fronts[-1]
-    drawn = (
-        pictures.profiles_figure(found.profiles, CRANE.mean_torque, TARGET),
-        front_figure(new),
-        front_figure(worn),
-        pictures.terminals_figure(found.endings),
-        pictures.sensor_figure(found.sensed),
-        pictures.smooth_figure(found.prices),
-    )
-    return OptimalStarts.result(
-        tables=(
-            limits.table(found.fronts),
-            profiles.table(found.profiles),
-            fronts.table(found.fronts),
-            fronts.controllers_table(found.fronts),
-            terminals.table(found.endings),
-            sensor.table(found.sensed),
-            smooth.table(found.prices),
-            kinds.table(found.kinds, found.profiles),
-        ),
-        claims=claims,
-        figures=drawn,
-    )
+    fronts = front_figure(found.fronts[0]), front_figure(found.fronts[-1])
+    drawn = profiles.figure(found.profiles), *fronts, costs.endings_figure(found.endings)
+    return OptimalStarts.result(tables, claims, drawn)

@@ -1,15 +1,20 @@
-"""Optimal starts at multiples of the start time of constant torque."""
+"""Optimal starts at multiples of the start time of constant torque: their numbers, and how they look."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from softstart import Run, simulate
 from softstart.controller import make_controller
 from softstart.optimal.front import FrontPoint
 from softstart.profile import TorqueProfile
 from softstart.study import Progress, Table
-from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, optima, rounded
+from softstart_studies.crane import K_DYN, starts_figure
+from softstart_studies.optimal_starts.drives import Extent, crane, direct_time, of_points, optima
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -29,60 +34,46 @@ def starts(extent: Extent, progress: Progress) -> list[OptimalStart]:
     >>> round(found[0].point.k_dyn, 5), found[0].run.contacts
     (0.90925, 1)
     """
-    return [
-        OptimalStart(gap, multiple, point, run_of(gap, point))
-        for gap in extent.gaps
-        for multiple, point in zip(
-            sorted(extent.multiples),
-            optima(
-                crane(gap), [m * direct_time(gap) for m in extent.multiples], "synchronous", progress
-            ).points,
-            strict=True,
-        )
-    ]
+    found = []
+    for gap in extent.gaps:
+        multiples = sorted(extent.multiples)
+        times = [multiple * direct_time(gap) for multiple in multiples]
+        points = optima(crane(gap), times, "synchronous", progress).points
+        found += [OptimalStart(gap, *one, run_of(gap, one[1])) for one in zip(multiples, points, strict=True)]
+    return found
 
 
 def run_of(gap: float, point: FrontPoint) -> Run | None:
     """The start under the profile of an optimum, to one elastic period after t_f."""
     if not point.found or point.start_time is None:
         return None
-    drive = crane(gap)
     profile = TorqueProfile(list(point.time), list(point.torque))
     player = make_controller("profile", {"profile": profile})
-    return simulate(drive, player, point.start_time + float(drive.elastic_period))
+    return simulate(crane(gap), player, point.start_time + float(crane(gap).elastic_period))
 
 
 def table(found: list[OptimalStart]) -> Table:
     """What each comes to, or the shortest start time where there is none."""
-    return Table(
-        "Optimal starts, synchronous, undamped, active load",
-        (
-            "gap, rad",
-            "x direct",
-            "start time, s",
-            "K_dyn",
-            "at least",
-            "bound",
-            "above it, %",
-            "method",
-            "contacts",
-            "heat, s",
-            "shortest, s",
-        ),
-        [
-            (
-                one.gap,
-                one.multiple,
-                rounded(one.point.start_time_bound),
-                rounded(one.point.k_dyn),
-                rounded(one.point.k_dyn_lower_bound),
-                one.point.bound_kind if one.point.found else one.point.status.lower(),
-                rounded(one.point.gap_percent, 4),
-                one.point.method or None,
-                one.point.contacts,
-                rounded(one.point.heat, 4),
-                rounded(one.point.shortest_start_time),
-            )
-            for one in found
-        ],
-    )
+    points = [one.point for one in found]
+    return Table.of("Optimal starts, synchronous, undamped, active load", {
+        "gap, rad": [one.gap for one in found],
+        "x direct": [one.multiple for one in found],
+        **of_points(points),
+        "contacts": [p.contacts for p in points],
+        "heat, s": [p.heat for p in points],
+        "shortest, s": [p.shortest_start_time for p in points],
+    })  # fmt: skip
+
+
+def figure(found: list[OptimalStart]) -> Figure:
+    """Torques and speeds of the optimal starts, a column a gap, a colour a start time."""
+    columns: dict[str, dict[str, Run]] = {}
+    for gap in sorted({one.gap for one in found}):
+        here = [one for one in found if one.gap == gap]
+        refused = ", ".join(f"{one.multiple:g}" for one in here if one.run is None)
+        columns[f"gap {gap:g} rad" + (f"; {refused} x: infeasible" if refused else "")] = {
+            f"{one.multiple:g} x: {one.point.start_time_bound:.4f} s, {K_DYN} {one.point.k_dyn:.4f}": one.run
+            for one in here
+            if one.run is not None
+        }
+    return starts_figure(columns)

@@ -25,7 +25,8 @@ from softstart.optimal.pulse_coast_hold import PulseCoastHold
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Table, Verdict
-from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, percent, rounded
+from softstart_studies.crane import percent
+from softstart_studies.optimal_starts.drives import Extent, crane, direct_time
 
 NEAR = 1.01  # so near the own optimum of the worst gap, knowing the gap would add nothing
 PULSES, EACH = 200, 10  # where no closed form holds, each tenth is tried
@@ -126,53 +127,30 @@ def _least_peak(contact: tuple[float, Drive], time: float) -> float:
 
 def table(found: list[Sensed]) -> Table:
     """K_dyn of each gap under the three."""
-    return Table(
-        "One torque for several gaps",
-        (
-            "start time, s",
-            "gap, rad",
-            "own optimum",
-            "blind",
-            "planned again",
-            "blind / own",
-            "planned again / own",
-        ),
-        [
-            (
-                rounded(one.start_time),
-                gap,
-                rounded(own, 4),
-                rounded(blind, 4),
-                rounded(reacting, 4),
-                rounded(blind / own, 3),
-                rounded(reacting / own, 3),
-            )
-            for one in found
-            for gap, own, blind, reacting in zip(one.gaps, one.alone, one.blind, one.reacting, strict=True)
-        ],
-    )
-
-
-def claims(found: list[Sensed]) -> list[Claim]:
-    """Whether it pays, and whether the gap itself has to be known."""
-    return [sensor_pays(found), optimum_depends_on_gap(found)]
+    rows = [
+        (one.start_time, gap, own, blind, reacting, blind / own, reacting / own)
+        for one in found
+        for gap, own, blind, reacting in zip(one.gaps, one.alone, one.blind, one.reacting, strict=True)
+    ]
+    columns = ("start time, s", "gap, rad", "own optimum", "blind", "planned again", "blind / own",
+               "planned again / own")  # fmt: skip
+    return Table("One torque for several gaps", columns, rows)
 
 
 def sensor_pays(found: list[Sensed]) -> Claim:
     """The worst gap under a torque planned again, beside its own optimum."""
     away = [max(one.reacting) / one.hardest for one in found]
     said = "; ".join(
-        f"{one.start_time:.4f} s: worst K_dyn {max(one.blind):.3f} blind, "
-        f"{max(one.reacting):.3f} planned again after the contact ({-one.percent:.0f} %), "
-        f"{one.hardest:.3f} for the worst gap by itself"
+        f"{one.start_time:.4f} s: worst K_dyn {max(one.blind):.3f} blind, {max(one.reacting):.3f} planned "
+        f"again after the contact ({-one.percent:.0f} %), {one.hardest:.3f} for the worst gap by itself"
         for one in found
     )
     pays = min(one.percent for one in found) > 1.0
     return Claim(
         "(Not in [G]) A torque that is planned again after the contact needs no knowledge of the gap.",
-        Verdict.REFUTED if not pays else Verdict.CONFIRMED if max(away) < NEAR else Verdict.PARTLY,
-        f"Gaps of {', '.join(f'{gap:g}' for gap in found[0].gaps)} rad. {said}. "
-        f"Planned again, the worst gap is {percent(min(away))} to {percent(max(away))} from its own optimum.",
+        Verdict.REFUTED if not pays else Verdict.of(True, max(away) < NEAR),
+        f"Gaps of {', '.join(f'{gap:g}' for gap in found[0].gaps)} rad. {said}. Planned again, the worst "
+        f"gap is {percent(min(away), 1)} to {percent(max(away), 1)} from its own optimum.",
     )
 
 
@@ -182,7 +160,7 @@ def optimum_depends_on_gap(found: list[Sensed]) -> Claim:
     spread = [max(one.alone) / min(one.alone) for one in found]
     return Claim(
         "The optimum is invariant to the gap.",
-        Verdict.CONFIRMED if max(spread) < 1.01 else Verdict.REFUTED,
+        Verdict.of(max(spread) < 1.01),
         f"Least K_dyn at {', '.join(f'{gap:g}' for gap in found[0].gaps)} rad in the same start time: "
         f"{said}; largest over least {max(spread):.3f} to {min(spread):.3f}. Torque profile and K_dyn both "
         "depend on it; what does not is the form (pulse, coast, hold).",

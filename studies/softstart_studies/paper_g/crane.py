@@ -7,20 +7,20 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from softstart import Drive, Records, Run, formulas, simulate
+from softstart import Drive, Records, Run, TorqueProfile, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
+from softstart_studies.crane import CRANE, published
 
 Method = Literal[1, 2]
 
-CRANE = Drive.load("crane-4amtkf")  # J2'' = 5 J1, delta1 = 0.5 rad
 GAP_1, GAP_2 = 0.5, 2.0  # rad, new and worn
 LIGHT, HEAVY = 2, 5  # J2'/J1, J2''/J1
+BASE = CRANE.mean_torque  # N m: K_dyn refers to that of J2'' = 5 J1 for all curves of fig. 2
 SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the check table
+TORQUE = SHARE * float(CRANE.Ms)
 RATIOS: Vector = np.linspace(0.0, 1.0, 101)[1:]  # the axis of figs. 2-4
-POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
 METHODS: tuple[Method, Method] = (1, 2)
-RAISED_AT_THE_END = ("reduced-two-stage", "acceleration-delay")  # of stage 2, in [G]
 CONTROLLERS = {1: "reduced-first-stage", 2: "reduced-two-stage"}
 
 
@@ -31,15 +31,6 @@ def crane(ratio: float = HEAVY, gap: float = GAP_1) -> Drive:
     (0.07, 2.0)
     """
     return CRANE.replace(load_inertia=ratio * CRANE.J1, gap=gap)
-
-
-def base() -> float:
-    """Mean torque in N m that K_dyn refers to in fig. 2 of [G]: that of J2'' = 5 J1 for all curves.
-
-    >>> round(base(), 2)
-    52.86
-    """
-    return CRANE.mean_torque
 
 
 def closed_form(
@@ -57,51 +48,55 @@ def closed_form(
     return formulas.two_stages(low, drive.Ms if method == 1 else low, **values, base=base)
 
 
-def published(controller: str, **parameters: object) -> Controller:
-    """A strategy as [G] proposes it: reduced torques are raised at the end of stage 2, (15), not its peak.
+def k_dyn(ratio: float, gap: float, r: Any, method: Method, base: float | None = BASE) -> Any:
+    """K_dyn of stage 2 by the closed form, on the base of J2'' = 5 J1 or, with None, on that of the drive.
 
-    >>> published("acceleration-delay").raise_at
-    'end'
+    >>> round(k_dyn(2, 0.5, 1.0, 1), 4), round(k_dyn(2, 0.5, 1.0, 1, None), 4)
+    (2.7157, 3.2834)
     """
-    if controller in RAISED_AT_THE_END:
-        parameters["raise_at"] = "end"
-    return make_controller(controller, parameters)
+    return closed_form(crane(ratio, gap), r, method, base).k_dyn
 
 
-def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None) -> Run:
+def ratio_where(value: float, ratio: float, gap: float, method: Method) -> float:
+    """The ratio M1/Ms at which the closed form of this method gives this K_dyn.
+
+    >>> round(ratio_where(2.0, 5, 0.5, 2), 3)
+    0.524
+    """
+    return float(brentq(lambda r: k_dyn(ratio, gap, r, method) - value, 0.0, 1.0, xtol=1e-14))
+
+
+def simulated(drive: Drive, r: float, method: Method) -> Run:
     """The whole start by the plant, torque r Ms in stage 1 (method 1) or in stages 1 and 2 (method 2).
 
     >>> round(simulated(crane(), 0.25, 2).k_dyn_first_contact, 4)
     1.2677
     """
-    return simulate(drive, published(CONTROLLERS[method], torque=r * float(drive.Ms)), base=base)
+    return simulate(drive, published(CONTROLLERS[method], torque=r * float(drive.Ms)), base=CRANE)
 
 
-def many(drives: Records, controller: str | Controller, **parameters: float) -> tuple[Vector, Vector]:
+def many(drives: Records, controller: Controller) -> tuple[Vector, Vector]:
     """K_dyn of first contact and of the whole start of a batch; controller and base of the new drive.
 
     >>> from softstart import records
-    >>> [k.round(4).tolist() for k in many(records(CRANE, gap=[0.5, 2.0]), "direct")]
+    >>> [k.round(4).tolist() for k in many(records(CRANE, gap=[0.5, 2.0]), published("direct"))]
     [[3.1179, 4.8654], [3.1179, 4.8654]]
     """
-    ready = published(controller, **parameters) if isinstance(controller, str) else controller
-    results: Any = simulate(drives, ready, fitted_to=CRANE, base=CRANE)
+    results: Any = simulate(drives, controller, fitted_to=CRANE, base=CRANE)
     return np.asarray(results["k_dyn_first_contact"]), np.asarray(results["k_dyn"])
 
 
-def ratio_where(k_dyn: float, drive: Drive, method: Method, base: float | None = None) -> float:
-    """The ratio M1/Ms at which the closed form of this method gives this K_dyn.
+def ways() -> dict[str, Controller]:
+    """How the torque M1 = Ms/4 is raised: at an instant, or a delay after the acceleration has dropped.
 
-    >>> round(ratio_where(2.0, crane(), 2), 3)
-    0.524
+    The instant is t1 + t2 of the new drive: what [G] warns of. (15) is the length of stage 2, as [G]
+    proposes; (14) half of it: at the peak of stage 2 the shaft carries the torque, the gap stays closed.
     """
-    return float(brentq(lambda r: closed_form(drive, r, method, base).k_dyn - k_dyn, 0.0, 1.0, xtol=1e-14))
-
-
-def percent(ratio: float) -> str:
-    """How much more or less than 1, as text.
-
-    >>> percent(1.56), percent(0.827)
-    ('+56 %', '-17 %')
-    """
-    return f"{100 * (ratio - 1):+.0f} %"
+    new = closed_form(CRANE, SHARE, 2)
+    instant, length = float(new.open_duration + new.contact_duration), float(new.contact_duration)
+    at_instant = TorqueProfile.steps([0.0, instant, 60.0], [TORQUE, float(CRANE.Ms)])
+    return {
+        "instant": make_controller("profile", {"profile": at_instant}),
+        "delay (15)": published("acceleration-delay", torque=TORQUE),
+        "delay (14)": published("acceleration-delay", torque=TORQUE, delay=0.5 * length),
+    }

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from softstart.arrays import Vector
 from softstart.study import Table
+from softstart.views.drawing import COLOURS, DASHES, drawing, head, new_figure
+from softstart_studies.crane import K_DYN
 from softstart_studies.paper_g.crane import (
-    CRANE,
+    BASE,
     GAP_1,
     GAP_2,
     HEAVY,
     LIGHT,
     METHODS,
-    POINTS,
     RATIOS,
     Method,
-    base,
     closed_form,
     crane,
     simulated,
 )
 
+POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
 # J2/J1, gap in rad, r, and what the check table gives: K method 1, K method 2, t1, t1 + t2 of method 1
 PRINTED = (
     (5, 0.5, 1.0, "3.1179", "3.1179", "0.0166", "0.0533"),
@@ -34,16 +37,19 @@ PRINTED = (
     (2, 0.5, 1.0, "2.7157", "2.7157", "0.0163", "0.0485"),
 )
 QUANTITIES = ("K method 1", "K method 2", "t1, s", "t1 + t2 method 1, s")
+TITLES = {
+    "2": "Fig. 2 of [G]: $\\delta_1 = 0.5$ rad, base of $J_2''$",
+    "3": "Fig. 3 of [G]: $J_2'' = 5\\,J_1$",
+    "4": "Fig. 4 of [G]: $J_2'' = 5\\,J_1$",
+}
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of a figure over M1/Ms, and the plant's values at some points of it."""
+    """One curve of a figure over RATIOS, and the plant's values at POINTS."""
 
     label: str
-    r: Vector
     values: Vector
-    at: Vector
     exact: Vector  # on the curve, at the points
     points: Vector  # by simulation
 
@@ -60,63 +66,38 @@ def k_dyn_curve(ratio: float, gap: float, method: Method, label: str) -> Curve:
     True
     """
     drive = crane(ratio, gap)
-    runs = [simulated(drive, float(r), method, CRANE) for r in POINTS]
+    values, exact = (np.asarray(closed_form(drive, r, method, BASE).k_dyn) for r in (RATIOS, POINTS))
+    runs = [simulated(drive, float(r), method) for r in POINTS]
     return Curve(
-        label,
-        RATIOS,
-        np.asarray(closed_form(drive, RATIOS, method, base()).k_dyn),
-        POINTS,
-        np.asarray(closed_form(drive, POINTS, method, base()).k_dyn),
-        np.array([run.k_dyn_first_contact for run in runs]),
+        f"{label}, method {method}", values, exact, np.array([run.k_dyn_first_contact for run in runs])
     )
 
 
-def duration_curve(gap: float, method: Method | None, label: str) -> Curve:
-    """Length in s of stages 1 + 2 by [G](3) and (15), or of stage 1 alone where no method is named."""
+def duration_curve(gap: float, method: Method, stages: int, label: str) -> Curve:
+    """Length in s of stage 1 by [G](3), or of stages 1 + 2 by (3) and (15)."""
     drive = crane(HEAVY, gap)
-    runs = [simulated(drive, float(r), method or 1) for r in POINTS]
-    on_curve, at_points = (closed_form(drive, r, method or 1) for r in (RATIOS, POINTS))
-    with_contact = 0.0 if method is None else 1.0
-    return Curve(
-        label,
-        RATIOS,
-        np.asarray(on_curve.open_duration + with_contact * on_curve.contact_duration),
-        POINTS,
-        np.asarray(at_points.open_duration + with_contact * at_points.contact_duration),
-        np.array([run.stage_durations[0] + with_contact * run.stage_durations[1] for run in runs]),
-    )
+    forms = [closed_form(drive, r, method) for r in (RATIOS, POINTS)]
+    values, exact = (np.asarray(sum((one.open_duration, one.contact_duration)[:stages])) for one in forms)
+    runs = [simulated(drive, float(r), method) for r in POINTS]
+    return Curve(label, values, exact, np.array([sum(run.stage_durations[:stages]) for run in runs]))
 
 
-def figure_2() -> list[Curve]:
-    """K_dyn for J2' and J2'' at delta1, both methods."""
-    return [
-        k_dyn_curve(ratio, GAP_1, method, f"$J_2{prime} = {ratio}\\,J_1$, method {method}")
-        for ratio, prime in ((HEAVY, "''"), (LIGHT, "'"))
-        for method in METHODS
-    ]
+def figures() -> dict[str, list[Curve]]:
+    """The curves by the number of the figure of [G].
 
-
-def figure_3() -> list[Curve]:
-    """K_dyn for delta1 and delta2 at J2'', both methods."""
-    return [
-        k_dyn_curve(HEAVY, gap, method, f"$\\delta_{index} = {gap:g}$ rad, method {method}")
-        for index, gap in ((2, GAP_2), (1, GAP_1))
-        for method in METHODS
-    ]
-
-
-def figure_4() -> list[Curve]:
-    """Length of stages 1 + 2 for both methods and of stage 1, both gaps, at J2''."""
-    spans: tuple[tuple[Method | None, str], ...] = (
-        (1, "$t_1 + t_2$, method 1"),
-        (2, "$t_1 + t_2$, method 2"),
-        (None, "$t_1$"),
-    )
-    return [
-        duration_curve(gap, method, f"$\\delta_{index} = {gap:g}$ rad, {what}")
-        for index, gap in ((2, GAP_2), (1, GAP_1))
-        for method, what in spans
-    ]
+    Fig. 2: K_dyn for J2' and J2'' at delta1, both methods. Fig. 3: for delta1 and delta2 at J2''. Fig. 4: the
+    length of stages 1 + 2 for both methods and of stage 1, both gaps, at J2''.
+    """
+    inertias = ((HEAVY, "$J_2'' = 5\\,J_1$"), (LIGHT, "$J_2' = 2\\,J_1$"))
+    gaps = ((GAP_2, "$\\delta_2 = 2$ rad"), (GAP_1, "$\\delta_1 = 0.5$ rad"))
+    spans: tuple[tuple[Method, int, str], ...] = (
+        (1, 2, "$t_1 + t_2$, method 1"), (2, 2, "$t_1 + t_2$, method 2"), (1, 1, "$t_1$"),
+    )  # fmt: skip
+    return {
+        "2": [k_dyn_curve(ratio, GAP_1, method, text) for ratio, text in inertias for method in METHODS],
+        "3": [k_dyn_curve(HEAVY, gap, method, text) for gap, text in gaps for method in METHODS],
+        "4": [duration_curve(gap, *span[:2], f"{text}, {span[2]}") for gap, text in gaps for span in spans],
+    }
 
 
 def worked_table() -> Table:
@@ -128,34 +109,19 @@ def worked_table() -> Table:
     rows: list[tuple[object, ...]] = []
     for ratio, gap, r, *printed in PRINTED:
         drive = crane(ratio, gap)
-        forms = [closed_form(drive, r, method, base()) for method in METHODS]
-        runs = [simulated(drive, r, method, CRANE) for method in METHODS]
-        opened, closed = float(forms[0].open_duration), float(forms[0].contact_duration)
-        computed = (float(forms[0].k_dyn), float(forms[1].k_dyn), opened, opened + closed)
-        by_plant = (
-            runs[0].k_dyn_first_contact,
-            runs[1].k_dyn_first_contact,
+        first, second = (closed_form(drive, r, method, BASE) for method in METHODS)
+        runs = [simulated(drive, r, method) for method in METHODS]
+        terms = float(first.open_duration), float(first.contact_duration)
+        computed = (float(first.k_dyn), float(second.k_dyn), terms[0], sum(terms))
+        plant = (
+            *(run.k_dyn_first_contact for run in runs),
             runs[0].first_contact,
             sum(runs[0].stage_durations),
         )
-        for name, text, form, plant in zip(QUANTITIES, printed, computed, by_plant, strict=True):
-            rows.append(
-                (
-                    ratio,
-                    gap,
-                    r,
-                    name,
-                    text,
-                    round(form, 6),
-                    round(plant, 6),
-                    _note(text, form, (opened, closed)),
-                )
-            )
-    return Table(
-        "Worked example: the check table recomputed",
-        ("J2/J1", "gap, rad", "M1/Ms", "quantity", "printed", "closed form", "plant", "note"),
-        rows,
-    )
+        for name, text, form, by_plant in zip(QUANTITIES, printed, computed, plant, strict=True):
+            rows.append((ratio, gap, r, name, text, form, by_plant, _note(text, form, terms)))
+    columns = ("J2/J1", "gap, rad", "M1/Ms", "quantity", "printed", "closed form", "plant", "note")
+    return Table("Worked example: the check table recomputed", columns, rows)
 
 
 def _note(printed: str, exact: float, terms: tuple[float, ...]) -> str:
@@ -166,14 +132,46 @@ def _note(printed: str, exact: float, terms: tuple[float, ...]) -> str:
     return "differs"
 
 
-def agreement_table(figures: Mapping[str, Sequence[Curve]]) -> Table:
+def agreement_table(drawn: Mapping[str, Sequence[Curve]]) -> Table:
     """Largest relative difference between plant and closed form, one row per figure."""
-    rows = []
-    for name, curves in figures.items():
-        points = sum(len(curve.at) for curve in curves)
-        rows.append((name, len(curves), points, max(curve.disagreement for curve in curves)))
-    return Table(
-        "Plant against closed form",
-        ("figure of [G]", "curves", "simulated points", "largest relative difference"),
-        rows,
-    )
+    return Table.of("Plant against closed form", {
+        "figure of [G]": drawn,
+        "curves": map(len, drawn.values()),
+        "simulated points": [len(curves) * len(POINTS) for curves in drawn.values()],
+        "largest relative difference": [max(one.disagreement for one in curves) for curves in drawn.values()],
+    })  # fmt: skip
+
+
+def curves_csv(drawn: Mapping[str, Sequence[Curve]]) -> str:
+    """Curves and points as text, one row per value; the plant's column is empty where it was not asked."""
+    stream = io.StringIO()
+    stream.write("figure,curve,M1/Ms,closed form,plant\n")
+    for number, curves in drawn.items():
+        for curve in curves:
+            name = "".join(sign for sign in curve.label if sign not in '$\\,"')
+            for r, value in zip(RATIOS, curve.values, strict=True):
+                stream.write(f'{number},"{name}",{r:.17g},{value:.17g},\n')
+            for r, value, point in zip(POINTS, curve.exact, curve.points, strict=True):
+                stream.write(f'{number},"{name}",{r:.17g},{value:.17g},{point:.17g}\n')
+    return stream.getvalue()
+
+
+def figure(number: str, curves: Sequence[Curve]) -> Any:
+    """A figure of [G]: curves over M1/Ms, a colour for each gap or inertia, and the plant's points."""
+    times = number == "4"
+    kinds, scale = (3, 1000.0) if times else (2, 1.0)
+    with drawing():
+        drawn, axes = new_figure(1, 1, (8.0, 5.0))
+        for index, curve in enumerate(curves):
+            colour, kind = COLOURS[index // kinds], index % kinds
+            look: dict[str, Any] = {"color": colour, "ls": DASHES[kind]}
+            marks: dict[str, Any] = {"marker": "os^"[kind], "ms": 4.5, "mec": colour, "mfc": "white"}
+            axes.plot(RATIOS, scale * curve.values, **look, zorder=2)
+            axes.plot(POINTS, scale * curve.points, **marks, ls="none", zorder=3)
+            axes.plot([], [], **look, **marks, label=curve.label)
+        worst = max(curve.disagreement for curve in curves)
+        across = f"$M_1/M_s$     (lines: closed form; points: exact plant, at most {worst:.0e} off)"
+        head(axes, TITLES[number], "time, ms" if times else K_DYN, across)
+        axes.set(xlim=(0.0, 1.02), ylim=(0.0, 250.0 if times else 5.2 if number == "3" else 3.5))
+        axes.legend(loc="upper right" if times else "upper left", handlelength=3.2)
+    return drawn

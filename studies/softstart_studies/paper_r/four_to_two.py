@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.chain import Chain, Mass, Shaft, natural_vibration, reduce_chain
 from softstart.study import Claim, Table
-
-__all__ = ["ErrorMap", "claims", "error_map", "four_masses", "map_table"]
+from softstart.views.drawing import COLOURS, drawing, head, new_figure
 
 Grid = NDArray[np.float64]
 
@@ -92,29 +91,32 @@ def map_table() -> Table:
     shares = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 1.0])
     found = error_map(shares)
     middle = int(np.argmin(np.abs(np.log(STIFFNESSES))))
-    rows = [
-        (
-            float(share),
-            round(100 * float(found.lever[i, middle]), 4),
-            round(100 * float(found.lever[i][np.argmax(np.abs(found.lever[i]))]), 4),
-            round(100 * float(found.modal[i, middle]), 4),
-            round(float(found.ratio[i, middle]), 1),
-            round(float(found.inner[i, middle]), 1),
-        )
-        for i, share in enumerate(shares)
-    ]
-    return Table(
-        "Four masses to two, I4 = 5 I1: error in the first frequency by the share of the inner inertia",
-        (
-            "(I2 + I3)/(I1 + I4)",
-            "lever, c1 = c3, %",
-            "lever, worst c1/c3 of 0.1 to 10, %",
-            "modal: participation, c1 = c3, %",
-            "(w_(1,2)/w)^2, c1 = c3",
-            "inner mass: (w_p/w)^2, c1 = c3",
-        ),
-        rows,
-    )
+    title = "Four masses to two, I4 = 5 I1: error in the first frequency by the share of the inner inertia"
+    return Table.of(title, {
+        "(I2 + I3)/(I1 + I4)": shares,
+        "lever, c1 = c3, %": 100 * found.lever[:, middle],
+        "lever, worst c1/c3 of 0.1 to 10, %": [100 * max(row, key=abs) for row in found.lever],
+        "modal: participation, c1 = c3, %": 100 * found.modal[:, middle],
+        "(w_(1,2)/w)^2, c1 = c3": found.ratio[:, middle],
+        "inner mass: (w_p/w)^2, c1 = c3": found.inner[:, middle],
+    })  # fmt: skip
+
+
+def map_figure(found: ErrorMap) -> Any:
+    """The error of the lever rule over inner inertia and stiffnesses, with the condition."""
+    with drawing():
+        figure, axes = new_figure(1, 1, (8.0, 5.0))
+        axes.set(
+            xscale="log", yscale="log"
+        )  # before the labels, which cut their gaps into the lines as drawn now
+        grid, levels = (STIFFNESSES, SHARES), [0.1, 0.3, 1.0, 3.0, 10.0, 30.0]
+        drawn = axes.contour(*grid, -100 * found.lever, levels, colors=COLOURS[0], linewidths=1.4)
+        axes.clabel(drawn, fmt="%g %%", inline_spacing=1)
+        held = axes.contour(*grid, found.ratio, [10.0], colors=COLOURS[1], linestyles="--")
+        axes.clabel(held, fmt="$(w_{(1,2)}/w)^2$ = %g", inline_spacing=1)
+        title = "Four masses to two, $I_4 = 5 I_1$: how low the lever rule puts the frequency"
+        head(axes, title, "$(I_2 + I_3)/(I_1 + I_4)$", "$c_1/c_3$")
+    return figure
 
 
 def claims(found: ErrorMap) -> list[Claim]:
@@ -129,22 +131,21 @@ def claims(found: ErrorMap) -> list[Claim]:
     allowed = 1.0 / np.sqrt(1.0 - 1.0 / found.inner[both]) - 1.0
     return [
         Claim(
-            "Four masses may be reduced to two where the partial systems (I1-c1-I2) and (I3-c3-I4) swing far "
-            "above the frequency wanted",
+            "Four masses may be reduced to two where the partial systems (I1-c1-I2) and (I3-c3-I4) swing "
+            "far above the frequency wanted",
             "confirmed",
-            f"Where both squares are at least 10 times that of the chain, its frequency comes out at most "
+            "Where both squares are at least 10 times that of the chain, its frequency comes out at most "
             f"{100 * worst:.1f} % off; the inner mass on both springs decides: where its square is 10 times "
             f"as well, at most {100 * float(error[both].max()):.2f} %, and never more than the bound "
-            f"1/sqrt(1 - (w/w_p)^2) - 1 (largest used share of it "
+            "1/sqrt(1 - (w/w_p)^2) - 1 (largest used share of it "
             f"{float((error[both] / allowed).max()):.2f}).",
         ),
         Claim(
             "The lever rule keeps the low frequency",
             "partly",
-            f"With an inner inertia of {SHARES[tenth]:.2f} of the outer ones it is "
-            f"{low:.1f} to {high:.1f} % low, over c1/c3 of 0.1 to 10; with 0.01, at most "
-            f"{at_hundredth:.2f} %. "
-            "The modal reduction keeps frequency and node exactly; the motor's participation is then at most "
+            f"With an inner inertia of {SHARES[tenth]:.2f} of the outer ones it is {low:.1f} to {high:.1f} "
+            f"% low, over c1/c3 of 0.1 to 10; with 0.01, at most {at_hundredth:.2f} %. The modal reduction "
+            "keeps frequency and node exactly; the motor's participation is then at most "
             f"{100 * float(np.abs(found.modal[tenth]).max()):.1f} % off (lever: "
             f"{100 * float(np.abs(found.lever_participation[tenth]).max()):.1f} %).",
         ),

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from softstart.study import Claim, Table
 
-__all__ = ["Cell", "cells", "claims", "gaps_of", "recomputed_table"]
-
 SECTIONS = ("12-13", "13-14", "14-15", "15-16", "16-17", "17-18")
 BACKLASH, DIAMETER = 0.2e-3, 0.185  # m, the means of [R]
 MESH = 0.002  # rad: 2 * 0.2/185 rounded as [R] does
@@ -88,12 +86,8 @@ def _follows(printed: str, value: float | None) -> str:
 
 def recomputed_table() -> Table:
     """Table 2 beside what follows from table 1."""
-    rows = [(c.gear, c.section, c.printed, c.recomputed, c.follows) for c in cells()]
-    return Table(
-        "Table 2 from table 1: gaps at the crank",
-        ("gear", "section", "printed, rad", "recomputed, rad", "follows"),
-        rows,
-    )
+    columns = ("gear", "section", "printed, rad", "recomputed, rad", "follows")
+    return Table("Table 2 from table 1: gaps at the crank", columns, cells())
 
 
 def claims() -> list[Claim]:
@@ -110,10 +104,10 @@ def claims() -> list[Claim]:
         Claim(
             "Table 2 follows from table 1 and a gap of 0.002 rad in each mesh",
             "partly",
-            f"{yes} of {len(all_cells)} cells round to the print; "
-            f"{' and '.join(c.printed for c in lost)} of gears 5 and 7 do not follow: as one mesh they "
-            f"would need i = {' and '.join(f'{i:.4f}' for i in needed.values())}, which no gear has. "
-            "12-13 of gear 1 follows with 0.708; the 1.708 printed in table 1 would give 0.001.",
+            f"{yes} of {len(all_cells)} cells round to the print; {' and '.join(c.printed for c in lost)} "
+            "of gears 5 and 7 do not follow: as one mesh they would need i = "
+            f"{' and '.join(f'{i:.4f}' for i in needed.values())}, which no gear has. 12-13 of gear 1 "
+            "follows with 0.708; the 1.708 printed in table 1 would give 0.001.",
         ),
         Claim(
             "A backlash of 0.2 mm on 185 mm is an angular gap of 0.002 rad",
@@ -126,14 +120,13 @@ def claims() -> list[Claim]:
             "Gaps at the crank are 0.02 to 0.253 rad (1.5 to 15 deg)",
             "partly",
             f"0.02 rad are {0.02 * degrees:.2f} deg and 0.253 rad {0.253 * degrees:.1f} deg. Sections of "
-            "gear "
-            f"1 have {min(first):.4f} to {max(first):.4f} rad, all of them together {sum(first):.3f} rad "
-            f"({sum(first) * degrees:.1f} deg).",
+            f"gear 1 have {min(first):.4f} to {max(first):.4f} rad, all of them together {sum(first):.3f} "
+            f"rad ({sum(first) * degrees:.1f} deg).",
         ),
         Claim(
             "Gaps may exceed the largest resonance amplitudes at the crank nose (1.5 to 2 deg)",
             "confirmed",
-            f"In gear 1 the sections {', '.join(large)} each exceed 2 deg ({RESONANCE / degrees:.3f} rad) on "
-            "their own.",
+            f"In gear 1 the sections {', '.join(large)} each exceed 2 deg ({RESONANCE / degrees:.3f} rad) "
+            "on their own.",
         ),
     ]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
-from softstart.arrays import Vector, plain_fields
+from softstart.arrays import Vector
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.periodic_torque import PeriodicTorque
@@ -24,8 +24,89 @@ from softstart.errors import InputError
 from softstart.quantities import Value
 from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
-from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.paper_r.last_bits import natural_vibration
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Instants in s; there angles about the common mean motion, speeds, twists, torques of the shafts."""
+
+    t: Vector
+    angle: Vector
+    w: Vector
+    twist: Vector
+    torque: Vector
+
+
+def twists(arrays: ChainArrays, torque: Vector) -> Vector:
+    """The twists at which the shafts carry these torques: spring and half of the gap."""
+    found: Vector = torque / arrays.c + 0.5 * arrays.gap * np.sign(torque)
+    return found
+
+
+def let_go(
+    arrays: ChainArrays, twist: Vector, t: Vector, *, speed: Vector | None = None,
+    acting: Mapping[str | int, PeriodicTorque] | None = None, damped: bool = False,
+) -> Motion:  # fmt: skip
+    """The exact motion at the motor shaft from these twists (rad) and speeds, at rest by default.
+
+    Load torques, friction and losses are left out, damping as well unless it is asked for.
+    """
+    speed = np.zeros(arrays.J.size) if speed is None else speed
+    d, d_ground = (one if damped else 0.0 * one for one in (arrays.d, arrays.d_ground))
+    masses = [
+        Mass(float(J), damping=float(b), initial_speed=float(v))
+        for J, b, v in zip(arrays.J, d_ground, speed, strict=True)
+    ]
+    shafts = [
+        Shaft(float(c), damping=float(b), gap=float(gap), contact_law=law, start_position=float(z))
+        for c, b, gap, law, z in zip(arrays.c, d, arrays.gap, arrays.law, twist, strict=True)
+    ]
+    found = simulate(Chain(masses, shafts), None, float(t[-1]), excitation=acting).at(t)
+    angle = about_mean(arrays, found["phi"] - found["phi"][:, :1])
+    return Motion(t, angle, found["w"], found["twist"], found["torques"])
+
+
+def harmonic(mean: Vector, size: Vector, w: float) -> dict[str | int, PeriodicTorque]:
+    """Constant torques and sizes of cosines in N m, one a mass, as torques that act on the masses."""
+    one, none = np.ones(1), np.zeros(1)
+    return {
+        index: PeriodicTorque(float(mean[index]), one, size[index] * one, none, w)
+        for index in np.flatnonzero((mean != 0.0) | (size != 0.0)).tolist()
+    }
+
+
+def about_mean(arrays: ChainArrays, angle: Any) -> Any:
+    """Angles without the motion of the whole: their mean, weighted with the inertias, is 0."""
+    return angle - (angle @ arrays.J / arrays.J.sum())[:, None]
+
+
+def windowed(signal: Vector) -> Vector:
+    """A signal without its mean, under a Hann window of mean 1 over its length."""
+    window = np.hanning(signal.shape[0])
+    found: Vector = (signal - signal.mean()) * window / window.sum()
+    return found
+
+
+def lines(signal: Vector, t: Vector, w: Any) -> Any:
+    """The spectral lines of a signal at the frequencies w in rad/s."""
+    return np.exp(-1j * np.outer(w, t)) @ signal
+
+
+def main_line(motion: Motion, arrays: ChainArrays, shape: Vector, Omega: float, mode: int = 1) -> float:
+    """The strongest line of the motion along the gap-free shape of a mode, rad/s, under a Hann window."""
+    t, signal = motion.t, windowed(motion.angle @ (arrays.J * shape))
+    step = 0.5 * math.pi / float(t[-1])
+    lowest = 0.1 if mode == 1 else 0.5  # below lie the lines of lower modes
+    places = np.arange(max(lowest * Omega, 4.0 * step), 1.15 * Omega, step)
+    best = float(places[int(np.argmax(np.abs(lines(signal, t, places))))])
+    refined = optimize.minimize_scalar(
+        lambda w: -float(np.abs(lines(signal, t, w)[0])),
+        bounds=(best - step, best + step),
+        method="bounded",
+        options={"xatol": 1e-7 * best},
+    )
+    return float(refined.x)
 
 
 def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Value:
@@ -66,14 +147,6 @@ class Backbone:
     frequency: Vector
     two_masses: Vector
 
-    def summary(self) -> dict[str, Any]:
-        """All of it as plain data."""
-        return {"chain": self.chain.name, "assumed": self.chain.assumed, **plain_fields(self, "chain")}
-
-    def plot(self) -> Any:
-        """The frequencies, over that without gaps, against the largest torque."""
-        return backbone_figure(self)
-
 
 HELD = "inertia = inf: vibrations with gaps are those of masses that all move; leave ground out."
 
@@ -103,44 +176,14 @@ def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60
         raise InputError(HELD)
     share = vibration.torque[mode] / np.abs(vibration.torque[mode]).max()
     Omega = float(vibration.Omega[mode])
-    found = [_main_line(chain, size * share, vibration.shape[mode], Omega, periods, mode) for size in torques]
+    t = np.linspace(0.0, periods * 2.0 * math.pi / Omega, 64 * periods + 1)
+    motions = (let_go(arrays, twists(arrays, size * share), t) for size in torques)
+    found = [main_line(one, arrays, vibration.shape[mode], Omega, mode) for one in motions]
     two = np.full(torques.size, math.nan)
     if mode == 1:
         reduced = reduce_chain(chain, force=True)
         two = np.asarray(backbone(reduced.J1, reduced.J2, reduced.c, reduced.gap, torques / reduced.c))
     return Backbone(chain, mode, Omega, torques, np.array(found), two)
-
-
-def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, periods: int, mode: int) -> float:
-    """The frequency of the free vibration released with these shaft torques, rad/s."""
-    arrays = chain.at_motor_shaft()
-    twist = torques / arrays.c + 0.5 * arrays.gap * np.sign(torques)
-    masses = [Mass(float(J)) for J in arrays.J]
-    rows = zip(arrays.c, arrays.gap, twist, strict=True)
-    shafts = [Shaft(float(c), gap=float(gap), start_position=float(at)) for c, gap, at in rows]
-    length = periods * 2.0 * math.pi / Omega
-    run = simulate(Chain(masses, shafts), None, length)
-    t = np.linspace(0.0, length, 64 * periods + 1)
-    phi = run.at(t)["phi"]
-    relative = phi - phi[:, :1]  # the rigid motion has no part in a shape
-    along = relative @ (arrays.J * shape)
-    window = np.hanning(t.size)
-    signal = (along - along.mean()) * window / window.sum()
-
-    def line(w: float) -> float:
-        return float(abs(np.exp(-1j * w * t) @ signal))
-
-    step = 0.5 * math.pi / length
-    lowest = 0.1 if mode == 1 else 0.5  # below lie the lines of lower modes
-    places = np.arange(max(lowest * Omega, 4.0 * step), 1.15 * Omega, step)
-    best = float(places[int(np.argmax([line(w) for w in places]))])
-    refined = optimize.minimize_scalar(
-        lambda w: -line(w),
-        bounds=(best - step, best + step),
-        method="bounded",
-        options={"xatol": 1e-7 * best},
-    )
-    return float(refined.x)
 
 
 PERIODS = 20  # over which an amplitude is measured
@@ -167,16 +210,6 @@ class ForcedResponse:
     without_gaps: Vector
     torque_without_gaps: Vector
     spread: Vector
-
-    def summary(self) -> dict[str, Any]:
-        """All of it as plain data."""
-        names = [mass.name for mass in self.chain.masses]
-        about = {"chain": self.chain.name, "assumed": self.chain.assumed, "masses": names}
-        return {**about, **plain_fields(self, "chain")}
-
-    def plot(self, mass: str | int = 0) -> Any:
-        """The amplitude of one mass against the frequency, with gaps and without."""
-        return response_figure(self, mass)
 
 
 def forced_response(
@@ -294,72 +327,21 @@ def _steady(
     flank = np.sign(constant + (law * twist).real)
     begin = constant / arrays.c + twist.real + 0.5 * arrays.gap * flank
     speed = (1j * w * begins).real
-    masses = [
-        Mass(float(J), damping=float(d), initial_speed=float(v))
-        for J, d, v in zip(arrays.J, arrays.d_ground, speed, strict=True)
-    ]
-    shafts = [
-        Shaft(float(c), damping=float(d), gap=float(gap), contact_law=law, start_position=float(at))
-        for c, d, gap, law, at in zip(arrays.c, arrays.d, arrays.gap, arrays.law, begin, strict=True)
-    ]
     mean = np.zeros(arrays.J.size)
     mean[arrays.motor] += locking
     mean[arrays.load] -= locking
-    one, none = np.ones(1), np.zeros(1)
-    acting: dict[str | int, PeriodicTorque] = {
-        index: PeriodicTorque(float(mean[index]), one, size * one, none, w)
-        for index, size in enumerate(force)
-        if size or mean[index]
-    }
     period = 2.0 * math.pi / w
     first = math.ceil(settle / period)
-    end = (first + PERIODS) * period
-    run = simulate(Chain(masses, shafts), None, end, excitation=acting)
-    t = np.linspace(first * period, end, PERIODS * SAMPLES, endpoint=False)
-    found = run.at(t)
-    swing = _about_mean(arrays, found["phi"] - found["phi"][:, :1])
+    t = first * period + np.linspace(0.0, PERIODS * period, PERIODS * SAMPLES, endpoint=False)
+    motion = let_go(arrays, begin, t, speed=speed, acting=harmonic(mean, force, w), damped=True)
+    swing = motion.angle
     halves = np.array([_height(part) for part in np.split(swing, 2)])
     spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
-    without_gaps: Vector = np.abs(_about_mean(arrays, linear[None, :])[0])
+    without_gaps: Vector = np.abs(about_mean(arrays, linear[None, :])[0])
     torque: Vector = np.abs(law * (linear[:-1] - linear[1:]))
-    return _height(swing), _height(found["torques"]), without_gaps, torque, spread
-
-
-def _about_mean(arrays: ChainArrays, angle: Any) -> Any:
-    """Angles without the motion of the whole: their mean, weighted with the inertias, is 0."""
-    return angle - (angle @ arrays.J / arrays.J.sum())[:, None]
+    return _height(swing), _height(motion.torque), without_gaps, torque, spread
 
 
 def _height(rows: Vector) -> Vector:
     found: Vector = np.sqrt(2.0 * np.mean((rows - rows.mean(axis=0)) ** 2, axis=0))
     return found
-
-
-def backbone_figure(found: Backbone) -> Any:
-    """The frequencies, over that without gaps, against the largest torque."""
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        axes.semilogx(found.torque, found.frequency / found.Omega, "o-", color=COLOURS[0], label="chain")
-        if np.isfinite(found.two_masses).all():
-            two = found.two_masses / found.Omega
-            axes.semilogx(found.torque, two, "--", color=COLOURS[1], label="two masses, exact")
-        axes.set_xlabel("largest torque at release, N m")
-        axes.set_ylabel("frequency over that without gaps")
-        axes.set_title(f"{found.chain.name}: free vibration with gaps, mode {found.mode}")
-        axes.legend()
-    return figure
-
-
-def response_figure(found: ForcedResponse, mass: str | int) -> Any:
-    """The amplitude of one mass against the frequency, with gaps and without."""
-    index = found.chain.index(mass)
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        with_gaps = f"with gaps, {found.locking:g} N m constant"
-        axes.plot(found.frequency, found.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
-        axes.plot(found.frequency, found.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
-        axes.set_xlabel("frequency of the exciting torque, rad/s")
-        axes.set_ylabel("amplitude, rad")
-        axes.set_title(f"{found.chain.name}: forced response of {found.chain.masses[index].name}")
-        axes.legend()
-    return figure

@@ -61,8 +61,6 @@ def test_without_gaps_each_mode_keeps_its_frequency() -> None:
     for mode in (1, 2):
         found = chain_backbone(chain, [0.1, 10.0], mode)
         assert found.frequency == pytest.approx(natural_vibration(chain).Omega[mode], rel=1e-5)
-    assert len(found.plot().axes) == 1
-    assert found.summary()["mode"] == 2
 
 
 def test_bad_questions_are_refused() -> None:

@@ -80,9 +80,3 @@ def test_bad_questions_are_refused_together() -> None:
         forced_response(partly, 1.0, {0: 1.0})
     with pytest.raises(InputError, match="one is rigid"):
         forced_response(Chain([Mass(1, damping=1), Mass(2)], [Shaft("inf")]), 1.0, {0: 1.0})
-
-
-def test_it_is_drawn_and_told() -> None:
-    found = forced_response(TWO, [10.0, 15.0], {"mass 1": 1.0})
-    assert len(found.plot("mass 2").axes[0].lines) == 2
-    assert found.summary()["amplitude"] == found.amplitude.tolist()

@@ -3,7 +3,7 @@
 import pytest
 
 from softstart import InputError, SimulationError, plugins
-from softstart import study as studies
+from softstart.cli import lists
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study
 from softstart.views.drawing import new_figure
 
@@ -60,7 +60,7 @@ def registered(monkeypatch):
         "broken": Point(ImportError("No module named 'nothing'")),
         "strange": Point(int),
     }
-    monkeypatch.setattr(studies, "registered", lambda group: points)
+    monkeypatch.setattr(lists, "registered", lambda group: points)
     monkeypatch.setattr(plugins, "registered", lambda group: points)
 
 
