@@ -477,12 +477,6 @@ def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float
     return w1, z, w2, u
 
 
-@inner
-def raised(p: Parameters, m: State, full: float) -> float:
-    """The torque where the contact cannot be seen, or was waited for in vain: a ramp from the last one."""
-    return min(m.sent[0] + p.raising, full)
-
-
 def certainty_parameter() -> Any:
     """`certainty` as a field of a controller."""
     return parameter(

@@ -6,79 +6,59 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
+from softstart.controller import compiled_step, parameter
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
-from softstart_controllers import contact, landing
-from softstart_controllers.contact import ahead, observe, raised, send, watching
-from softstart_controllers.landing import ROOM, approach, approach_speed_parameter, landing_numbers
+from softstart_controllers import landing
+from softstart_controllers.contact import ahead
+from softstart_controllers.landing import CLOSED, ROOM, Landing, landed, sent
 from softstart_controllers.reduced import reduced_torque_parameter
-from softstart_controllers.sampled import full_torque_parameter, patience_parameter, period_parameter
 
 DAMPING_RATIO = 0.7
 SLEWED_SHARE = 0.25  # of Ms
 PHASE_LEFT = math.pi / 6  # phase margin that the delays must leave
-GAP_OPEN, CLOSED, IMPATIENT = 0.0, 1.0, 2.0  # phases
 
 
 class Parameters:
-    """Estimator, landing, and the limit with its feedback."""
+    """The landing, and the limit with its feedback."""
 
-    watch: contact.Parameters
     landing: landing.Parameters
-    low_torque: float
-    full_torque: float
     feedback: float
     rise: float
-    patience: float
 
 
 class State:
-    """The estimate, and how far the limit has risen."""
+    """The landing, and how far the limit has risen."""
 
-    watch: contact.State
-    sample: float
-    phase: float
+    landing: landing.State
     progress: float
 
 
-PARAMETERS = record(Parameters, watch=contact.PARAMETERS, landing=landing.PARAMETERS)
-STATE = record(State, watch=contact.STATE)
-COMMAND = record(Answer, State, watch=contact.STATE)
+PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
+STATE = record(State, landing=landing.STATE)
+COMMAND = record(Answer, State, landing=landing.STATE)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Close the gap at the approach speed; from contact on the limit rises, less the feedback of T'."""
+    """Land at the approach speed; from contact on the limit rises, less the feedback of T'."""
     p = named(parameters, PARAMETERS)
     m = named(measured, MEASURED)
     y = named(command, COMMAND)
     keep_state(state, command)
-    watch = y.watch
-    t, u = m.time, m.motor_torque
-    if y.phase != IMPATIENT:
-        observe(p.watch, watch, t, u, m.motor_angle, m.motor_speed, 1.0)
-        y.phase = CLOSED if watch.closed != 0.0 else GAP_OPEN
-    if p.landing.blind != 0.0 or t >= p.patience:
-        y.phase = IMPATIENT
-
-    if y.phase == IMPATIENT:
-        y.torque = raised(p.watch, watch, p.full_torque)
-    elif y.phase == GAP_OPEN:
-        y.torque = approach(p.landing, p.watch, watch, t)
-    else:
-        w1, _, w2, _ = ahead(p.watch, watch, u)
-        limit = p.low_torque + (ROOM * p.full_torque - p.low_torque) * y.progress
-        y.torque = min(max(limit - p.feedback * (w1 - w2), 0.0), p.full_torque)
-        if watch.held == 0.0:  # else the limit waits for the brake
+    near, now = p.landing, y.landing
+    y.torque = landed(near, now, m)
+    if now.phase == CLOSED:
+        w1, _, w2, _ = ahead(near.watch, now.watch, m.motor_torque)
+        limit = near.low_torque + (ROOM * near.full_torque - near.low_torque) * y.progress
+        y.torque = min(max(limit - p.feedback * (w1 - w2), 0.0), near.full_torque)
+        if now.watch.held == 0.0:  # else the limit waits for the brake
             y.progress = min(1.0, y.progress + p.rise)
-    y.sample += 1.0
-    y.ask_again = y.sample * p.watch.period
-    send(p.watch, watch, y.torque, u)
+    y.ask_again = sent(near, now, y.torque, m.motor_torque)
 
 
 @dataclass(frozen=True)
-class CurrentLimitFeedback(CompiledController):
+class CurrentLimitFeedback(Landing):
     """Torque limit with a derivative ("flexible") feedback of the estimated shaft torque.
 
     It measures the motor angle (encoder) and the motor torque. The gap is nowhere among its numbers.
@@ -103,9 +83,6 @@ class CurrentLimitFeedback(CompiledController):
     kept there by zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). A drive whose torque is too slow for its
     elastic frequency so gets no feedback, but the soft approach and the rise all the same.
 
-    An encoder count above a tenth of Ms/c shows the contact too late: then the torque is raised in a ramp,
-    and so it is after `patience`.
-
     Source: [G], conclusions ("regulators acting on the current-limit level or as a flexible feedback").
 
     >>> from softstart import Drive, simulate
@@ -119,14 +96,20 @@ class CurrentLimitFeedback(CompiledController):
         "low limit while the gap is open, then a limit with feedback of the estimated dT/dt"
     )
     source: ClassVar[str] = "[G]"
-    effort: ClassVar[Effort | None] = Effort.ENCODER
+    impact: ClassVar[float] = 0.85
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
     low_torque: float | None = reduced_torque_parameter("torque limit while the gap is open", "0 or more")
-    approach_speed: float | None = approach_speed_parameter("0.85", lambda p: 0.85)
-    full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
+    approach_speed: float | None = parameter(
+        "rad/s",
+        "speed at which the gap is closed",
+        "c dw12/Omega = 0.85 of the mean shaft torque under the full torque",
+        value=landing.approach_speed,
+        rule="above 0",
+        multiples=(0.3, 3.0),
+    )
     rise: float | None = parameter(
         "s",
         "time in which the limit rises after contact",
@@ -143,20 +126,12 @@ class CurrentLimitFeedback(CompiledController):
         rule="0 or more",
         between=(0.0, 1.5),
     )
-    certainty: float | None = contact.certainty_parameter()
-    uncertainty: float | None = contact.uncertainty_parameter()
-    patience: float | None = patience_parameter()
-    period: float | None = period_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
-        """Estimator, landing, feedback, and the rise in a sample."""
+        """Landing, feedback, and the rise in a sample."""
         p: Any = self  # fitted: every parameter is a number
-        return {
-            "watch": watching(drive, p, p.approach_speed),
-            "landing": landing_numbers(drive, p),
-            "feedback": 2.0 * p.damping_ratio * drive.J1 * drive.Omega,
-            "rise": p.period / max(p.rise, p.period),
-        }
+        feedback = 2.0 * p.damping_ratio * drive.J1 * drive.Omega
+        return super().numbers(drive) | {"feedback": feedback, "rise": p.period / max(p.rise, p.period)}
 
 
 def damping_ratio(drive: Drive, period: float) -> float:

@@ -1,51 +1,89 @@
-"""Closing the gap softly: what `shaped` and `state-feedback` share.
+"""Closing the gap softly: what `current-limit-feedback`, `shaped` and `state-feedback` share.
 
 The motor takes up `approach_speed` relative to the load and keeps it,
 
     u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag + computing delay)), 0, low_torque)
 
 The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the
-approach speed, no further), and after a contact as estimated (`contact`).
+approach speed, no further), and after a contact as estimated (`contact`). From contact on the strategy itself
+sets the torque. Where an encoder count above a tenth of Ms/c, or a torque later than 2 sqrt(J1/c), shows the
+contact too late, and after `patience`, the torque is raised in a ramp.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from softstart.controller import parameter
+from softstart.controller import CompiledController, Effort, parameter
 from softstart.controller.compiled import inner, record
 from softstart.drive import Drive
 from softstart_controllers import contact
 from softstart_controllers.reduced import load_drift
-from softstart_controllers.sampled import pulling_load
+from softstart_controllers.sampled import (
+    full_torque_parameter,
+    patience_parameter,
+    period_parameter,
+    pulling_load,
+)
 
 COARSE = 0.1  # of Ms/c: with larger counts the contact is over before it is seen
 SLOW = 2.0  # sqrt(J1/c): with a torque later than this no feedback comes in time
 ROOM = 0.99  # of the full torque, to which a feedback raises it: below its limit it can act both ways
 LOW_TORQUE_SHARE = 0.5  # of the accelerating torque
 
+# phases; those of a strategy follow
+GAP_OPEN, CLOSED, RAISING, NEXT = 0.0, 1.0, 2.0, 3.0
+
 
 class Parameters:
-    """What `landing_numbers` gives."""
+    """Estimator and limits; `approach` is the speed, `drift` the slowing down of the load."""
 
-    low: float
+    watch: contact.Parameters
+    low_torque: float
+    full_torque: float
     approach: float
     horizon: float
     drift: float
+    patience: float
     blind: float
 
 
-PARAMETERS = record(Parameters)
+class State:
+    """The estimate, and how far the landing is."""
+
+    watch: contact.State
+    sample: float
+    phase: float
+
+
+PARAMETERS = record(Parameters, watch=contact.PARAMETERS)
+STATE = record(State, watch=contact.STATE)
 
 
 @inner
-def approach(p: Parameters, near: contact.Parameters, x: contact.State, t: float) -> float:
-    """The torque that closes the gap, within 0 and the low torque."""
-    allowed = x.load_speed + p.approach
-    if x.load_time == 0.0:  # never less than half: a contact not seen must not let the load run back
-        allowed -= min(p.drift * t, 0.5 * p.approach)
-    return min(max((allowed - x.now.speed) / (near.a * p.horizon), 0.0), p.low)
+def landed(p: Parameters, x: State, m: Any) -> float:
+    """See a sample and tell the phase; the torque while the gap is open, or where nothing can be seen."""
+    watch = x.watch
+    if x.phase <= CLOSED:
+        contact.observe(p.watch, watch, m.time, m.motor_torque, m.motor_angle, m.motor_speed, 1.0)
+        x.phase = CLOSED if watch.closed != 0.0 else GAP_OPEN
+        if p.blind != 0.0 or m.time >= p.patience:
+            x.phase = RAISING
+    if x.phase == RAISING:
+        return min(watch.sent[0] + p.watch.raising, p.full_torque)
+    allowed = watch.load_speed + p.approach
+    if watch.load_time == 0.0:  # never less than half: a contact not seen must not let the load run back
+        allowed -= min(p.drift * m.time, 0.5 * p.approach)
+    return min(max((allowed - watch.now.speed) / (p.watch.a * p.horizon), 0.0), p.low_torque)
+
+
+@inner
+def sent(p: Parameters, x: State, torque: float, u: float) -> float:
+    """Keep what this sample demands; the instant of the next one."""
+    contact.send(p.watch, x.watch, torque, u)
+    x.sample += 1.0
+    return x.sample * p.watch.period
 
 
 def shaft_torque_under(drive: Drive, torque: Any) -> float:
@@ -58,46 +96,57 @@ def shaft_torque_under(drive: Drive, torque: Any) -> float:
     return under
 
 
-def horizon(drive: Drive, period: float) -> float:
-    """Time in s in which the speed control takes the motor to its speed."""
-    return 2.0 * (period + drive.torque_lag + drive.computing_delay)
+def low_torque(drive: Drive, p: Any) -> float:
+    """Load torque plus half the accelerating torque, in N m."""
+    held = pulling_load(drive)
+    return held + LOW_TORQUE_SHARE * (drive.Ms - held)
 
 
-def landing_numbers(drive: Drive, p: Any) -> dict[str, float]:
-    """The numbers of `Parameters`, for a controller with its parameters."""
-    return {
-        "low": p.low_torque,
-        "approach": p.approach_speed,
-        "horizon": horizon(drive, p.period),
-        "drift": load_drift(drive),
-        "blind": contact.blind(drive, COARSE, SLOW) and not contact.hanging(drive)[0],
-    }
+def approach_speed(drive: Drive, p: Any) -> float:
+    """Speed in rad/s of which the impact alone swings the shaft to the share `impact` of the full torque."""
+    return drive.Omega * p.impact * shaft_torque_under(drive, p.full_torque) / drive.c
 
 
-def low_torque_parameter() -> Any:
-    """`low_torque` as a field of a controller."""
+@dataclass(frozen=True)
+class Landing(CompiledController):
+    """A strategy that lands softly. `impact` is c dw12/Omega over the shaft torque under the full torque."""
 
-    def value(drive: Drive, p: Any) -> float:
-        held = pulling_load(drive)
-        return held + LOW_TORQUE_SHARE * (drive.Ms - held)
+    effort: ClassVar[Effort | None] = Effort.ENCODER
+    impact: ClassVar[float] = 0.7
 
-    return parameter(
+    low_torque: float | None = parameter(
         "N*m",
         "torque limit while the gap is open",
         "load torque plus half the accelerating torque",
-        value=value,
+        value=low_torque,
         rule="above 0",
         multiples=(0.3, 2.0),
     )
-
-
-def approach_speed_parameter(share: str, impact: Callable[[Any], float]) -> Any:
-    """`approach_speed` as a field of a controller: of which the impact makes a share of the full torque."""
-    return parameter(
+    approach_speed: float | None = parameter(
         "rad/s",
         "speed at which the gap is closed",
-        f"c dw12/Omega = {share} of the mean shaft torque under the full torque",
-        value=lambda drive, p: drive.Omega * impact(p) * shaft_torque_under(drive, p.full_torque) / drive.c,
+        "c dw12/Omega = 0.7 of the mean shaft torque under the full torque",
+        value=approach_speed,
         rule="above 0",
         multiples=(0.3, 3.0),
     )
+    full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
+    certainty: float | None = contact.certainty_parameter()
+    uncertainty: float | None = contact.uncertainty_parameter()
+    patience: float | None = patience_parameter()
+    period: float | None = period_parameter()
+
+    def numbers(self, drive: Drive) -> dict[str, Any]:
+        """The numbers of `Parameters` as `landing`."""
+        p: Any = self  # fitted: every parameter is a number
+        landing = {
+            "watch": contact.watching(drive, p, p.approach_speed),
+            "low_torque": p.low_torque,
+            "full_torque": p.full_torque,
+            "approach": p.approach_speed,
+            "horizon": 2.0 * (p.period + drive.torque_lag + drive.computing_delay),
+            "drift": load_drift(drive),
+            "patience": p.patience,
+            "blind": contact.blind(drive, COARSE, SLOW) and not contact.hanging(drive)[0],
+        }
+        return {"landing": landing}

@@ -6,46 +6,40 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
+from softstart.controller import compiled_step, parameter
 from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, named, record, size
 from softstart.drive import Drive
-from softstart_controllers import contact, landing
-from softstart_controllers.contact import ahead, observe, raised, send, watching
-from softstart_controllers.landing import approach, landing_numbers
-from softstart_controllers.sampled import full_torque_parameter, patience_parameter, period_parameter
+from softstart_controllers import landing
+from softstart_controllers.contact import ahead
+from softstart_controllers.landing import CLOSED, NEXT, RAISING, Landing, landed, sent
 from softstart_controllers.shaping import ZV, ZVD, plan, sensitivity, vector
 
 SHAPERS = {"zv": ZV, "zvd": ZVD}
 IMPACT = {"zv": 0.7, "zvd": 0.3}  # c dw12/Omega, of the shaft torque under the full torque
 BRAKING = 4.0  # of T'/Omega, that the mean torque stays below T while no steps are found
 LARGEST_DAMPING = 0.95  # damping ratio that the plan may have
-GAP_OPEN, SWINGING, STEPPING, IMPATIENT, DONE = 0.0, 1.0, 2.0, 3.0, 4.0  # phases
+STEPPING, DONE = NEXT, NEXT + 1.0  # phases after those of the landing
 
 
 class Parameters:
     """The landing and the steps."""
 
-    watch: contact.Parameters
     landing: landing.Parameters
     order: float
-    full_torque: float
-    patience: float
 
 
 class State:
-    """The estimate and the planned steps: levels of so many samples each, from the sample `first` on."""
+    """The landing and the planned steps: levels of so many samples each, from the sample `first` on."""
 
-    watch: contact.State
-    sample: float
-    phase: float
+    landing: landing.State
     first: float
     samples: float
     levels: Vector
 
 
-PARAMETERS = record(Parameters, watch=contact.PARAMETERS, landing=landing.PARAMETERS)
-STATE = record(State, watch=contact.STATE, levels=4)
-COMMAND = record(Answer, State, watch=contact.STATE, levels=4)
+PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
+STATE = record(State, landing=landing.STATE, levels=4)
+COMMAND = record(Answer, State, landing=landing.STATE, levels=4)
 
 
 @compiled
@@ -54,26 +48,28 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
 
     With M = (u J2 + Mc J1)/(J1 + J2), the mean torque of the shaft under the motor torque u.
     """
-    near, shaft = p.watch, y.watch.shaft
+    near, shaft = p.landing.watch, y.landing.watch.shaft
     a, b, c, d = near.a, shaft.b, near.c, near.d
-    w1, z, w2, u = ahead(near, y.watch, u)
+    w1, z, w2, u = ahead(near, y.landing.watch, u)
+    if y.landing.watch.held != 0.0:  # by the brake, under the torque that holds the load
+        return p.landing.low_torque
     if near.reactive != 0.0 and w2 == 0.0 and c * z + d * w1 <= near.Mc:
-        return p.landing.low  # until the load breaks away
+        return p.landing.low_torque  # until the load breaks away
     share, load = a / (a + b), near.Mc * b / (a + b)
     Omega = math.sqrt(c * (a + b))
     ratio = min(0.5 * d * Omega / c, LARGEST_DAMPING)
     sigma, omega = -ratio * Omega, Omega * math.sqrt(1.0 - ratio * ratio)
     level = share * u + load
     rate = w1 - w2
-    W = vector(z, rate, c, sigma, omega, p.watch.lag, level)
-    D = sensitivity(rate, c * z, 1.0 / (a + b), sigma, omega, p.watch.lag, level)
-    full = share * p.full_torque + load
+    W = vector(z, rate, c, sigma, omega, near.lag, level)
+    D = sensitivity(rate, c * z, 1.0 / (a + b), sigma, omega, near.lag, level)
+    full = share * p.landing.full_torque + load
     n, M0, M1, M2, M3 = plan(int(p.order), W, D, max(0.0, load), full, sigma, omega, near.period)
     if n == 0:
         mean = c * (z - BRAKING * rate / Omega)
-        return min(max((mean - load) / share, 0.0), p.full_torque)
-    y.phase = STEPPING
-    y.first, y.samples = y.sample, n
+        return min(max((mean - load) / share, 0.0), p.landing.full_torque)
+    y.landing.phase = STEPPING
+    y.first, y.samples = y.landing.sample, n
     y.levels[0] = max((M0 - load) / share, 0.0)
     y.levels[1] = max((M1 - load) / share, 0.0)
     y.levels[2] = max((M2 - load) / share, 0.0)
@@ -83,39 +79,30 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Close the gap, follow the swing, plan the steps once, play them."""
+    """Land, follow the swing, plan the steps once, play them."""
     p = named(parameters, PARAMETERS)
     m = named(measured, MEASURED)
     y = named(command, COMMAND)
     keep_state(state, command)
-    watch = y.watch
-    t, u = m.time, m.motor_torque
-    if y.phase <= SWINGING:
-        observe(p.watch, watch, t, u, m.motor_angle, m.motor_speed, 1.0)
-        y.phase = SWINGING if watch.closed != 0.0 else GAP_OPEN
-    y.torque = p.full_torque
-    if y.phase == STEPPING:
-        level = int((y.sample - y.first) / y.samples)
+    near, now = p.landing, y.landing
+    y.torque = landed(near, now, m)
+    if now.phase == CLOSED:
+        y.torque = torque_after_contact(p, m.motor_torque, y)
+    elif now.phase == RAISING and y.torque == near.full_torque:
+        now.phase = DONE
+    elif now.phase == STEPPING:
+        level = int((now.sample - y.first) / y.samples)
         if level < int(p.order):
             y.torque = y.levels[level]
         else:
-            y.phase = DONE
-    elif y.phase == IMPATIENT or p.landing.blind != 0.0 or t >= p.patience:
-        y.torque = raised(p.watch, watch, p.full_torque)
-        y.phase = IMPATIENT if y.torque < p.full_torque else DONE
-    elif y.phase == GAP_OPEN:
-        y.torque = approach(p.landing, p.watch, watch, t)
-    elif watch.held != 0.0:  # by the brake, under the torque that holds the load
-        y.torque = p.landing.low
-    elif y.phase == SWINGING:
-        y.torque = torque_after_contact(p, u, y)
-    y.sample += 1.0
-    y.ask_again = math.inf if y.phase == DONE else y.sample * p.watch.period
-    send(p.watch, watch, y.torque, u)
+            y.torque = near.full_torque
+            now.phase = DONE
+    next_sample = sent(near, now, y.torque, m.motor_torque)
+    y.ask_again = math.inf if now.phase == DONE else next_sample
 
 
 @dataclass(frozen=True)
-class Shaped(CompiledController):
+class Shaped(Landing):
     """Soft landing, then the torque raised in steps that leave no swing in the shaft.
 
     It measures the motor angle (encoder) and the motor torque. The gap is nowhere among its numbers.
@@ -145,9 +132,7 @@ class Shaped(CompiledController):
 
     *Limits.* The steps are played without looking: inertias, load torque and elastic `frequency` are those
     of the nominal drive (J2 as far as it has shown until then). A first-order lag of the torque commutes
-    with the shaper, and is allowed for, and so is a dead time. A limited torque rate is not. An encoder
-    count above a tenth of Ms/c shows the contact too late: then the torque is raised in a ramp, and so it
-    is after `patience`.
+    with the shaper, and is allowed for, and so is a dead time. A limited torque rate is not.
 
     Source: posicast of Smith (1957), ZV and ZVD of Singer and Seering (1990), with the state at contact.
 
@@ -160,17 +145,19 @@ class Shaped(CompiledController):
     name: ClassVar[str] = "shaped"
     summary: ClassVar[str] = "soft landing, then torque steps that leave no swing in the shaft (ZV, ZVD)"
     source: ClassVar[str] = "Smith 1957, Singer and Seering 1990"
-    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
     shaper: str | None = parameter("", "zv or zvd", "zv", "text", value="zv", choices=tuple(SHAPERS))
-    low_torque: float | None = landing.low_torque_parameter()
-    approach_speed: float | None = landing.approach_speed_parameter(
-        "0.7 (zv) or 0.3 (zvd)", lambda p: IMPACT[p.shaper]
+    approach_speed: float | None = parameter(
+        "rad/s",
+        "speed at which the gap is closed",
+        "c dw12/Omega = 0.7 (zv) or 0.3 (zvd) of the mean shaft torque under the full torque",
+        value=landing.approach_speed,
+        rule="above 0",
+        multiples=(0.3, 3.0),
     )
-    full_torque: float | None = full_torque_parameter("torque after the last step", "above 0")
     frequency: float | None = parameter(
         "rad/s",
         "undamped elastic frequency of the model",
@@ -179,19 +166,15 @@ class Shaped(CompiledController):
         rule="above 0",
         multiples=(0.7, 1.4),
     )
-    certainty: float | None = contact.certainty_parameter()
-    uncertainty: float | None = contact.uncertainty_parameter()
-    patience: float | None = patience_parameter("longest wait for contact and plan")
-    period: float | None = period_parameter()
+
+    @property
+    def impact(self) -> float:  # type: ignore[override]
+        """C dw12/Omega, of the shaft torque under the full torque."""
+        return IMPACT[self.shaper or "zv"]
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
-        """Estimator with the stiffness that has this frequency, landing, and steps."""
+        """Landing, with the stiffness that has this frequency, and steps."""
         p: Any = self  # fitted: every parameter is a number
-        ratio = drive.J2 / drive.J1
-        watch = watching(drive, p, p.approach_speed)
-        watch["c"] = drive.J2 / (1.0 + ratio) * p.frequency**2
-        return {
-            "watch": watch,
-            "landing": landing_numbers(drive, p),
-            "order": SHAPERS[p.shaper],
-        }
+        numbers = super().numbers(drive)
+        numbers["landing"]["watch"]["c"] = drive.J1 * drive.J2 / (drive.J1 + drive.J2) * p.frequency**2
+        return numbers | {"order": SHAPERS[p.shaper]}

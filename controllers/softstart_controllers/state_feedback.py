@@ -6,95 +6,75 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
+from softstart.controller import compiled_step, parameter
 from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, named, record, size
 from softstart.drive import Drive
-from softstart_controllers import contact, landing
-from softstart_controllers.contact import ahead, observe, raised, send, watching
-from softstart_controllers.landing import ROOM, approach, landing_numbers
+from softstart_controllers import landing
+from softstart_controllers.contact import ahead
+from softstart_controllers.landing import CLOSED, ROOM, Landing, landed, sent
 from softstart_controllers.regulator import feedback_gains
-from softstart_controllers.sampled import full_torque_parameter, patience_parameter, period_parameter
 
 SLEWED_SHARE = 0.25  # of Ms
 LARGEST_DAMPING = 0.95  # damping ratio that the design may have
-GAP_OPEN, CLOSED, IMPATIENT = 0.0, 1.0, 2.0  # phases
 
 
 class Parameters:
-    """The landing, the weights f of the feedback, and how a load hangs at first."""
+    """The landing, and the weights f of the feedback."""
 
-    watch: contact.Parameters
     landing: landing.Parameters
-    full_torque: float
-    low_torque: float
     rise: float
     f_twist: float
     f_rate: float
     f_torque: float
-    patience: float
 
 
 class State:
-    """The estimate and the reference."""
+    """The landing, and how far the reference has risen."""
 
-    watch: contact.State
-    sample: float
-    phase: float
+    landing: landing.State
     progress: float
 
 
-PARAMETERS = record(Parameters, watch=contact.PARAMETERS, landing=landing.PARAMETERS)
-STATE = record(State, watch=contact.STATE)
-COMMAND = record(Answer, State, watch=contact.STATE)
+PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
+STATE = record(State, landing=landing.STATE)
+COMMAND = record(Answer, State, landing=landing.STATE)
 
 
 @compiled
 def feedback(p: Parameters, u: float, y: State) -> float:
     """The torque that the feedback asks for, within 0 and the full torque; raises the reference."""
-    near, shaft = p.watch, y.watch.shaft
+    watch = y.landing.watch
+    near, shaft = p.landing.watch, watch.shaft
     a, b, c = near.a, shaft.b, near.c
-    w1, z, w2, u = ahead(near, y.watch, u)
+    w1, z, w2, u = ahead(near, watch, u)
     share, load = a / (a + b), near.Mc * b / (a + b)  # of the motor torque, in the mean torque of the shaft
     Omega = math.sqrt(c * (a + b))
-    low, full = share * p.low_torque + load, share * ROOM * p.full_torque + load
+    low, full = share * p.landing.low_torque + load, share * ROOM * p.landing.full_torque + load
     reference = low + (full - low) * y.progress
     rate = (full - low) / p.rise if y.progress < 1.0 else 0.0
-    if y.watch.held == 0.0:  # else the reference waits for the brake
+    if watch.held == 0.0:  # else the reference waits for the brake
         y.progress = min(1.0, y.progress + near.period / p.rise)
     mean = reference + near.d / c * rate - p.f_twist * (c * z - reference)
     mean -= p.f_rate * (c * (w1 - w2) - rate) / Omega
     mean -= p.f_torque * (share * u + load - reference)
-    return min(max((mean - load) / share, 0.0), p.full_torque)
+    return min(max((mean - load) / share, 0.0), p.landing.full_torque)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Close the gap; from contact on estimate the state and feed it back."""
+    """Land; from contact on estimate the state and feed it back."""
     p = named(parameters, PARAMETERS)
     m = named(measured, MEASURED)
     y = named(command, COMMAND)
     keep_state(state, command)
-    watch = y.watch
-    t, u = m.time, m.motor_torque
-    if y.phase != IMPATIENT:
-        observe(p.watch, watch, t, u, m.motor_angle, m.motor_speed, 1.0)
-        y.phase = CLOSED if watch.closed != 0.0 else GAP_OPEN
-    if p.landing.blind != 0.0 or t >= p.patience:
-        y.phase = IMPATIENT
-
-    if y.phase == IMPATIENT:
-        y.torque = raised(p.watch, watch, p.full_torque)
-    elif y.phase == GAP_OPEN:
-        y.torque = approach(p.landing, p.watch, watch, t)
-    else:
-        y.torque = feedback(p, u, y)
-    y.sample += 1.0
-    y.ask_again = y.sample * p.watch.period
-    send(p.watch, watch, y.torque, u)
+    y.torque = landed(p.landing, y.landing, m)
+    if y.landing.phase == CLOSED:
+        y.torque = feedback(p, m.motor_torque, y)
+    y.ask_again = sent(p.landing, y.landing, y.torque, m.motor_torque)
 
 
 @dataclass(frozen=True)
-class StateFeedback(CompiledController):
+class StateFeedback(Landing):
     """Soft landing, then a linear-quadratic regulator of the shaft torque on a Kalman filter.
 
     It measures the motor angle (encoder) and the motor torque. The gap is nowhere among its numbers.
@@ -122,8 +102,7 @@ class StateFeedback(CompiledController):
     reference until the brake has let the motor go. Else the start position is nowhere among its numbers.
 
     *Limits.* Designs are made for groups without units on a grid (`regulator`), so neighbouring weights may
-    give the same start. Where the flanks part again, the gap is closed again. An encoder count above a tenth
-    of Ms/c shows the contact too late: then the torque is raised in a ramp, and so it is after `patience`.
+    give the same start. Where the flanks part again, the gap is closed again.
 
     Source: linear-quadratic-Gaussian control as in the manual of python-control; landing as `shaped`.
 
@@ -136,14 +115,10 @@ class StateFeedback(CompiledController):
     name: ClassVar[str] = "state-feedback"
     summary: ClassVar[str] = "soft landing, then LQR of the shaft torque on a Kalman filter"
     source: ClassVar[str] = "LQG, python-control"
-    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    low_torque: float | None = landing.low_torque_parameter()
-    approach_speed: float | None = landing.approach_speed_parameter("0.7", lambda p: 0.7)
-    full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
     rise: float | None = parameter(
         "s",
         "time in which the reference rises after contact",
@@ -168,13 +143,9 @@ class StateFeedback(CompiledController):
         rule="above 0",
         multiples=(0.03, 30.0),
     )
-    certainty: float | None = contact.certainty_parameter()
-    uncertainty: float | None = contact.uncertainty_parameter()
-    patience: float | None = patience_parameter()
-    period: float | None = period_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
-        """Estimator, landing, gains, and how a load hangs at first."""
+        """Landing, rise, and gains."""
         p: Any = self  # fitted: every parameter is a number
         ratio = min(0.5 * drive.d * drive.Omega / drive.c, LARGEST_DAMPING)
         lag = drive.torque_lag + SLEWED_SHARE * drive.Ms / drive.torque_rate
@@ -182,9 +153,7 @@ class StateFeedback(CompiledController):
         f_twist, f_rate, f_torque = feedback_gains(
             step, ratio, drive.Omega * lag, p.torque_weight, p.rate_weight
         )
-        return {
-            "watch": watching(drive, p, p.approach_speed),
-            "landing": landing_numbers(drive, p),
+        return super().numbers(drive) | {
             "rise": max(p.rise, p.period),
             "f_twist": f_twist,
             "f_rate": f_rate,

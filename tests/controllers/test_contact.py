@@ -45,7 +45,7 @@ def crane(gap: float, J2: float, lag: float, kind: Any) -> Drive:
 
 def seen(states: Any, trace: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
     """A column of the estimate."""
-    return trace[:, 1 + index(states, f"watch.{name}")]
+    return trace[:, 1 + index(states, f"landing.watch.{name}")]
 
 
 # the filters ---------------------------------------------------------------------------------------------
@@ -269,7 +269,7 @@ def test_looks_ahead_by_dead_time_and_lag(dead: float, lag: float, seed: int) ->
     )  # fmt: skip
     run = simulate(drive, Profile(profile=profile), until=0.03)
     numbers = Shaped().fitted(drive).vector(drive)
-    p = numbers.view(shaped.PARAMETERS)[0].watch
+    p = numbers.view(shaped.PARAMETERS)[0].landing.watch
     m = np.zeros(size(contact.STATE)).view(contact.STATE)[0]
     now = 9 * h
     at = run.at([now, now + dead])
