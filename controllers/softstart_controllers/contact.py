@@ -569,7 +569,7 @@ def hanging(drive: Drive) -> tuple[float, float, float]:
     return T / drive.c, 0.0, drive.release_time
 
 
-def blind(drive: Drive, coarse: float, slow: float) -> bool:
+def blind(drive: Drive, coarse: float, slow: float = math.inf) -> bool:
     """Whether a contact cannot be answered in time.
 
     The encoder's count is above the share `coarse` of Ms/c, or the torque (dead time, lag, half the slewing

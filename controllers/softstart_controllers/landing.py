@@ -5,9 +5,9 @@ The motor takes up `approach_speed` relative to the load and keeps it,
     u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag + computing delay)), 0, low_torque)
 
 The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the
-approach speed, no further), and after a contact as estimated (`contact`). From contact on the strategy itself
-sets the torque. Where an encoder count above a tenth of Ms/c, or a torque later than 2 sqrt(J1/c), shows the
-contact too late, and after `patience`, the torque is raised in a ramp.
+approach speed, no further), and after a contact as estimated (`contact`). From contact on the strategy
+itself sets the torque. Where an encoder count above a tenth of Ms/c shows the contact too late, and after
+`patience`, the torque is raised in a ramp.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from softstart_controllers.sampled import (
 )
 
 COARSE = 0.1  # of Ms/c: with larger counts the contact is over before it is seen
-SLOW = 2.0  # sqrt(J1/c): with a torque later than this no feedback comes in time
 ROOM = 0.99  # of the full torque, to which a feedback raises it: below its limit it can act both ways
 LOW_TORQUE_SHARE = 0.5  # of the accelerating torque
 
@@ -147,6 +146,6 @@ class Landing(CompiledController):
             "horizon": 2.0 * (p.period + drive.torque_lag + drive.computing_delay),
             "drift": load_drift(drive),
             "patience": p.patience,
-            "blind": contact.blind(drive, COARSE, SLOW) and not contact.hanging(drive)[0],
+            "blind": contact.blind(drive, COARSE) and not contact.hanging(drive)[0],
         }
         return {"landing": landing}
