@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import Engine
+from softstart.balancing.engine import shaking_of_shafts
 from softstart.study import find_study
 from softstart_studies.paper_b import PaperB, orders, tables, vaz, verdicts
 from softstart_studies.paper_b.vaz import MOMENTS, RPM, SPEEDS, TUNING, VAZ, balanced, first_order
@@ -39,6 +40,9 @@ def test_verdicts(study):
     for claim, (begin, verdict) in zip(claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(begin)
         assert claim.verdict.value == verdict, claim.evidence
+    # M_b equal in amplitude, |M| sin(phi): of A cos + B sin the part A cos + (B - |M|) sin stays
+    first = VAZ.torque_harmonics(TUNING * RPM)[2]
+    assert f"in amplitude instead, {abs(first + 1j * abs(first)):.1f})" in claims[6].evidence
 
 
 def test_result_is_complete_and_plain(study):
@@ -106,9 +110,8 @@ def test_an_arm_for_full_load_is_wrong_at_others():
         assert left > without
     # by the shafts themselves, at load 0
     found = balanced(load=1.0)
-    pair = found.shafts("variable-h-e")
-    w = TUNING * RPM
-    left = -VAZ.torque_harmonics(w, 0.0)[2] + w**2 * VAZ.shaft_shaking(pair)[2][1]
+    w, moment = TUNING * RPM, shaking_of_shafts(found.residual("variable-h-e").shafts)[2]
+    left = -VAZ.torque_harmonics(w, 0.0)[2] + w**2 * moment[2]
     assert vaz.left_at_load(0.0, TUNING, sideways=True)[1] == pytest.approx(abs(left), rel=1e-12)
 
 
