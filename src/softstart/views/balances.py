@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 STEPS = 1440  # of the torque over the cycle: half degrees
 COUPLED = "couple-shaft", "two-couple-shafts"  # designs for the couple
 BARS = 6.0  # highest order in the bar chart
-OVER_SPEED = (  # what is drawn over the speed, where it is known and not 0; its column and scale
+OVER_SPEED = (  # what is drawn over the speed, a height if there are any, a couple if it is not 0
     ("moment of first order\non the housing, N m", "first_order_moment", 1.0),
     ("height |h| of the shafts\nfrom the crank, mm", "height", 1e3),
     ("largest force\non the housing, kN", "force", 1e-3),
@@ -245,7 +245,7 @@ def residual_figure(found: Balance) -> Any:
             for i, one in enumerate(found.residuals)
             if (values := one.columns[key]) is not None and not (key == "height" and one.name.endswith("-e"))
         ]
-        if any(np.any(values > 0.0) for *_, values in curves):
+        if (key != "first_order_couple" and curves) or any(np.any(values > 0.0) for *_, values in curves):
             shown[up] = curves
     with drawing():
         figure, panels = new_figure(len(shown), 1, (8.0, 3.1 * len(shown)), sharex=True)

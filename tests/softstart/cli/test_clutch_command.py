@@ -64,7 +64,7 @@ ONE_SENTENCE = {
     "points alone": (["--points", "3"], ['--points = "3"', "add --optimal"]),
     "count": (["--optimal", "--points", "many"], ['--points = "many"', "from 1 to 200"]),
     "until of an optimum": (["--optimal", "--until", "3"], ["leave it out with --optimal"]),
-    "gap of an optimum": (["--optimal", "--set", "shaft.gap=0.1"], ["gap = 0.1", "without a gap"]),
+    "gap of an optimum": (["--optimal", "--set", "shaft.gap=0.1"], ["gap = 0.1", "set gap = 0"]),
 }
 
 
