@@ -44,7 +44,7 @@ from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Parameter
 from softstart.quantities import nearest, show
 
-TURNS = np.fft.fftfreq(2 * HIGHEST + 1, 1.0 / (2 * HIGHEST + 1))  # 0, 1 .. 24, -24 .. -1
+TURNS = np.roll(np.arange(-HIGHEST, HIGHEST + 1.0), -HIGHEST)  # of F: 0, 1 .. 24, -24 .. -1
 ORDERS = 0.5 * np.arange(2 * HIGHEST + 1)  # of torques: multiples 0, 0.5, 1 .. of the crank speed
 ROUNDING = 1e-13  # of the sum of the sizes
 INDICATOR_FILE = "indicator.csv"

@@ -246,5 +246,9 @@ def test_figures_show_the_residuals():
     course = {line.get_label(): line.get_ydata() for line in figures["torque"].axes[0].get_lines()}
     phi = np.linspace(0.0, 4.0 * np.pi, 1441)
     assert course["both"] == pytest.approx(VAZ.torque(phi, found.tuning_speed), rel=1e-12)
+    first = {line.get_label(): max(line.get_ydata()) for line in figures["forces"].axes[0].get_lines()}
+    mass = 2e-3 * (0.68 + 0.51) * 0.0355 * found.tuning_speed**2  # kN, of all that reciprocates and rotates
+    assert first["without counterweights"] == pytest.approx(mass, rel=1e-12)
+    assert first["left with the shafts"] == pytest.approx(0.0, abs=1e-12)
     assert found.plot().axes[0].get_ylabel() == moment.get_ylabel()
     assert len(balance(engine((1, 3, 4, 2))).figures()["residual"].axes) == 2
