@@ -50,14 +50,10 @@ def test_a_measured_pressure_is_read_beside_the_file(tmp_path):
 
 BAD = {
     "rod": ("cylinders.rod_length", "30 mm", "[cylinders] rod_length = 0.03 m: the rod must be longer"),
-    "unit": ("cylinders.bore", "82 N", "N is a force, not a length"),
     "firing": ("cylinders.firing_angles", ["0 deg", "720 deg"], "from 0 to below 720 deg"),
     "order": ("cylinders.firing_order", [1, 2], "both are given"),
-    "mass": ("masses.reciprocating", -1, "must be above 0"),
-    "share": ("counterweights.reciprocating_share", 1.5, "from 0 to 1"),
     "speeds": ("operation.highest_speed", "500 rpm", "must be above lowest_speed"),
     "frequency": ("operation.highest_speed", "50 Hz", "Hz is a frequency"),
-    "load": ("operation.load", 2, "from 0 to 1"),
     "tuning": ("balancer.tuning_speed", 0, "must be above 0"),
     "key": ("masses.reciprocatin", 1, "did you mean masses.reciprocating?"),
     "assumed": ("assumed", "mass.*", "did you mean masses.*?"),
