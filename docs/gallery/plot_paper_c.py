@@ -31,7 +31,7 @@ laws = engagement_figure([runs["linear"], *best], "The linear law, and two optim
 laws.set_label("The linear law and the laws with the lowest peak.")
 
 # %%
-# All tables and verdicts: ``softstart study paper-c --out results`` (10 s); the model is on
+# All tables and verdicts: ``softstart study paper-c --out results`` (12 s); the model is on
 # :doc:`/paper-c`.
 #
 # **References.** [C] Influence of the engagement law of a friction clutch on the load of its elements.

@@ -4,7 +4,7 @@
 
 >>> from softstart.balancing import Engine, balance
 >>> found = balance(Engine.load("vaz-11113"))
->>> round(float(found.residual("none").first_order[found.tuning_index]), 1)
+>>> round(float(found.residual("none").first_order_moment[found.tuning_index]), 1)
 149.5
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 from softstart.balancing.design import Balance, Residual, balance
 from softstart.balancing.engine import Engine
 from softstart.balancing.gas import MeasuredCycle, SimpleCycle
-from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Layout, Masses, Operation
+from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Masses, Operation
 
 __all__ = [
     "Balance",
@@ -21,7 +21,6 @@ __all__ = [
     "Counterweights",
     "Cylinders",
     "Engine",
-    "Layout",
     "Masses",
     "MeasuredCycle",
     "Operation",

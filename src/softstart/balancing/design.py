@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.engine import HIGHEST, Engine, moment_harmonic
+from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, largest, shaking_of_shafts
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
 from softstart.quantities import to_si
@@ -44,31 +44,20 @@ def free_force(engine: Engine) -> complex:
     >>> round(free_force(Engine.load("vaz-11113")).real, 5)
     0.02414
     """
-    force = complex(engine.crank_shaking[0].backward[1])
+    force = complex(engine.crank_shaking[0][-1])
     scale = engine.cylinders.count * engine.masses.reciprocating * engine.cylinders.crank.r
     return force if abs(force) > NOTHING * scale else 0j
 
 
-def free_couple(engine: Engine, *, forward: bool = False) -> complex:
-    """First-order couple over w^2, in kg m^2, that turns against the crank, or with it if `forward`.
-
-    >>> round(abs(free_couple(Engine.load("vaz-11113"))), 5)
-    0.0
+def couple_shaft(engine: Engine, turn: int) -> tuple[BalancerShaft, ...]:
+    """The imbalances, as far apart as the outer cylinders, against the first-order couple that turns with the
+    crank (`turn` 1) or against it (-1).
     """
-    couple = engine.crank_shaking[1]
-    return complex((couple.forward if forward else couple.backward)[1])
-
-
-def couple_shaft(engine: Engine, *, forward: bool = False) -> tuple[BalancerShaft, ...]:
-    """The two imbalances of the shaft for that couple, as far apart as the outer cylinders."""
-    couple = -free_couple(engine, forward=forward)
+    couple = -complex(engine.crank_shaking[1][turn])
     ends = engine.cylinders.places[:: engine.cylinders.count - 1] if couple else ()
     return tuple(
         BalancerShaft(
-            abs(couple) / (ends[-1] - ends[0]),
-            1 if forward else -1,
-            float(np.angle(couple * along)) % TURN,
-            along=along,
+            abs(couple) / (ends[-1] - ends[0]), turn, float(np.angle(couple * along)) % TURN, along=along
         )
         for along in ends
     )
@@ -91,19 +80,17 @@ def arm(engine: Engine, speed: float, load: float | None = None, *, gas: bool = 
 
 
 def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerShaft]:
-    """The two shafts, half the imbalance each, with the middle between them at height + i offset in m.
+    """The two shafts, half the imbalance each, with height + i offset in m of the middle between them.
 
-    >>> one, other = two_shafts(Engine.load("vaz-11113"), 0.03)
-    >>> one.height, other.offset - one.offset
-    (0.03, 0.16)
+    Both are given that place: moving them apart about it changes neither force nor moment.
+
+    >>> two_shafts(Engine.load("vaz-11113"), 0.03)[0].height
+    0.03
     """
     force = -free_force(engine)
-    half = 0.0 if engine.layout is None else 0.5 * engine.layout.spacing
     phase = math.atan2(force.imag, force.real) % TURN
-    first, second = (
-        BalancerShaft(0.5 * abs(force), -1, phase, place.real, place.imag + side * half) for side in (-1, 1)
-    )
-    return first, second
+    half = BalancerShaft(0.5 * abs(force), -1, phase, place.real, place.imag)
+    return half, half
 
 
 # name and what it is; whether its arm is for the gas torque too, not that of inertia alone; whether it is
@@ -122,47 +109,36 @@ class Residual:
     """What one layout leaves on the housing, one entry for each speed.
 
     `height` and `offset` in m of the middle of the shafts (None without designed ones). The moments are
-    about the crank axis and act on the housing, in N m: `first_order` is the amplitude at crank speed,
-    `first_order_cosine` and `first_order_sine` its parts, `moment` the largest deviation from the mean with
-    all orders to 24, sampled every half degree. Forces in N: `force` the largest at crank speed,
-    `all_forces` with all orders; `couple` and `all_couples` the same of the couple about an axis across the
-    crank, N m; NaN without a spacing. `shafts` are those that do it, at the tuning speed.
+    about the crank axis and act on the housing, in N m: `first_order_moment` is the amplitude at crank speed,
+    cosine and sine its parts, `moment` the largest deviation from the mean with all orders to 24, sampled
+    every half degree. Forces in N, and couples about an axis across the crank in N m, NaN without a spacing:
+    the largest at crank speed, and with all orders. `shafts` are those that do it, at the tuning speed.
     """
 
     name: str
     about: str
+    shafts: tuple[BalancerShaft, ...]
     speeds: Vector
     height: Vector | None
     offset: Vector | None
-    first_order_cosine: Vector
-    first_order_sine: Vector
+    first_order_moment: Vector
+    first_order_moment_cosine: Vector
+    first_order_moment_sine: Vector
     moment: Vector
+    first_order_force: Vector
     force: Vector
-    all_forces: Vector
+    first_order_couple: Vector
     couple: Vector
-    all_couples: Vector
-    shafts: tuple[BalancerShaft, ...]
 
     @property
-    def first_order(self) -> Vector:
-        """Amplitude in N m of the moment at crank speed."""
-        return np.hypot(self.first_order_cosine, self.first_order_sine)
+    def columns(self) -> dict[str, Vector | None]:
+        """All that is given for each speed but the speed, by its name."""
+        apart = "name", "about", "shafts", "speeds"
+        return {name: values for name, values in vars(self).items() if name not in apart}
 
     def row(self, index: int) -> dict[str, float | None]:
         """The values at one of the speeds, as plain data."""
-        columns = {
-            "speed": self.speeds,
-            "height": self.height,
-            "offset": self.offset,
-            "first_order_moment": self.first_order,
-            "first_order_moment_cosine": self.first_order_cosine,
-            "first_order_moment_sine": self.first_order_sine,
-            "moment": self.moment,
-            "first_order_force": self.force,
-            "force": self.all_forces,
-            "first_order_couple": self.couple,
-            "couple": self.all_couples,
-        }
+        columns = {"speed": self.speeds, **self.columns}
         return {name: None if values is None else float(values[index]) for name, values in columns.items()}
 
 
@@ -171,9 +147,8 @@ class Balance:
     """An engine over its speed range at one load: as it is, and with the balancers designed for it.
 
     The first of `residuals` is the engine without balancer shafts; "own-shafts" follows if it has any; then,
-    if there is a first-order force for two shafts to balance, the designs of `softstart.balancing.design`;
-    then, if there is a first-order couple, "couple-shaft" and, where a part of it turns with the crank,
-    "two-couple-shafts".
+    if there is a first-order force for two shafts to balance, those of `DESIGNS`; then, if there is a
+    first-order couple, "couple-shaft" and, where a part of it turns with the crank, "two-couple-shafts".
     Speeds in rad/s; `shown` are those that were asked for.
     """
 
@@ -192,7 +167,7 @@ class Balance:
     @property
     def note(self) -> str:
         """Why no balancer was designed; empty if one was."""
-        if self.imbalance or free_couple(self.engine) or free_couple(self.engine, forward=True):
+        if any(one.shafts for one in self.residuals if one.name != "own-shafts"):
             return ""
         known = self.engine.cylinders.couples_known
         return (
@@ -212,12 +187,10 @@ class Balance:
         """The index of the tuning speed in `speeds`."""
         return int(np.argmin(np.abs(self.speeds - self.tuning_speed)))
 
-    def shafts(self, name: str) -> tuple[BalancerShaft, ...]:
-        """The shafts of a design at the tuning speed, as an engine takes them."""
-        found = self.residual(name).shafts
-        if not found:
-            raise InputError(f"{name}: no shafts were designed for it.")
-        return found
+    @property
+    def shown_indices(self) -> list[int]:
+        """The indices of the speeds asked for."""
+        return [int(np.argmin(np.abs(self.speeds - speed))) for speed in self.shown]
 
     def orders(self) -> list[dict[str, float]]:
         """The harmonics at the tuning speed, up to order 6, of what does not cancel; plain data.
@@ -229,7 +202,7 @@ class Balance:
         inertia = engine.inertia_harmonics * w**2
         pressed = engine.gas is not None
         gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
-        force, couple = (one.largest * w**2 for one in engine.crank_shaking)
+        force, couple = (largest(one) * w**2 for one in engine.crank_shaking)
         couple = couple if engine.cylinders.couples_known else math.nan * couple
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
@@ -237,7 +210,7 @@ class Balance:
             shaken = (force[j // 2], couple[j // 2]) if j % 2 == 0 else (0.0, 0.0)
             if max(abs(gas[j]), abs(inertia[j])) <= tiny and not (shaken[0] > 0.0 or shaken[1] > 0.0):
                 continue
-            row = {"order": engine.orders[j]}
+            row = {"order": ORDERS[j]}
             if pressed:
                 row |= {"gas_cosine": gas[j].real, "gas_sine": -gas[j].imag}
             row |= {"inertia_cosine": inertia[j].real, "inertia_sine": -inertia[j].imag}
@@ -248,7 +221,6 @@ class Balance:
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
         engine = self.engine
-        shown = [int(np.argmin(np.abs(self.speeds - speed))) for speed in self.shown]
         work = None if engine.gas is None else engine.indicated_work(self.tuning_speed, self.load)
         return {
             "engine": engine.name,
@@ -264,8 +236,7 @@ class Balance:
             "indicated_work": work,
             "speed_fluctuation": engine.speed_fluctuation(self.tuning_speed, self.load),
             "imbalance": self.imbalance,
-            "force_per_speed_squared": self.imbalance / RPM**2,
-            "free_couple": abs(free_couple(engine)) if engine.cylinders.couples_known else None,
+            "free_couple": abs(engine.crank_shaking[1][-1]) if engine.cylinders.couples_known else None,
             "note": self.note,
             "orders": self.orders(),
             "designs": [
@@ -273,14 +244,12 @@ class Balance:
                     "name": one.name,
                     "about": one.about,
                     "at_tuning_speed": one.row(self.tuning_index),
-                    "largest_first_order_moment": float(one.first_order.max()),
-                    "largest_first_order_moment_speed": float(self.speeds[one.first_order.argmax()]),
-                    "largest_moment": float(one.moment.max()),
-                    "largest_first_order_force": float(one.force.max()),
-                    "largest_force": float(one.all_forces.max()),
-                    "largest_first_order_couple": float(one.couple.max()),
-                    "largest_couple": float(one.all_couples.max()),
-                    "speeds": [one.row(i) for i in shown],
+                    **{
+                        f"largest_{name}": float(values.max())
+                        for name, values in one.columns.items()
+                        if values is not None and name.endswith(("moment", "force", "couple"))
+                    },
+                    "speeds": [one.row(i) for i in self.shown_indices],
                 }
                 for one in self.residuals
             ],
@@ -339,48 +308,48 @@ def balance(
     Examples
     --------
     >>> found = balance(Engine.load("vaz-11113"))
-    >>> [round(float(one.first_order[found.tuning_index]), 1) for one in found.residuals]
+    >>> [round(float(one.first_order_moment[found.tuning_index]), 1) for one in found.residuals]
     [149.5, 123.4, 55.1, 55.1, 0.0, 0.0]
     """
     operation = engine.operation
-    given_speed = engine.tuning_speed if tuning_speed is None else tuning_speed
-    tuning = float(to_si(given_speed, "rad/s", "tuning_speed"))
-    if not tuning > 0.0:
-        raise InputError(f"tuning_speed = {tuning:g} rad/s: it must be above 0.")
-    low, high = operation.lowest_speed, operation.highest_speed
+    tuning = float(
+        to_si(engine.tuning_speed if tuning_speed is None else tuning_speed, "rad/s", "tuning_speed")
+    )
     if speeds is None:
-        asked = _round_speeds(low, high)
+        asked = _round_speeds(operation.lowest_speed, operation.highest_speed)
     else:
         asked = np.atleast_1d(np.asarray(to_si(list(speeds), "rad/s", "speeds")))
-    if np.any(asked <= 0.0):
-        raise InputError(f"speeds = {asked.min():g} rad/s: each must be above 0.")
-    every = np.unique(np.concatenate([np.linspace(low, high, POINTS), asked, [tuning]]))
-    given = operation.load if load is None else engine._load(load)
-    nothing = np.zeros((every.size, HIGHEST + 1), dtype=np.complex128)
-    residuals = [_residual(engine, ("none", "no balancer shafts"), every, given, (), nothing)]
+    for name, values in (("tuning_speed", np.array([tuning])), ("speeds", asked)):
+        if np.any(values <= 0.0):
+            raise InputError(f"{name} = {values.min():g} rad/s: a speed must be above 0.")
+    range_of = np.linspace(operation.lowest_speed, operation.highest_speed, POINTS)
+    every = np.unique(np.concatenate([range_of, asked, [tuning]]))
+    given = operation.load if load is None else float(load)
+    torque = np.outer(every**2, engine.inertia_harmonics)
+    if engine.gas is not None:
+        torque += [engine.gas_harmonics(float(speed), given) for speed in every]
+
+    layouts: list[tuple[str, str, tuple[BalancerShaft, ...], Complex | None]]
+    layouts = [("none", "no balancer shafts", (), None)]
     if engine.shafts:
-        about = ("own-shafts", "the shafts of the file")
-        moments = np.tile(engine.shaft_shaking()[2], (every.size, 1))
-        residuals.append(_residual(engine, about, every, given, engine.shafts, moments))
-    if force := free_force(engine):
-        for name, what, gas, variable, sideways in DESIGNS:
-            if gas and engine.gas is None:
-                continue
-            speeds_of_arm = every if variable else np.full(every.size, tuning)
-            places = np.array([arm(engine, float(w), given, gas=gas) for w in speeds_of_arm])
-            places = places if sideways else places.real + 0j
-            moments = nothing.copy()
-            moments[:, 1] = [moment_harmonic(complex(one), -force, forward=False) for one in places]
-            shafts = two_shafts(engine, complex(places[int(np.argmin(np.abs(every - tuning)))]))
-            residuals.append(_residual(engine, (name, what), every, given, shafts, moments, places))
-    against, along = couple_shaft(engine), couple_shaft(engine, forward=True)
+        layouts.append(("own-shafts", "the shafts of the file", engine.shafts, None))
+    for name, about, gas, variable, sideways in DESIGNS if free_force(engine) else ():
+        if gas and engine.gas is None:
+            continue
+        speeds_of_arm = every if variable else np.full(every.size, tuning)
+        places = np.array([arm(engine, float(w), given, gas=gas) for w in speeds_of_arm])
+        places = places if sideways else places.real + 0j
+        shafts = two_shafts(engine, complex(places[np.argmin(np.abs(every - tuning))]))
+        layouts.append((name, about, shafts, places))
+    against, along = couple_shaft(engine, -1), couple_shaft(engine, 1)
     if against:
-        about = ("couple-shaft", "a shaft against the crank with two opposite imbalances")
-        residuals.append(_residual(engine, about, every, given, against, nothing))
+        layouts.append(
+            ("couple-shaft", "a shaft against the crank with two opposite imbalances", against, None)
+        )
     if along:
-        about = ("two-couple-shafts", "a second one that turns with the crank")
-        residuals.append(_residual(engine, about, every, given, (*against, *along), nothing))
-    return Balance(engine, given, tuning, every, asked, tuple(residuals))
+        layouts.append(("two-couple-shafts", "a second one that turns with the crank", against + along, None))
+    residuals = tuple(_residual(engine, every, torque, *layout) for layout in layouts)
+    return Balance(engine, given, tuning, every, asked, residuals)
 
 
 def _round_speeds(low: float, high: float) -> Vector:
@@ -399,40 +368,44 @@ def _round_speeds(low: float, high: float) -> Vector:
 
 def _residual(
     engine: Engine,
-    about: tuple[str, str],
     speeds: Vector,
-    load: float,
-    shafts: Sequence[BalancerShaft],
-    moments: Complex,
-    places: Complex | None = None,
+    torque: Complex,
+    name: str,
+    about: str,
+    shafts: tuple[BalancerShaft, ...],
+    places: Complex | None,
 ) -> Residual:
-    """What is left with the forces of these shafts and with these moments over w^2, a row per speed."""
+    """What these shafts leave of torque and forces, for each speed; `places` of those that were designed."""
     w2 = speeds**2
-    if engine.gas is None:
-        left = -np.outer(w2, engine.inertia_harmonics)
-    else:
-        left = np.array([-engine.torque_harmonics(float(speed), load) for speed in speeds])
-    left[:, ::2] += w2[:, None] * moments
+    *vectors, moment = shaking_of_shafts(shafts)
+    moments = np.tile(moment, (speeds.size, 1))
+    if places is not None:
+        moments[:, 2] = -1j * places * free_force(engine).conjugate()  # u (h sin(phi) + e cos(phi))
+    left = w2[:, None] * moments - torque
     left[:, 0] = 0.0  # the mean goes through the mounts whatever is done
-    shaft_force, shaft_couple, _ = engine.shaft_shaking(shafts)
-    force = engine.crank_shaking[0] + shaft_force
-    couple = engine.crank_shaking[1] + shaft_couple
-    angle, known = np.outer(engine.orders, PHI), 1.0 if engine.cylinders.couples_known else math.nan
+    angle = np.outer(ORDERS, PHI)
     # einsum: threads of a BLAS cost more than such a small product where other processes work too
-    swing = np.einsum("sq,qp->sp", left.real, np.cos(angle)) - np.einsum(
-        "sq,qp->sp", left.imag, np.sin(angle)
+    swing = np.einsum("sq,qp->sp", left.real, np.cos(angle))
+    swing -= np.einsum("sq,qp->sp", left.imag, np.sin(angle))
+    force, couple = (
+        cleaned(crank + shaft, float(max(largest(crank).max(), largest(shaft).max())))
+        for crank, shaft in zip(engine.crank_shaking, vectors, strict=True)
     )
+    known = 1.0 if engine.cylinders.couples_known else math.nan
+    turn = PHI[: PHI.size // 2]
     return Residual(
-        *about,
+        name=name,
+        about=about,
+        shafts=shafts,
         speeds=speeds,
         height=None if places is None else places.real,
         offset=None if places is None else places.imag,
-        first_order_cosine=left[:, 2].real,
-        first_order_sine=-left[:, 2].imag,
+        first_order_moment=np.abs(left[:, 2]),
+        first_order_moment_cosine=left[:, 2].real,
+        first_order_moment_sine=-left[:, 2].imag,
         moment=np.abs(swing).max(axis=1),
-        force=force.largest[1] * w2,
-        all_forces=np.abs(force.at(PHI[: PHI.size // 2])).max() * w2,
-        couple=couple.largest[1] * w2 * known,
-        all_couples=np.abs(couple.at(PHI[: PHI.size // 2])).max() * w2 * known,
-        shafts=tuple(shafts),
+        first_order_force=largest(force)[1] * w2,
+        force=np.abs(force_at(force, turn)).max() * w2,
+        first_order_couple=largest(couple)[1] * w2 * known,
+        couple=np.abs(force_at(couple, turn)).max() * w2 * known,
     )

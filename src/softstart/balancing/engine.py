@@ -3,10 +3,12 @@
 Constant speed of the crank is assumed throughout; `Engine.speed_fluctuation` tells how far from true that is.
 The rod is replaced by two masses at its pins; friction and the valve drive are left out.
 
-Inertia forces are resolved by order into two vectors, one turning with the crank, one against it. A force
-across the crank is a complex number: upwards + i sideways, sideways to where the crank turns on top. So the
-crank pin of a throw at angle phi is r exp(i phi), and a moment about the crank axis, positive with the crank,
-is Im(conj(place) force). Everything is over w^2, in kg m: at constant speed all forces grow with it.
+Which orders the inertia forces have, and which of them shafts remove, is seen in one array F of the vectors
+that turn with the crank (F[q], at q times its speed) and against it (F[-q]); a shaft removes one of them. The
+force is sum F[q] exp(i q phi), a complex number: upwards + i sideways, sideways to where the crank turns on
+top. So the crank pin of a throw at angle phi is r exp(i phi), and a moment about the crank axis, positive
+with the crank, is Im(conj(place) force). Everything is over w^2, in kg m: at constant speed all forces grow
+with it.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,13 +25,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.gas import Gas, MeasuredCycle, SimpleCycle, shape_work, torque_harmonics
+from softstart.balancing.gas import Gas, MeasuredCycle, SimpleCycle, torque_harmonics
 from softstart.balancing.parts import (
     CYCLE_ANGLE,
+    HIGHEST,
     BalancerShaft,
     Counterweights,
     Cylinders,
-    Layout,
     Masses,
     Operation,
 )
@@ -37,10 +40,12 @@ from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import Library
+from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Parameter
 from softstart.quantities import nearest, show
 
-HIGHEST = 24  # order of the crank speed
+TURNS = np.roll(np.arange(-HIGHEST, HIGHEST + 1.0), -HIGHEST)  # of F: 0, 1 .. 24, -24 .. -1
+ORDERS = 0.5 * np.arange(2 * HIGHEST + 1)  # of torques: multiples 0, 0.5, 1 .. of the crank speed
 ROUNDING = 1e-13  # of the sum of the sizes
 INDICATOR_FILE = "indicator.csv"
 LIBRARY = Library("softstart.balancing", "an engine", "engines")
@@ -68,22 +73,23 @@ INDICATOR = Table(
     required=False,
 )  # fmt: skip
 
-CYLINDERS, MASSES, COUNTERWEIGHTS, OPERATION, BALANCER, CYCLE = (
-    replace(part.TABLES[0], required=required)
-    for part, required in (
-        (Cylinders, True), (Masses, True), (Counterweights, True), (Operation, True), (Layout, False),
-        (SimpleCycle, False),
-    )
-)  # fmt: skip
+# the parts of an engine that are tables of their own, by the name of their field
+PARTS: dict[str, type[ParameterSet]] = {
+    "cylinders": Cylinders, "masses": Masses, "counterweights": Counterweights, "gas": SimpleCycle,
+    "operation": Operation,
+}  # fmt: skip
+OPTIONAL = "cycle", "balancer"  # tables
 SHAFT = replace(BalancerShaft.TABLES[0], many=True)
+PART_TABLES = {
+    name: [replace(table, required=table.name not in OPTIONAL) for table in part.TABLES]
+    for name, part in PARTS.items()
+}
+TABLES = (TOP, *(table for tables in PART_TABLES.values() for table in tables), INDICATOR, SHAFT)
 USUAL = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed", "speeds"), "rpm")
-TABLES = (TOP, CYLINDERS, MASSES, COUNTERWEIGHTS, CYCLE, INDICATOR, OPERATION, BALANCER, SHAFT)
 
 
 def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, Any]) -> tuple[str, ...]:
-    """The keys named in a text as "masses.*, cycle.speeds", but those `changed` by the user.
-
-    A star stands for all keys of a table that are there in `found`.
+    """The keys named in a text as "masses.*, cycle.speeds", but those `changed`; of a star those in `found`.
 
     >>> assumed_keys("masses.*", {"masses.rotating": 1}, {"masses": {"reciprocating": 1, "rotating": 2}})
     ('masses.reciprocating',)
@@ -91,127 +97,86 @@ def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, A
     Traceback (most recent call last):
     softstart.errors.InputError: assumed = "mases.*": an engine file has no such key; did you mean masses.*?
     """
-    known: dict[str, list[str]] = {}
-    for table in (table for table in TABLES if table.name):
-        values = found.get(table.name)
-        here = values.items() if isinstance(values, Mapping) else ()
-        known[f"{table.name}.*"] = [f"{table.name}.{key}" for key, value in here if value is not None]
-        known |= {p.path: [p.path] for p in table.parameters}
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    wrong = []
-    for name in (name for name in names if name not in known):
-        meant = nearest(name, list(known))
-        hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
-        wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
+    tables = [table for table in TABLES if table.name and not table.many]
+    known = [p.path for table in tables for p in table.parameters]
+    given = {
+        p.path for table in tables for p in table.parameters
+        if (found.get(table.name) or {}).get(p.key) is not None
+    }  # fmt: skip
+    wrong, keys = [], dict[str, None]()
+    for name in (name.strip() for name in text.split(",") if name.strip()):
+        named = [key for key in known if fnmatchcase(key, name)]
+        keys |= dict.fromkeys(key for key in named if key not in changed and key in (name, *given))
+        if not named:
+            meant = nearest(name, [*known, *(f"{table.name}.*" for table in tables)])
+            hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
+            wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
     if wrong:
         raise InputError(wrong)
-    keys = dict.fromkeys(key for name in names for key in known[name])
-    return tuple(key for key in keys if key not in changed)
+    return tuple(keys)
 
 
-@dataclass(frozen=True, eq=False)
-class Shaking:
-    """Forces sum_q forward_q exp(i q phi) + backward_q exp(-i q phi), q = 0, 1 .. the last index.
-
-    Forces are in kg m; each times its place along the crank, they are couples in kg m^2.
-    """
-
-    forward: Complex
-    backward: Complex
-
-    def __add__(self, other: Shaking) -> Shaking:
-        scale = float(max(self.largest.max(), other.largest.max()))
-        return Shaking(
-            _clean(self.forward + other.forward, scale), _clean(self.backward + other.backward, scale)
-        )
-
-    def at(self, phi: ArrayLike) -> Complex:
-        """The vector at crank angles in rad, over w^2."""
-        turning = np.exp(1j * np.multiply.outer(np.asarray(phi, dtype=np.float64), self.orders))
-        found: Complex = (turning * self.forward + turning.conj() * self.backward).sum(axis=-1)
-        return found
-
-    def up_to(self, highest: int | None) -> Shaking:
-        """The same with the orders up to `highest` only."""
-        end = None if highest is None else highest + 1
-        return Shaking(self.forward[:end], self.backward[:end])
-
-    @property
-    def orders(self) -> Vector:
-        """Multiples 0, 1, 2 .. of the crank speed."""
-        return np.arange(self.forward.size, dtype=np.float64)
-
-    @property
-    def largest(self) -> Vector:
-        """Largest size of each order, over w^2: half the long axis of the ellipse that its vector draws."""
-        return np.abs(self.forward) + np.abs(self.backward)
+def force_at(force: Complex, phi: ArrayLike) -> Complex:
+    """The vector at crank angles in rad, over w^2."""
+    found: Complex = (np.exp(1j * np.multiply.outer(np.asarray(phi), TURNS)) * force).sum(axis=-1)
+    return found
 
 
-def shaking_of_crank(
-    cylinders: Cylinders, masses: Masses, counterweights: Counterweights, highest: int
-) -> tuple[Shaking, Shaking]:
-    """Forces and couples of all cylinders with their counterweights.
-
-    [B](1) for one cylinder without counterweights: m r cos(phi), half of it forwards and half backwards.
-
-    >>> one = Cylinders("82 mm", "71 mm", "121 mm", firing_angles=(0.0,))
-    >>> force, _ = shaking_of_crank(one, Masses(1.0), Counterweights(), 2)
-    >>> float(force.forward[1].real), float(force.backward[1].real)
-    (0.01775, 0.01775)
-    """
-    crank = cylinders.crank
-    harmonics = np.array(acceleration_harmonics(crank.ratio, highest))
-    orders = np.arange(highest + 1)
-    # at crank angle phi the crank of a cylinder stands at phi - its firing angle
-    turned = np.exp(-1j * np.outer(cylinders.firing_angles, orders))
-    half = 0.5 * masses.reciprocating * crank.r * harmonics
-    forward, backward = half * turned, half * turned.conj()
-    rotating = masses.rotating * (1.0 - counterweights.rotating_share)
-    rotating -= masses.reciprocating * counterweights.reciprocating_share
-    forward[:, 1] += rotating * crank.r * turned[:, 1]
-    along = np.array(cylinders.places)
-    scale = cylinders.count * (masses.reciprocating + masses.rotating) * crank.r
-    arms = max(0.5 * cylinders.count * cylinders.spacing, 1e-300)
-    return (
-        Shaking(_clean(forward.sum(axis=0), scale), _clean(backward.sum(axis=0), scale)),
-        Shaking(_clean(along @ forward, scale * arms), _clean(along @ backward, scale * arms)),
-    )
+def largest(force: Complex) -> Vector:
+    """Largest size of each order 0, 1 .. 24, over w^2: half the long axis of the ellipse of its vector."""
+    sizes = np.abs(force)
+    return np.append(sizes[:1], sizes[1 : HIGHEST + 1] + sizes[:HIGHEST:-1])
 
 
-def _clean(sums: Complex, scale: float) -> Complex:
+def cleaned(sums: Complex, scale: float) -> Complex:
     """The sums, 0 where they cancel but for rounding."""
     return np.where(np.abs(sums) < ROUNDING * scale, 0.0, sums)
 
 
-def shaking_of_shafts(shafts: Sequence[BalancerShaft], highest: int) -> tuple[Shaking, Shaking, Complex]:
-    """Forces and couples of balancer shafts, and the moment M_q about the crank, Re sum M_q exp(i q phi).
+def shaking_of_crank(
+    cylinders: Cylinders, masses: Masses, counterweights: Counterweights
+) -> tuple[Complex, Complex]:
+    """Forces and couples over w^2 of all cylinders with their counterweights, as vectors that turn.
 
-    >>> shaft = BalancerShaft(0.02, -1, phase="180 deg", height=0.03)
-    >>> force, couple, moment = shaking_of_shafts([shaft], 2)
-    >>> complex(force.backward[1].round(6)), complex(moment[1].round(9))
+    [B](1) for one cylinder without counterweights: m r cos(phi), half of it forwards and half backwards.
+
+    >>> one = Cylinders("82 mm", "71 mm", "121 mm", firing_angles=(0.0,))
+    >>> force, _ = shaking_of_crank(one, Masses(1.0), Counterweights())
+    >>> float(force[1].real), float(force[-1].real)
+    (0.01775, 0.01775)
+    """
+    r, m = cylinders.crank.r, masses.reciprocating
+    half = 0.5 * m * r * acceleration_harmonics(cylinders.crank.ratio, HIGHEST)
+    one = np.concatenate([half, half[:0:-1]])
+    one[1] += r * (
+        masses.rotating * (1.0 - counterweights.rotating_share) - m * counterweights.reciprocating_share
+    )
+    # at crank angle phi the crank of a cylinder stands at phi - its firing angle
+    each: Complex = one * np.exp(-1j * np.outer(cylinders.firing_angles, TURNS))
+    scale = cylinders.count * (m + masses.rotating) * r
+    couple = cleaned(cylinders.places @ each, 0.5 * scale * cylinders.count * cylinders.spacing)
+    return cleaned(each.sum(axis=0), scale), couple
+
+
+def shaking_of_shafts(shafts: Sequence[BalancerShaft]) -> tuple[Complex, Complex, Complex]:
+    """Forces and couples over w^2 of balancer shafts, and C_j of the moment about the crank, as of a torque.
+
+    A force F exp(i q phi) at a place has the moment Im(conj(place) F exp(i q phi)).
+
+    >>> force, couple, moment = shaking_of_shafts([BalancerShaft(0.02, -1, phase="180 deg", height=0.03)])
+    >>> complex(force[-1].round(6)), complex(moment[2].round(9))  # 0.0006 sin(phi)
     ((-0.02+0j), -0.0006j)
     """
-    vectors = np.zeros((2, 2, highest + 1), dtype=np.complex128)
-    scale = sum(shaft.imbalance * shaft.ratio**2 for shaft in shafts)
-    moment = np.zeros(highest + 1, dtype=np.complex128)
+    force, couple, moment = np.zeros((3, TURNS.size), dtype=np.complex128)
     for shaft in shafts:
-        q = int(abs(shaft.ratio))
-        force = shaft.imbalance * shaft.ratio**2 * np.exp(1j * shaft.phase)
-        side = 0 if shaft.ratio > 0 else 1
-        vectors[0, side, q] += force
-        vectors[1, side, q] += shaft.along * force
-        moment[q] += moment_harmonic(shaft.place, force, forward=shaft.ratio > 0)
-    return Shaking(*_clean(vectors[0], scale)), Shaking(*vectors[1]), moment
-
-
-def moment_harmonic(place: complex, force: complex, *, forward: bool) -> complex:
-    """M in Re(M exp(i q phi)) = Im(conj(place) force exp(+-i q phi)), the moment of a turning force.
-
-    >>> moment_harmonic(0.03, -0.02, forward=False)  # 0.0006 sin(phi)
-    -0.0006j
-    """
-    arm = place.conjugate() * force
-    return -1j * arm if forward else (-1j * arm).conjugate()
+        turn = int(shaft.ratio)
+        vector = shaft.imbalance * turn**2 * np.exp(1j * shaft.phase)
+        force[turn] += vector
+        couple[turn] += shaft.along * vector
+        about = -1j * shaft.place.conjugate() * vector
+        moment[2 * abs(turn)] += about if turn > 0 else about.conjugate()
+    scale = sum(shaft.imbalance * shaft.ratio**2 for shaft in shafts)
+    return cleaned(force, scale), couple, moment
 
 
 @dataclass(frozen=True)
@@ -232,8 +197,6 @@ class Engine:
         Shares of the masses that are balanced on the crank.
     shafts : tuple of BalancerShaft, optional
         Balancer shafts that the engine has.
-    layout : Layout, optional
-        Given values of a two-shaft balancer that is to be designed.
     name, source : str, optional
         Name of the engine, and source of its numbers.
     assumed : tuple of str, optional
@@ -261,7 +224,6 @@ class Engine:
     operation: Operation
     counterweights: Counterweights = field(default_factory=Counterweights)
     shafts: tuple[BalancerShaft, ...] = ()
-    layout: Layout | None = None
     name: str = "unnamed engine"
     source: str = ""
     assumed: tuple[str, ...] = ()
@@ -269,16 +231,9 @@ class Engine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "shafts", tuple(self.shafts))
         object.__setattr__(self, "assumed", tuple(self.assumed))
-        wrong = [] if self.gas is None else list(self.gas.refuse(self.cylinders))
-        if isinstance(self.gas, MeasuredCycle) and self.operation.load != 1.0:
-            wrong.append(_fixed_load(self.operation.load))
-        wrong += [
-            f"ratio = {shaft.ratio:g}: orders up to {HIGHEST} are looked at; give a smaller ratio."
-            for shaft in self.shafts
-            if abs(shaft.ratio) > HIGHEST
-        ]
-        if wrong:
-            raise InputError(wrong)
+        speeds = (self.gas.speeds if isinstance(self.gas, SimpleCycle) else None) or (0.0,)
+        for speed in speeds if self.gas else ():
+            self._weights(speed, None)
 
     @classmethod
     def load(cls, engine: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Engine:
@@ -312,28 +267,23 @@ class Engine:
             return made(make, values, f"{before}{place}{' ' if place else ''}", wrong)
 
         named: dict[str, Any] = found.pop("")
-        cycle, indicator = found["cycle"], found["indicator"]
-        parts: dict[str, Any] = {
-            key: part(f"[{table}]", make, found[table] or {})
-            for key, table, make in (
-                ("cylinders", "cylinders", Cylinders), ("masses", "masses", Masses),
-                ("operation", "operation", Operation), ("counterweights", "counterweights", Counterweights),
-                ("layout", "balancer", Layout), ("gas", "cycle", SimpleCycle),
-            )
-            if found[table] or table == "counterweights"
-        }  # fmt: skip
-        parts.setdefault("gas", None)
+        parts: dict[str, Any] = {"gas": None}
+        for key, make in PARTS.items():
+            tables = [table.name for table in PART_TABLES[key]]
+            values = {name: value for table in tables for name, value in (found[table] or {}).items()}
+            if found[tables[0]] is not None:
+                parts[key] = part(f"[{tables[0]}]", make, values)
         parts["shafts"] = [
             part(f"[shaft] {i},", BalancerShaft, row) for i, row in enumerate(found["shaft"], 1)
         ]
         about = {"text": named.pop("assumed"), "changed": also or {}, "found": found}
         parts["assumed"] = part("", assumed_keys, about)
-        if cycle is not None and indicator is not None:
-            wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
-        elif indicator is not None:
-            measured = {"path": Path(folder) / indicator["file"]}
-            measured["crankcase_pressure"] = indicator["crankcase_pressure"]
-            parts["gas"] = part("[indicator]", MeasuredCycle.from_csv, measured)
+        if (indicator := found["indicator"]) is not None:
+            if found["cycle"] is not None:
+                wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
+            else:
+                path = Path(folder) / indicator.pop("file")
+                parts["gas"] = part("[indicator]", MeasuredCycle.from_csv, {"path": path, **indicator})
         if wrong:
             raise InputError(wrong)
         try:
@@ -346,20 +296,16 @@ class Engine:
 
         A measured pressure is not in it: it stands in its own file.
         """
-        blocks: list[tuple[Table, Any]] = [
-            (TOP, {"name": self.name, "source": self.source, "assumed": ", ".join(self.assumed)}),
-            (CYLINDERS, self.cylinders.values()),
-            (MASSES, self.masses.values()),
-            (COUNTERWEIGHTS, self.counterweights.values()),
-            (OPERATION, self.operation.values()),
-            *((BALANCER, layout.values()) for layout in [self.layout] if layout is not None),
-            *((SHAFT, shaft.values()) for shaft in self.shafts),
-        ]
-        if isinstance(self.gas, MeasuredCycle):
-            about = {"file": INDICATOR_FILE, "crankcase_pressure": self.gas.crankcase_pressure}
-            blocks.insert(1, (INDICATOR, about))
-        elif self.gas is not None:
-            blocks.insert(4, (CYCLE, self.gas.values()))
+        top = {"name": self.name, "source": self.source, "assumed": ", ".join(self.assumed)}
+        blocks: list[tuple[Table, Any]] = [(TOP, top)]
+        for key, tables in PART_TABLES.items():
+            part = getattr(self, key)
+            if isinstance(part, MeasuredCycle):
+                about = {"file": INDICATOR_FILE, "crankcase_pressure": part.crankcase_pressure}
+                blocks.append((INDICATOR, about))
+            elif part is not None:
+                blocks += [(table, part.values()) for table in tables]
+        blocks += [(SHAFT, shaft.values()) for shaft in self.shafts]
         kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
         return document_text(kept, units=False)
 
@@ -372,23 +318,17 @@ class Engine:
 
     @property
     def tuning_speed(self) -> float:
-        """Speed in rad/s at which a balancer is tuned: that of the layout, else the highest."""
-        return self.operation.highest_speed if self.layout is None else self.layout.tuning_speed
-
-    def _load(self, load: float | None) -> float:
-        if load is None:
-            return self.operation.load
-        if isinstance(self.gas, MeasuredCycle) and load != 1.0:
-            raise InputError(_fixed_load(load))
-        if not 0.0 <= load <= 1.0:
-            raise InputError(f"load = {load}: it must be from 0 to 1.")
-        return float(load)
+        """Speed in rad/s at which a balancer is tuned, by default the highest."""
+        return self.operation.tuning_speed or self.operation.highest_speed
 
     def _weights(self, speed: float, load: float | None) -> tuple[Gas, Vector]:
-        """The pressure, and the factors of its shapes; raises InputError where none is given."""
+        """The pressure, and the factors of its shapes; raises InputError without one, or at a bad load."""
+        load = self.operation.load if load is None else load
         if self.gas is None:
             raise InputError("[cycle], [indicator]: one of the two gives the gas torque; add one.")
-        return self.gas, self.gas.weights(self.cylinders, speed, self._load(load))
+        if not 0.0 <= load <= 1.0:
+            raise InputError(f"load = {load}: it must be from 0 to 1.")
+        return self.gas, self.gas.weights(self.cylinders, speed, load)
 
     # ---- torques over the crank angle --------------------------------------------------------------------
 
@@ -420,22 +360,16 @@ class Engine:
     # ---- harmonics ---------------------------------------------------------------------------------------
 
     @cached_property
-    def orders(self) -> Vector:
-        """Multiples 0, 0.5, 1 .. of the crank speed: the orders of the harmonics below."""
-        found: Vector = 0.5 * np.arange(2 * HIGHEST + 1, dtype=np.float64)
-        return found
-
-    @cached_property
     def _turned(self) -> Complex:
         """Sum over the cylinders of exp(-i q firing angle), 0 where an order cancels."""
-        found: Complex = np.exp(-1j * np.outer(self.orders, self.cylinders.firing_angles)).sum(axis=1)
+        found: Complex = np.exp(-1j * np.outer(ORDERS, self.cylinders.firing_angles)).sum(axis=1)
         found[np.abs(found) < 1e-12 * self.cylinders.count] = 0.0
         return found
 
     def gas_harmonics(self, speed: float, load: float | None = None) -> Complex:
-        """C_q of the gas torque Re sum C_q exp(i q phi) in N m, q as in `orders`; [B](2) has z A and z B."""
+        """C_q of the gas torque Re sum C_q exp(i q phi) in N m, q as in `ORDERS`; [B](2) has z A and z B."""
         gas, weights = self._weights(speed, load)
-        found: Complex = weights @ torque_harmonics(gas, self.cylinders, HIGHEST) * self._turned
+        found: Complex = weights @ torque_harmonics(gas, self.cylinders) * self._turned
         return found
 
     @cached_property
@@ -443,7 +377,7 @@ class Engine:
         """The same of the inertia torque over w^2, in kg m^2, [B](3): B_k sin is -i B_k here."""
         found = np.zeros(2 * HIGHEST + 1, dtype=np.complex128)
         crank = self.cylinders.crank
-        whole = np.array(inertia_torque_harmonics(crank.ratio, HIGHEST))
+        whole = inertia_torque_harmonics(crank.ratio, HIGHEST)
         found[::2] = -1j * self.masses.reciprocating * crank.r**2 * whole
         return found * self._turned
 
@@ -461,36 +395,23 @@ class Engine:
         if not 0.5 <= orders <= HIGHEST:
             raise InputError(f"orders = {orders}: harmonics from order 0.5 to {HIGHEST} can be taken.")
         found = self.torque_harmonics(speed, load)
-        kept = (self._turned != 0.0) & (self.orders > 0.0) & (self.orders <= orders)
+        kept = (self._turned != 0.0) & (ORDERS > 0.0) & (orders >= ORDERS)
         return PeriodicTorque(
-            float(found[0].real), self.orders[kept], found[kept].real, -found[kept].imag, float(speed)
+            float(found[0].real), ORDERS[kept], found[kept].real, -found[kept].imag, float(speed)
         )
 
     # ---- forces on the housing ---------------------------------------------------------------------------
 
     @cached_property
-    def crank_shaking(self) -> tuple[Shaking, Shaking]:
+    def crank_shaking(self) -> tuple[Complex, Complex]:
         """Forces over w^2 in kg m, and couples in kg m^2, of the crank drive with its counterweights."""
-        return shaking_of_crank(self.cylinders, self.masses, self.counterweights, HIGHEST)
-
-    @cached_property
-    def bare_shaking(self) -> tuple[Shaking, Shaking]:
-        """The same as if there were no counterweights."""
-        bare = Counterweights(reciprocating_share=0.0, rotating_share=0.0)
-        return shaking_of_crank(self.cylinders, self.masses, bare, HIGHEST)
-
-    def shaft_shaking(
-        self, shafts: Sequence[BalancerShaft] | None = None
-    ) -> tuple[Shaking, Shaking, Complex]:
-        """Forces, couples and moment about the crank over w^2 of these balancer shafts, else its own."""
-        return shaking_of_shafts(self.shafts if shafts is None else shafts, HIGHEST)
+        return shaking_of_crank(self.cylinders, self.masses, self.counterweights)
 
     # ---- work and speed ----------------------------------------------------------------------------------
 
     def indicated_work(self, speed: float, load: float | None = None) -> float:
         """Work in J of the gas in one cycle of all cylinders: 4 pi times the mean torque."""
-        gas, weights = self._weights(speed, load)
-        return float(self.cylinders.count * (weights @ shape_work(gas, self.cylinders)))
+        return CYCLE_ANGLE * float(self.gas_harmonics(speed, load)[0].real)
 
     def speed_fluctuation(self, speed: float, load: float | None = None) -> float | None:
         """Coefficient (w_max - w_min)/w against a constant load torque: excess work over inertia and w^2.
@@ -501,14 +422,6 @@ class Engine:
         if self.masses.inertia is None or self.gas is None:
             return None
         phi = np.linspace(0.0, CYCLE_ANGLE, 7200, endpoint=False)
-        orders = self.orders[1:]
-        integral = self.torque_harmonics(speed, load)[1:] / (1j * orders)
-        excess = (np.exp(1j * np.outer(phi, orders)) @ integral).real
+        integral = self.torque_harmonics(speed, load)[1:] / (1j * ORDERS[1:])
+        excess = (np.exp(1j * np.outer(phi, ORDERS[1:])) @ integral).real
         return float(np.ptp(excess) / (self.masses.inertia * speed**2))
-
-
-def _fixed_load(load: float) -> str:
-    return (
-        f"load = {load:g}: a measured pressure is that of the load at which it was measured; leave the load "
-        "at 1, or describe the pressure by [cycle]."
-    )

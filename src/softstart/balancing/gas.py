@@ -1,10 +1,10 @@
-"""The gas pressure in a cylinder over a four-stroke cycle, its work and the harmonics of its torque.
+"""The gas pressure in a cylinder over a four-stroke cycle, and the harmonics of its torque.
 
 theta is the crank angle of one cylinder from its firing dead centre: expansion to pi, exhaust to 2 pi, intake
 to 3 pi, compression to 4 pi. The pressure is that of a simple cycle in closed form (`SimpleCycle`), or was
-measured (`MeasuredCycle`). It is given as `weights @ shapes(theta)`: whatever is linear in it (work, torque,
-harmonics) is computed once for each shape, for all speeds and loads. Integrals over a cycle are exact to
-rounding, since the pressure is smooth between known angles.
+measured (`MeasuredCycle`). It is given as `weights @ shapes(theta)`: the harmonics, the mean among them, are
+computed once for each shape, for all speeds and loads. Integrals over a cycle are exact to rounding, since
+the pressure is smooth between known angles.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.parts import CYCLE_ANGLE, Cylinders
+from softstart.balancing.parts import CYCLE_ANGLE, HIGHEST, Cylinders
 from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
 from softstart.input.files import text_of
@@ -33,8 +33,7 @@ MANY = 100  # breaks, as of a measured pressure, leave panels so short that few 
 BURNT = math.log(1000.0)  # Vibe's 6.908: 99.9 % at the end, here scaled to all
 DEGREE = 40  # of the polynomials that hold the heat integral
 GRADES = (0.0, 2**-16, 2**-13, 2**-10, 2**-7, 2**-5, 1 / 8, 1 / 4, 1 / 2, 3 / 4, 1.0)  # finer at the start
-FEWEST = 24  # angles of a measurement
-WIDEST = math.radians(30.0)  # between neighbouring angles
+WIDEST = math.radians(30.0)  # between neighbouring angles of a measurement
 EXAMPLE = "angle [deg],pressure [bar]"
 
 
@@ -56,27 +55,13 @@ def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
     return np.concatenate(places), np.concatenate(weights)
 
 
-@lru_cache(maxsize=32)
-def _torque_shapes(cycle: Gas, cylinders: Cylinders) -> tuple[Vector, Vector]:
-    """The nodes, and weights times the torque on the crank of each shape of pressure."""
+@lru_cache(maxsize=64)
+def torque_harmonics(cycle: Gas, cylinders: Cylinders) -> Complex:
+    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 48, of one cylinder; a row per shape."""
     theta, weights = nodes(cycle.breaks())
     per_pressure = -cylinders.area * cylinders.crank.slope(theta)
-    return theta, cycle.shapes(cylinders, theta) * per_pressure * weights
-
-
-@lru_cache(maxsize=64)
-def shape_work(cycle: Gas, cylinders: Cylinders) -> Vector:
-    """Work in J of one cycle of one cylinder for each shape."""
-    work: Vector = _torque_shapes(cycle, cylinders)[1].sum(axis=1)
-    work.setflags(write=False)
-    return work
-
-
-@lru_cache(maxsize=32)
-def torque_harmonics(cycle: Gas, cylinders: Cylinders, highest: int) -> Complex:
-    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row per shape."""
-    theta, torque = _torque_shapes(cycle, cylinders)
-    turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * highest + 1)))
+    torque = cycle.shapes(cylinders, theta) * per_pressure * weights
+    turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * HIGHEST + 1)))
     # einsum: threads of a BLAS cost more than such a small product where other processes work too
     found: Complex = np.einsum("sn,nj->sj", torque, turning) * (2.0 / CYCLE_ANGLE)
     found[:, 0] *= 0.5
@@ -101,7 +86,8 @@ class SimpleCycle(ParameterSet, kw_only=False):
     the exponents, the spread between cycles.
 
     >>> cycle, one = SimpleCycle(9.9, "10 bar"), Cylinders(0.082, 0.071, 0.121, firing_angles=(0.0,))
-    >>> round(float(cycle.weights(one, 300.0, 1.0) @ shape_work(cycle, one)) / one.displacement / 1e5, 9)
+    >>> mean_torque = cycle.weights(one, 300.0, 1.0) @ torque_harmonics(cycle, one)[:, 0].real
+    >>> round(float(CYCLE_ANGLE * mean_torque / one.displacement / 1e5), 9)
     10.0
     """
 
@@ -160,49 +146,31 @@ class SimpleCycle(ParameterSet, kw_only=False):
 
     def contradictions(self) -> Sequence[str]:
         """Sentences on values that contradict one another."""
-        wrong = []
-        for key in ("compression_ratio", "compression_exponent", "expansion_exponent"):
-            if not getattr(self, key) > 1.0:
-                wrong.append(f"{key} = {getattr(self, key):g}: it must be above 1.")
+        wrong = [
+            f"{key} = {getattr(self, key):g}: it must be above 1."
+            for key in ("compression_ratio", "compression_exponent", "expansion_exponent")
+            if not getattr(self, key) > 1.0
+        ]
         if self.idle_pressure > self.intake_pressure:
             wrong.append(
                 f"idle_pressure = {self.idle_pressure:g} Pa: it must not be above intake_pressure = "
                 f"{self.intake_pressure:g} Pa."
             )
-        count = len(self.mean_indicated_pressure)
-        if self.speeds is None and count > 1:
-            wrong.append(f"mean_indicated_pressure: {count} pressures need as many speeds; give speeds too.")
-        elif self.speeds is not None and len(self.speeds) != count:
-            wrong.append(f"speeds: there are {len(self.speeds)} speeds for {count} mean indicated pressures.")
-        elif self.speeds is not None and np.any(np.diff(self.speeds) <= 0.0):
-            wrong.append("speeds: each speed must be above the one before it.")
-        return [*wrong, *self._timing()]
-
-    def _timing(self) -> Sequence[str]:
-        def degrees(angle: float) -> str:
-            return f"{math.degrees(angle):g} deg"
-
-        wrong = []
-        if self.combustion_start >= math.pi:
+        count, speeds = len(self.mean_indicated_pressure), self.speeds or (1.0,)
+        if len(speeds) != count or np.any(np.diff(speeds) <= 0.0):
             wrong.append(
-                f"combustion_start = {degrees(self.combustion_start)}: combustion begins in the compression, "
-                "below 180 deg before dead centre."
+                f"speeds: {len(self.speeds or ())} for {count} in mean_indicated_pressure; give one pressure "
+                "alone, or one for each of several rising speeds."
             )
-        end = self.combustion_duration - self.combustion_start
-        if end > self.exhaust_opening:
+        begin, length = self.combustion_start, self.combustion_duration
+        angles = [-begin, length - begin, self.exhaust_opening, self.exhaust_opening + self.blowdown]
+        limits = -math.pi < angles[0] and angles[2] <= math.pi and angles[3] <= 2.0 * math.pi
+        if not (limits and angles[1] <= angles[2]):
+            first, burnt, opening, last = (f"{math.degrees(angle):g}" for angle in angles)
             wrong.append(
-                f"exhaust_opening = {degrees(self.exhaust_opening)}: the combustion lasts to {degrees(end)} "
-                "after dead centre; open the exhaust later or burn faster."
-            )
-        if self.exhaust_opening > math.pi:
-            wrong.append(
-                f"exhaust_opening = {degrees(self.exhaust_opening)}: the exhaust opens at the latest when "
-                "the expansion ends, 180 deg."
-            )
-        if self.exhaust_opening + self.blowdown > 2.0 * math.pi:
-            wrong.append(
-                f"blowdown = {degrees(self.blowdown)}: begun at exhaust_opening = "
-                f"{degrees(self.exhaust_opening)} it ends after the exhaust stroke, 360 deg; make it shorter."
+                f"combustion_start, combustion_duration, exhaust_opening, blowdown: it burns from {first} to "
+                f"{burnt} deg after dead centre, and the exhaust opens at {opening} deg, until {last} deg; "
+                "burn from above -180 deg on and open the exhaust behind that, by 180 deg, until 360 deg."
             )
         return wrong
 
@@ -256,26 +224,17 @@ class SimpleCycle(ParameterSet, kw_only=False):
         return np.array([intake, self.exhaust_pressure, heat, -self.crankcase_pressure])
 
     def heat(self, cylinders: Cylinders, speed: float) -> float:
-        """Heat in J of one cycle of one cylinder at full load."""
-        work = shape_work(self, cylinders)
-        wanted = self._mean_pressure(speed) * cylinders.displacement
-        return float((wanted - self.intake_pressure * work[0] - self.exhaust_pressure * work[1]) / work[2])
-
-    def refuse(self, cylinders: Cylinders) -> Sequence[str]:
-        """Sentences on what is impossible with these cylinders."""
-        speeds = self.speeds or (0.0,)
-        for speed, pressure in zip(speeds, self.mean_indicated_pressure, strict=True):
-            if self.heat(cylinders, speed) < 0.0:
-                return (
-                    f"mean_indicated_pressure = {pressure / 1e5:g} bar: the gas does more work without any "
-                    "heat; give a larger one.",
-                )
-        return ()
-
-    def _mean_pressure(self, speed: float) -> float:
-        if self.speeds is None:
-            return self.mean_indicated_pressure[0]
-        return float(np.interp(speed, self.speeds, self.mean_indicated_pressure))
+        """Heat in J of one cycle of one cylinder at full load; raises InputError where it is negative."""
+        pressure = float(np.interp(speed, self.speeds or (1.0,), self.mean_indicated_pressure))
+        work = CYCLE_ANGLE * torque_harmonics(self, cylinders)[:, 0].real
+        without = self.intake_pressure * work[0] + self.exhaust_pressure * work[1]
+        heat = float((pressure * cylinders.displacement - without) / work[2])
+        if heat < 0.0:
+            raise InputError(
+                f"mean_indicated_pressure = {pressure / 1e5:g} bar: the gas does more work without any heat; "
+                "give a larger one."
+            )
+        return heat
 
     def _volume(self, cylinders: Cylinders, psi: Vector) -> Vector:
         clearance = cylinders.displacement / (self.compression_ratio - 1.0)
@@ -306,12 +265,13 @@ def _heat_pieces(cycle: SimpleCycle, cylinders: Cylinders) -> tuple[Vector, list
 class MeasuredCycle:
     """Pressures in Pa at rising crank angles in rad, 0 at the firing dead centre; straight lines between.
 
-    The angles cover one cycle of 4 pi, wherever it begins (-360 deg to 360 deg is usual). It is used for all
-    speeds and loads: a measurement at one operating point says nothing about others.
+    The angles cover one cycle of 4 pi, wherever it begins (-360 deg to 360 deg is usual), in steps of at most
+    30 deg. It is used for all speeds at load 1: a measurement at one operating point says nothing about
+    others. Raises InputError.
 
     >>> angles = np.radians(np.arange(-360.0, 360.0, 10.0))
-    >>> MeasuredCycle(tuple(angles), tuple(1e5 + 0 * angles)).refuse(None)
-    ()
+    >>> len(MeasuredCycle(tuple(angles), tuple(1e5 + 0 * angles)).pressures)
+    72
     """
 
     angles: tuple[float, ...]
@@ -319,20 +279,25 @@ class MeasuredCycle:
     crankcase_pressure: float = 1e5
 
     def __post_init__(self) -> None:
-        wrong = []
-        angles = to_si(list(self.angles), "rad", "angles")
-        pressures = to_si(list(self.pressures), "Pa", "pressures")
-        if np.size(angles) != np.size(pressures):
-            wrong.append(f"pressures: there are {np.size(pressures)} pressures for {np.size(angles)} angles.")
-        else:
-            wrong += _errors(np.asarray(angles), np.asarray(pressures))
-        if wrong:
-            raise InputError(wrong)
-        object.__setattr__(self, "angles", tuple(np.asarray(angles).tolist()))
-        object.__setattr__(self, "pressures", tuple(np.asarray(pressures).tolist()))
-        object.__setattr__(
-            self, "crankcase_pressure", to_si(self.crankcase_pressure, "Pa", "crankcase_pressure")
-        )
+        for name, unit in (("angles", "rad"), ("pressures", "Pa")):
+            values = np.asarray(to_si(list(getattr(self, name)), unit, name))
+            object.__setattr__(self, name, tuple(values.tolist()))
+        below = to_si(self.crankcase_pressure, "Pa", "crankcase_pressure")
+        object.__setattr__(self, "crankcase_pressure", below)
+        if not len(self.angles) == len(self.pressures) > 0:
+            raise InputError(f"there are {len(self.pressures)} pressures for {len(self.angles)} angles.")
+        steps = np.diff([*self.angles, self.angles[0] + CYCLE_ANGLE])
+        wrong = (steps <= 0.0) | (steps > WIDEST + 1e-9)
+        wrong[-1] = not -1e-9 <= steps[-1] <= WIDEST + 1e-9  # 0 where the last one is the first again
+        if wrong.any():
+            bad = int(np.argmax(wrong))
+            raise InputError(
+                f"angle {bad + 1} = {math.degrees(self.angles[bad]):g} deg: {math.degrees(steps[bad]):g} deg "
+                "to the next one (behind the last: to the first of the next cycle); give one whole cycle of "
+                f"720 deg in rising steps of at most {math.degrees(WIDEST):g} deg."
+            )
+        if not min(self.pressures) > 0.0:
+            raise InputError(f"pressure = {min(self.pressures):g} Pa: an absolute pressure is above 0.")
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str], crankcase_pressure: float = 1e5) -> MeasuredCycle:
@@ -364,40 +329,13 @@ class MeasuredCycle:
         return np.stack([found, np.ones_like(found)])
 
     def weights(self, cylinders: Cylinders, speed: float, load: float) -> Vector:
-        """The pressure less that below the piston, whatever speed and load are."""
-        return np.array([1.0, -self.crankcase_pressure])
-
-    def refuse(self, cylinders: Cylinders | None) -> Sequence[str]:
-        """No sentences: a measured pressure fits any cylinders."""
-        return ()
-
-
-def _errors(angles: Vector, pressures: Vector) -> list[str]:
-    wrong = []
-    if angles.size < FEWEST:
-        return [f"there are {angles.size} angles, and a cycle needs at least {FEWEST}."]
-    steps = np.diff(angles)
-    if np.any(steps <= 0.0):
-        i = int(np.argmax(steps <= 0.0)) + 1
-        wrong.append(
-            f"angle {i + 1} = {math.degrees(angles[i]):g} deg: each must be above the one before it."
-        )
-    span = angles[-1] - angles[0]
-    if span > CYCLE_ANGLE + 1e-9:
-        wrong.append(f"the angles span {math.degrees(span):g} deg, and a cycle has 720 deg; give one cycle.")
-    elif not wrong:
-        widest = max(float(steps.max()), CYCLE_ANGLE - span)
-        if widest > WIDEST:
-            wrong.append(
-                f"there is nothing over {math.degrees(widest):g} deg; give the whole cycle of 720 deg in "
-                f"steps of at most {math.degrees(WIDEST):g} deg."
+        """The pressure less that below the piston; raises InputError for a load other than 1."""
+        if load != 1.0:
+            raise InputError(
+                f"load = {load:g}: a measured pressure is that of the load at which it was measured; leave "
+                "the load at 1, or describe the pressure by [cycle]."
             )
-        if span > CYCLE_ANGLE - 1e-9 and pressures[0] != pressures[-1]:
-            wrong.append("the first and last angle are 720 deg apart, and their pressures differ; drop one.")
-    if np.any(pressures <= 0.0):
-        i = int(np.argmax(pressures <= 0.0))
-        wrong.append(f"pressure {i + 1} = {pressures[i]:g} Pa: an absolute pressure is above 0.")
-    return wrong
+        return np.array([1.0, -self.crankcase_pressure])
 
 
 Gas = SimpleCycle | MeasuredCycle  # where the pressure comes from

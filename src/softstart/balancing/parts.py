@@ -16,6 +16,7 @@ from softstart.quantities import show
 TURN = 2.0 * math.pi
 CYCLE_ANGLE = 2.0 * TURN  # a four-stroke cycle
 SAME = 1e-6  # rad: angles nearer than this are one
+HIGHEST = 24  # order of the crank speed
 
 
 class Cylinders(ParameterSet, kw_only=False):
@@ -164,7 +165,7 @@ class Counterweights(ParameterSet, kw_only=False):
 
 
 class Operation(ParameterSet, kw_only=False):
-    """Speed range in rad/s, and load: 1 is full, 0 is idling."""
+    """Speed range in rad/s, load (1 is full, 0 is idling), and the speed at which a balancer is tuned."""
 
     WHAT: ClassVar[str] = "an operation"
 
@@ -175,6 +176,10 @@ class Operation(ParameterSet, kw_only=False):
         "operation.highest_speed", "rad/s", "highest speed", '"5600 rpm"', "above 0"
     )
     load: Number = parameter("operation.load", "1", "load", "1", "from 0 to 1", default=1.0)
+    tuning_speed: MaybeNumber = parameter(
+        "balancer.tuning_speed", "rad/s", "tuning speed, by default the highest", '"4500 rpm"', "above 0",
+        default=None,
+    )  # fmt: skip
 
     def contradictions(self) -> Sequence[str]:
         """The range."""
@@ -184,19 +189,6 @@ class Operation(ParameterSet, kw_only=False):
             f"highest_speed = {self.highest_speed:g} rad/s: it must be above lowest_speed = "
             f"{self.lowest_speed:g} rad/s.",
         )
-
-
-class Layout(ParameterSet, kw_only=False):
-    """Given values of a two-shaft balancer to be designed: tuning speed in rad/s, shaft distance in m."""
-
-    WHAT: ClassVar[str] = "a layout"
-
-    tuning_speed: Number = parameter(
-        "balancer.tuning_speed", "rad/s", "tuning speed", '"4500 rpm"', "above 0"
-    )
-    spacing: Number = parameter(
-        "balancer.spacing", "m", "distance between the two shafts", '"160 mm"', "0 or more", default=0.0
-    )
 
 
 class BalancerShaft(ParameterSet, kw_only=False):
@@ -230,11 +222,11 @@ class BalancerShaft(ParameterSet, kw_only=False):
 
     def contradictions(self) -> Sequence[str]:
         """The ratio."""
-        if self.ratio and self.ratio == round(self.ratio):
+        if self.ratio == round(self.ratio) and 1 <= abs(self.ratio) <= HIGHEST:
             return ()
         return (
             f"ratio = {self.ratio:g}: a balancer shaft turns a whole number of times a turn of the crank, as "
-            "-1 (opposite) or 2.",
+            f"-1 (opposite) or 2, at most {HIGHEST}.",
         )
 
     @property

@@ -41,6 +41,10 @@ STILL = 1e-9
 ROUNDING = 2e-15  # of the time: accuracy of an event's instant
 SAME = 1.0 + 1e-13  # ratio of peaks that count as equal
 MANY = 500  # steps, each shorter than two radians of the fastest oscillation
+FIGURES = (
+    "status", "slip_time", "end_time", "peak_torque", "peak_time", "slip_peak_torque", "slip_peak_time",
+    "locked_peak_torque", "peak_ratio", "friction_work", "slip_work", "work_while_engaging", "lining_heat",
+)  # fmt: skip
 PATIENCE = 20.0  # times the slip time on a rigid shaft, until an engagement is given up
 
 
@@ -90,38 +94,22 @@ class EnergyBalance:
 class Engagement:
     """One engagement, as `engage` returns it: torques in N m, times in s, work in J.
 
-    Parameters
+    Attributes
     ----------
-    clutch : Clutch
-        The clutch.
-    law : Law
-        Its engagement law.
     status : str
         "LOCKED", or "SLIPS" if the clutch slips at the end.
-    slip_time : float
-        tau1, the first instant at which the clutch side turns at w0 and is held there, s.
-    end_time : float
-        End of the run, s.
-    peak_torque, peak_time : float
-        Largest |T| of all, N m, and its instant, s.
-    slip_peak_torque, slip_peak_time : float
-        Largest |T| up to tau1, [C] (2), and its instant.
-    locked_peak_torque : float
-        Largest |T| after tau1, N m.
-    friction_work : float
-        Work of all slip, before and after tau1, J.
-    slip_work : float
-        Work of the slip up to tau1, J, [C] (3).
-    work_while_engaging : float
-        Work of the slip before the torque of the law is held, J.
+    slip_time, end_time : float
+        tau1, the first instant at which the clutch side turns at w0 and is held there; end of the run.
+    peak_torque, slip_peak_torque, locked_peak_torque : float
+        Largest |T| of all, up to tau1, [C] (2), and after tau1.
+    peak_time, slip_peak_time : float
+        Instants of the first two.
+    friction_work, slip_work, work_while_engaging : float
+        Work of all slip, of that up to tau1, [C] (3), and of that before the torque of the law is held.
     energy : EnergyBalance
         Where the work of the driving side went.
-    phases : tuple of Phase
-        Spans of slip and of lock.
-    events : tuple of Event
-        All changes of mode.
-    steps : tuple of Step
-        The Taylor series of all steps.
+    phases, events, steps : tuple
+        Spans of slip and of lock; changes of mode; the Taylor series of all steps.
 
     References
     ----------
@@ -195,20 +183,8 @@ class Engagement:
             "clutch": self.clutch.summary(),
             "law": self.law.label,
             "engaged_at": self.law.engaged_at,
-            "status": self.status,
-            "slip_time": self.slip_time,
-            "end_time": self.end_time,
-            "peak_torque": self.peak_torque,
-            "peak_time": self.peak_time,
-            "slip_peak_torque": self.slip_peak_torque,
-            "slip_peak_time": self.slip_peak_time,
-            "locked_peak_torque": self.locked_peak_torque,
+            **{name: getattr(self, name) for name in FIGURES},
             "mean_torque": self.clutch.mean_torque,
-            "peak_ratio": self.peak_ratio,
-            "friction_work": self.friction_work,
-            "slip_work": self.slip_work,
-            "work_while_engaging": self.work_while_engaging,
-            "lining_heat": self.lining_heat,
             "energy": {**asdict(self.energy), "residual": self.energy.residual},
             "phases": [asdict(phase) for phase in self.phases],
             "events": [{"time": event.t, "event": event.name} for event in self.events],

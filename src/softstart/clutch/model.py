@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, Self, cast, get_args
 
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
@@ -184,23 +183,18 @@ class Clutch(ParameterSet, kw_only=False):
         wrong = []
         held = self.clutch_torque
         if self.law == "table":
-            wrong = list(self._table_mistakes())
+            wrong = self._table_mistakes()
             if not wrong and self.law_torques is not None:
                 held = self.law_torques[-1]
         elif self.law_times is not None or self.law_torques is not None:
-            kinds = ", ".join(LAWS)
             wrong.append(
                 f'law = "{self.law}": only the law "table" has law_times and law_torques; write law = '
-                f'"table", or leave them out for {kinds}.'
+                f'"table", or leave them out for {", ".join(LAWS)}.'
             )
-        if self.time_constant == 0.0:
-            wrong.append(
-                "time_constant = 0: the time constant of the exponential law must not be 0; [C] has 1 s."
-            )
-        elif self.law == "exponential" and abs(self.engagement_time / self.time_constant) > 500.0:
+        if self.law == "exponential" and self.engagement_time > 500.0 * abs(self.time_constant):
             wrong.append(
                 f"time_constant = {self.time_constant:g}: engagement_time is more than 500 of these, which "
-                "is a step and no law; give a longer time constant."
+                "is a step and no law; give a longer time constant, as 1 s in [C]."
             )
         if not held > self.load_torque:
             wrong.append(
@@ -227,27 +221,16 @@ class Clutch(ParameterSet, kw_only=False):
                 return
 
     def _table_mistakes(self) -> list[str]:
-        times, torques = self.law_times, self.law_torques
-        if times is None or torques is None:
-            missing = "law_times" if times is None else "law_torques"
-            return [f'law = "table": {missing} is missing; give instants in s and friction torques in N m.']
-        if len(times) != len(torques):
+        times, torques = self.law_times or (), self.law_torques or ()
+        if not (len(times) == len(torques) > 0 and times[0] == 0.0 and sorted(times) == list(times)):
             return [
-                f"law_torques has {len(torques)} values and law_times {len(times)}: give a torque for each "
-                f"instant."
+                f"law_times, law_torques: there are {len(times)} and {len(torques)} values; a table has a "
+                "torque (N m) for each instant (s), begins at 0 s, and its instants do not go back."
             ]
-        wrong = []
-        if times[0] != 0.0:
-            wrong.append(f"law_times[0] = {times[0]:g}: a table begins at 0 s.")
-        for i, (before, after) in enumerate(pairwise(times), start=1):
-            if after < before:
-                wrong.append(f"law_times[{i}] = {after:g}: the instants must not go back; sort them.")
-                break
         most = max(torques)
         if most > self.clutch_torque * ABOVE:
-            wrong.append(
+            return [
                 f"law_torques[{torques.index(most)}] = {most:g}: more than the engaged clutch has, "
-                f"clutch_torque = "
-                f"{self.clutch_torque:g} N m; lower the table or raise clutch_torque."
-            )
-        return wrong
+                f"clutch_torque = {self.clutch_torque:g} N m; lower the table or raise clutch_torque."
+            ]
+        return []

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.balancing.engine import INDICATOR_FILE
+from softstart.balancing.engine import INDICATOR_FILE, TURNS, force_at, shaking_of_crank, shaking_of_shafts
 from softstart.balancing.gas import MeasuredCycle
-from softstart.balancing.parts import CYCLE_ANGLE
+from softstart.balancing.parts import CYCLE_ANGLE, HIGHEST, Counterweights
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -29,11 +29,17 @@ from softstart.views.sheet import Sheet, columns_file, records_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.balancing.design import Balance, Residual
+    from softstart.balancing.design import Balance
 
 STEPS = 1440  # of the torque over the cycle: half degrees
 COUPLED = "couple-shaft", "two-couple-shafts"  # designs for the couple
 BARS = 6.0  # highest order in the bar chart
+OVER_SPEED = (  # what is drawn over the speed, a height if there are any, a couple if it is not 0
+    ("moment of first order\non the housing, N m", "first_order_moment", 1.0),
+    ("height |h| of the shafts\nfrom the crank, mm", "height", 1e3),
+    ("largest force\non the housing, kN", "force", 1e-3),
+    ("couple of first order\non the housing, N m", "first_order_couple", 1.0),
+)
 
 
 def balance_sheet(found: Balance) -> Sheet:
@@ -120,8 +126,9 @@ def _designs(found: Balance) -> Table:
     """What each design needs and leaves."""
     i, all_of = found.tuning_index, found.residuals
     at_tuning = {
-        "moment\nN m": "first_order", "at most\nN m": "", "all orders\nN m": "moment", "force\nN": "force",
-        "all orders\nN": "all_forces", "couple\nN m": "couple", "couple, all\nN m": "all_couples",
+        "moment\nN m": "first_order_moment", "at most\nN m": "", "all orders\nN m": "moment",
+        "force\nN": "first_order_force", "all orders\nN": "force", "couple\nN m": "first_order_couple",
+        "couple, all\nN m": "couple",
     }  # fmt: skip
     cells = {
         "balancer": [one.name for one in all_of],
@@ -129,25 +136,25 @@ def _designs(found: Balance) -> Table:
         "e\nmm": [number(None if one.offset is None else 1e3 * one.offset[i], 2) for one in all_of],
     }
     for heading, key in at_tuning.items():
-        values = [float(getattr(one, key)[i] if key else one.first_order.max()) for one in all_of]
-        if "couple" not in key or any(one.all_couples[i] > 0.0 for one in all_of):
+        values = [float(getattr(one, key)[i] if key else one.first_order_moment.max()) for one in all_of]
+        if "couple" not in key or any(one.couple[i] > 0.0 for one in all_of):
             cells[heading] = column_of(values)
     return Table.of(f"Left on the housing at {_rpm(found)}, first and all orders", cells, ("balancer",))
 
 
 def _speeds(found: Balance) -> list[Table]:
     """What is left of first order over the speeds asked for: moment, and couple if any."""
-
-    def table(what: str, key: str, residuals: Sequence[Residual]) -> Table:
-        where = [int(np.argmin(np.abs(found.speeds - speed))) for speed in found.shown]
-        cells = {"speed\nrpm": [f"{found.speeds[i] * RPM:.6g}" for i in where]}
-        for one in residuals:
-            cells[one.name.replace("-", "\n", 1)] = [number(float(getattr(one, key)[i]), 1) for i in where]
-        return Table.of(f"First-order {what} left on the housing, N m", cells)
-
-    moments = table("moment", "first_order", [o for o in found.residuals if not o.name.endswith(COUPLED)])
-    coupled = any(np.any(one.couple > 0.0) for one in found.residuals)
-    return [moments, table("couple", "couple", found.residuals)] if coupled else [moments]
+    tables, where = [], found.shown_indices
+    for what in ("moment", "couple"):
+        of = [one for one in found.residuals if what == "couple" or not one.name.endswith(COUPLED)]
+        left = {one.name.replace("-", "\n", 1): one.columns[f"first_order_{what}"] for one in of}
+        if what == "moment" or any(values is not None and np.any(values > 0.0) for values in left.values()):
+            cells = {"speed\nrpm": [f"{found.speeds[i] * RPM:.6g}" for i in where]}
+            cells |= {
+                name: [number(float(v[i]), 1) for i in where] for name, v in left.items() if v is not None
+            }
+            tables.append(Table.of(f"First-order {what} left on the housing, N m", cells))
+    return tables
 
 
 def _rpm(found: Balance) -> str:
@@ -200,14 +207,13 @@ def torque_figure(found: Balance) -> Any:
     harmonics = found.engine.torque_harmonics(found.tuning_speed, found.load)
     mean, wave = harmonics[0].real, (harmonics[2] * np.exp(1j * np.radians(degrees))).real
     rows = [row for row in found.orders() if row["order"] <= BARS and row["torque"] > 0.0]
+    of_gas, of_inertia = (
+        [math.hypot(row[f"{what}_cosine"], row[f"{what}_sine"]) for row in rows]
+        for what in ("gas", "inertia")
+    )
     parts = {
-        "gas": (gas, [math.hypot(row["gas_cosine"], row["gas_sine"]) for row in rows], 1, "//"),
-        "inertia": (
-            inertia,
-            [math.hypot(row["inertia_cosine"], row["inertia_sine"]) for row in rows],
-            2,
-            "..",
-        ),
+        "gas": (gas, of_gas, 1, "//"),
+        "inertia": (inertia, of_inertia, 2, ".."),
         "both": (gas + inertia, [row["torque"] for row in rows], 0, ""),
     }
     with drawing():
@@ -232,25 +238,20 @@ def torque_figure(found: Balance) -> Any:
 
 def residual_figure(found: Balance) -> Any:
     """First-order moment left, the arm that each design needs, forces and couples, over the speed."""
-    of: Sequence[Any] = found.residuals
-    designed = [(i, one) for i, one in enumerate(of) if one.height is not None and one.name[-2:] != "-e"]
-    shown = {
-        "moment of first order\non the housing, N m": [(i, one.first_order) for i, one in enumerate(of)],
-        "height |h| of the shafts\nfrom the crank, mm": [
-            (i, 1e3 * np.abs(one.height)) for i, one in designed
-        ],
-        "largest force\non the housing, kN": [(i, 1e-3 * one.all_forces) for i, one in enumerate(of)],
-        "couple of first order\non the housing, N m": [
-            (i, one.couple) for i, one in enumerate(of) if any(np.any(each.couple > 0.0) for each in of)
-        ],
-    }
-    shown = {up: curves for up, curves in shown.items() if curves}
+    shown = {}
+    for up, key, scale in OVER_SPEED:
+        curves = [
+            (i, one.name, scale * np.abs(values))
+            for i, one in enumerate(found.residuals)
+            if (values := one.columns[key]) is not None and not (key == "height" and one.name.endswith("-e"))
+        ]
+        if (key != "first_order_couple" and curves) or any(np.any(values > 0.0) for *_, values in curves):
+            shown[up] = curves
     with drawing():
         figure, panels = new_figure(len(shown), 1, (8.0, 3.1 * len(shown)), sharex=True)
         for axes, (up, curves) in zip(panels, shown.items(), strict=True):
-            for i, values in curves:
-                line = line_of(i, dashed=True)
-                axes.plot(found.speeds * RPM, values, label=of[i].name, clip_on=False, **line)
+            for i, name, values in curves:
+                axes.plot(found.speeds * RPM, values, label=name, clip_on=False, **line_of(i, dashed=True))
             axes.set_ylabel(up)
             axes.axvline(found.tuning_speed * RPM, color=GREY, lw=0.9, ls=":")
             if up.startswith("height"):
@@ -267,20 +268,23 @@ def residual_figure(found: Balance) -> Any:
 
 def force_figure(found: Balance) -> Any:
     """The force vector over a turn at the tuning speed: first order on the left, all orders on the right."""
-    engine, crank = found.engine, found.engine.crank_shaking[0]
-    kinds = {"without counterweights": engine.bare_shaking[0], "with counterweights": crank}
+    engine = found.engine
+    bare = shaking_of_crank(engine.cylinders, engine.masses, Counterweights(0.0, 0.0))[0]
+    crank = engine.crank_shaking[0]
+    kinds = {"without counterweights": bare, "with counterweights": crank}
     shafts = next((one.shafts for one in found.residuals if one.height is not None), engine.shafts)
     if shafts:
-        kinds["force of the shafts"] = engine.shaft_shaking(shafts)[0]
+        kinds["force of the shafts"] = shaking_of_shafts(shafts)[0]
         kinds["left with the shafts"] = crank + kinds["force of the shafts"]
     looks = ((1, "--"), (6, "-"), (2, "-."), (0, "-"))
     phi = np.linspace(0.0, 2.0 * np.pi, 721)
     with drawing():
         figure, panels = new_figure(1, 2, (6.6, 5.6), sharex=True, sharey=True)
-        for axes, title, highest in zip(panels, ("first order", "all orders"), (1, None), strict=True):
-            for (name, shaking), (index, dash) in zip(kinds.items(), looks, strict=False):
+        for axes, title, highest in zip(panels, ("first order", "all orders"), (1, HIGHEST), strict=True):
+            for (name, vectors), (index, dash) in zip(kinds.items(), looks, strict=False):
                 colour = COLOURS[index]
-                force = 1e-3 * found.tuning_speed**2 * shaking.up_to(highest).at(phi)
+                shown = np.where(np.abs(TURNS) <= highest, vectors, 0.0)
+                force = 1e-3 * found.tuning_speed**2 * force_at(shown, phi)
                 axes.plot(force.imag, force.real, color=colour, ls=dash, label=name)
                 axes.plot(force.imag[:1], force.real[:1], "o", ms=5, color=colour)
                 axes.plot(force.imag[180:181], force.real[180:181], "s", ms=5, color=colour, mfc="white")

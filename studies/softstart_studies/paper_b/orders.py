@@ -6,7 +6,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.balancing.slider_crank import SliderCrank, inertia_torque_harmonics, samples_needed
+from softstart.balancing.slider_crank import SliderCrank, inertia_torque_harmonics
 from softstart.study import Table
 from softstart_studies.paper_b.vaz import RPM, TUNING, VAZ
 
@@ -28,7 +28,7 @@ def inertia_torque_series(ratio: float, orders: int) -> Vector:
     >>> [round(float(b), 6) for b in inertia_torque_series(0.25, 4)[1:]]
     [0.063506, -0.50013, -0.192056, -0.016129]
     """
-    n = samples_needed(ratio, orders)
+    n = 256
     sine = _speed_series(ratio, n)  # s' = -r sum sine_p sin(p phi), s'' = -r sum p sine_p cos(p phi)
     cosine = np.arange(n + 1) * sine
     sums = np.convolve(sine, cosine)  # sin p cos q = [sin(p + q) + sin(p - q)]/2

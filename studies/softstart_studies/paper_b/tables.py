@@ -107,7 +107,7 @@ def designs(found: Balance) -> Table:
     assert last.offset is not None
     rows = []
     for n, i in _indices(found):
-        left = [round(float(one.first_order[i]), 2) for one in found.residuals]
+        left = [round(float(one.first_order_moment[i]), 2) for one in found.residuals]
         rows.append((n, *left, round(1e3 * float(last.height[i]), 2), round(1e3 * float(last.offset[i]), 2)))
     columns = ("n, rpm", *(one.name for one in found.residuals), "h(n), mm", "e(n), mm")
     return Table("First-order moment left on the housing, N m, at full load", columns, rows)

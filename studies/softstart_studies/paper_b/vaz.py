@@ -7,8 +7,8 @@ import math
 from functools import cache
 
 from softstart.balancing import Balance, Engine, SimpleCycle, balance
-from softstart.balancing.design import arm, free_force
-from softstart.balancing.engine import moment_harmonic
+from softstart.balancing.design import arm, two_shafts
+from softstart.balancing.engine import shaking_of_shafts
 
 RPM = math.pi / 30.0  # rad/s
 TUNING = 4500.0  # rpm
@@ -101,5 +101,5 @@ def left_at_load(load: float, rpm: float, *, sideways: bool = False) -> tuple[fl
     place = arm(VAZ, w, 1.0)
     place = place if sideways else complex(place.real)
     torque = VAZ.torque_harmonics(w, load)[2]
-    balancing = w**2 * moment_harmonic(place, -free_force(VAZ), forward=False)
+    balancing = w**2 * shaking_of_shafts(two_shafts(VAZ, place))[2][2]
     return float(abs(torque)), float(abs(balancing - torque))

@@ -27,7 +27,6 @@ from softstart_studies.paper_c.least_work import STEPS, OptimalLaw, Search
 from softstart_studies.paper_c.printed import IN_KGF, KGF
 
 HIGHEST = 1.5  # of the mean torque: peaks above are useless, and the clutch locks in mid-swing there
-HALVINGS = 12
 CROSS_CHECKED = 4  # the point at this part of each front, but not the first, by collocation
 COVERS = {
     name: f"all {words}laws with 0 <= M(t) <= MM for t < tM and M = MM from tM on, with which the clutch "
@@ -37,41 +36,12 @@ COVERS = {
 
 
 @dataclass(frozen=True, eq=False)
-class KnownLaw:
-    """A known law compared with the optimum at its own peak and at its own work; SI.
-
-    No law of the class with its peak has less work than `work_bound`, and the one found has `least_work`;
-    none with its work has a lower peak than `peak_bound`, and the one found has `least_peak`.
-    """
-
-    name: str
-    run: Engagement
-    least_work: float
-    work_bound: float
-    least_peak: float
-    peak_bound: float
-
-    def summary(self) -> dict[str, Any]:
-        """Everything as plain data, for JSON."""
-        work, peak = self.run.slip_work, self.run.slip_peak_torque
-        return {
-            "law": self.name,
-            "peak_torque": peak,
-            "slip_work": work,
-            "least_work": self.least_work,
-            "work_bound": self.work_bound,
-            "excess_work_percent": 100.0 * (work / self.least_work - 1.0),
-            "least_peak": self.least_peak,
-            "peak_bound": self.peak_bound,
-            "excess_peak_percent": 100.0 * (peak / self.least_peak - 1.0),
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class EngagementFront:
     """Least friction work over the peak of the shaft torque, as `optimize_engagement` returns it; SI.
 
-    `points` are the optimal laws of the class "any" or "nondecreasing" by rising peak, `laws` known ones.
+    `points` are the optimal laws of the class "any" or "nondecreasing" by rising peak. `laws` are known ones,
+    each with the least work found at its peak and the bound of that, and with the least peak of all where it
+    does no less work than the optimal law of that peak (None: it does less).
 
     >>> front = optimize_engagement(Clutch.load("paper-c"), 1, laws=False, steps=60)
     >>> front.law_class, len(front.points), front.points[0].gap_percent < 0.1
@@ -81,7 +51,7 @@ class EngagementFront:
     clutch: Clutch
     law_class: str
     points: tuple[OptimalLaw, ...]
-    laws: tuple[KnownLaw, ...]
+    laws: tuple[dict[str, Any], ...]
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
@@ -91,7 +61,7 @@ class EngagementFront:
             "bound_covers": COVERS[self.law_class],
             "mean_torque": self.clutch.mean_torque,
             "points": [point.summary() for point in self.points],
-            "laws": [law.summary() for law in self.laws],
+            "laws": list(self.laws),
         }
 
     def plot(self) -> Any:
@@ -100,11 +70,8 @@ class EngagementFront:
 
     def sheet(self) -> Sheet:
         """What the command shows and writes; each law of the front is a file that --law reads."""
-        points, laws = [one.summary() for one in self.points], [one.summary() for one in self.laws]
-        beaten = ", ".join(
-            law["law"] for law in laws
-            if law["peak_torque"] > points[0]["peak_torque"] and law["slip_work"] > points[0]["slip_work"]
-        )  # fmt: skip
+        points, laws = [one.summary() for one in self.points], self.laws
+        beaten = ", ".join(law["law"] for law in laws if law["least_peak"])
         files = {
             f"law-{i}.csv": columns_file({"t [s]": one.pop("times"), "M [N*m]": one.pop("torques")})
             for i, one in enumerate(points, start=1)
@@ -124,7 +91,6 @@ class EngagementFront:
             "friction\nwork J": column_of([law["slip_work"] for law in laws], 6),
             "least work at\nthis peak J": column_of([law["least_work"] for law in laws], 6),
             "excess\n%": [number(law["excess_work_percent"], 2) for law in laws],
-            "least peak at\nthis work N m": column_of([law["least_peak"] for law in laws], 5),
             "excess of\npeak %": [number(law["excess_peak_percent"], 2) for law in laws],
         }
         return Sheet(
@@ -210,40 +176,36 @@ def optimize_engagement(
         peak = search.slip.Tm * (1.0 + (HIGHEST - 1.0) * (i / max(points - 1, 1)) ** 2)
         progress(f"optimal law {i + 1} of {points}, {law_class}: peak {peak:.5g} N m")
         found.append(search.least_work(peak))
+    least = found[0]
     for name, run in _known_laws(clutch, search).items() if laws else ():
         progress(f"{name} against the optimum, {law_class}")
-        best = search.least_work(run.slip_peak_torque)
-        peaks = _least_peak(search, found[0], run)
-        known.append(KnownLaw(name, run, best.slip_work, best.work_bound, *peaks))
+        best, peak, work = search.least_work(run.slip_peak_torque), run.slip_peak_torque, run.slip_work
+        beaten = work >= least.slip_work
+        known.append(
+            {
+                "law": name,
+                "peak_torque": peak,
+                "slip_work": work,
+                "least_work": best.slip_work,
+                "work_bound": best.work_bound,
+                "excess_work_percent": 100.0 * (work / best.slip_work - 1.0),
+                "least_peak": least.peak_torque if beaten else None,
+                "excess_peak_percent": 100.0 * (peak / least.peak_torque - 1.0) if beaten else None,
+            }
+        )
     return EngagementFront(clutch, law_class, tuple(found), tuple(known))
 
 
 def _known_laws(clutch: Clutch, search: Search) -> dict[str, Engagement]:
     """The laws of [C] on this clutch, and its own table; only those that slip for a period beyond tM."""
-    made: dict[str, Clutch] = {
-        name: clutch.replace(law=name, law_times=None, law_torques=None) for name in LAWS
-    }
     slip = search.slip
+    made: dict[str, Clutch] = {}
+    for law in LAWS:
+        made[law] = clutch.replace(law=law, law_times=None, law_torques=None)
     if clutch.law == "table" and clutch.friction.held == slip.MM and clutch.friction.engaged_at <= slip.tM:
         made["table"] = clutch
     runs = {name: engage(one) for name, one in made.items()}
     return {name: run for name, run in runs.items() if run.slip_time - slip.tM >= slip.period}
-
-
-def _least_peak(search: Search, first: OptimalLaw, run: Engagement) -> tuple[float, float]:
-    """(peak found, peak proved) at the work of a run; `first` is the law with the least peak of all."""
-    low, high = search.slip.Tm, run.slip_peak_torque
-    if run.slip_work >= first.slip_work:
-        return first.peak_torque, low
-    peak, proved = high, low
-    for _ in range(HALVINGS):
-        law = search.least_work(0.5 * (low + high))
-        if law.slip_work <= run.slip_work:
-            peak, high = law.peak_torque, 0.5 * (low + high)
-        else:
-            low = 0.5 * (low + high)
-            proved = low if search.work_bound(low) > run.slip_work else proved
-    return peak, proved
 
 
 # laws of two numbers -----------------------------------------------------------------------------------
@@ -297,11 +259,13 @@ def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
         for one in found
         for point in one.points
     ]  # fmt: skip
-    distances = []
-    for law_class, law in ((front.law_class, law.summary()) for front in found for law in front.laws):
-        in_kgf = [law[key] / KGF for key in ("peak_torque", "slip_work", "least_work", "least_peak")]
-        off = law["excess_work_percent"], law["excess_peak_percent"]
-        distances.append((law_class, law["law"], *in_kgf[:3], off[0], in_kgf[3], off[1]))
+    distances = [
+        (front.law_class, law["law"], law["peak_torque"] / KGF, law["slip_work"] / KGF,
+         law["least_work"] / KGF, law["excess_work_percent"],
+         law["least_peak"] and law["least_peak"] / KGF, law["excess_peak_percent"])
+        for front in found
+        for law in front.laws
+    ]  # fmt: skip
     simple, checked = [], []
     names = (("full torque, pause, full torque", pulse_and_pause), ("two steps", two_steps))
     for one, (name, law_of) in zip(found, names, strict=True):
@@ -362,8 +326,8 @@ def front_figure(fronts: list[EngagementFront], unit: tuple[float, str] = IN_KGF
             head(panel, f"laws, {one.law_class}", f"friction torque, {name}", "time, s")
             panel.legend(loc="lower right", fontsize=8)
         for law, marker, colour in zip(fronts[0].laws, MARKERS, COLOURS[3:], strict=False):
-            point = [law.run.slip_peak_torque / size], [law.run.slip_work / size]
-            front.plot(*point, marker, ms=7, mfc="none", mew=1.6, color=colour, label=law.name)
+            point = [law["peak_torque"] / size], [law["slip_work"] / size]
+            front.plot(*point, marker, ms=7, mfc="none", mew=1.6, color=colour, label=law["law"])
         front.axvline(fronts[0].clutch.mean_torque / size, color=GREY, lw=0.8, ls=":")
         across = f"peak of the shaft torque, {name}     (dotted: none lower)"
         work = "J" if size == 1.0 else name

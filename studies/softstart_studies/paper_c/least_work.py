@@ -41,6 +41,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.clutch import Clutch, Engagement, engage
 from softstart.errors import InputError, SimulationError
+from softstart.quantities import show
 
 STEPS = 160  # torques of a law
 CHECKS = 4  # instants in each of them at which T <= P is asked
@@ -60,21 +61,14 @@ class Slip:
     """The constants of a clutch whose optimal law is sought; InputError where the optimum is not linear."""
 
     def __init__(self, clutch: Clutch) -> None:
-        wrong = []
-        if clutch.gap > 0.0:
-            wrong.append(
-                f"gap = {clutch.gap:g}: the optimal law is known for a shaft without a gap, as in [C]; set "
-                "gap = 0 (engage simulates a law with the gap)."
-            )
-        if clutch.damping > 0.0:
-            wrong.append(
-                f"damping = {clutch.damping:g}: the optimal law is known without damping; set damping = 0."
-            )
-        if clutch.load_kind != "active" and clutch.load_torque > 0.0:
-            wrong.append(
-                'load_kind = "reactive": the optimal law is known for a load that acts always; set '
-                '"active", or load_torque = 0.'
-            )
+        load = "active" if clutch.load_torque == 0.0 else clutch.load_kind
+        known = (("gap", clutch.gap, 0.0), ("damping", clutch.damping, 0.0), ("load_kind", load, "active"))
+        wrong = [
+            f"{key} = {show(value)}: the optimal law is known for {show(usual)} only, as in [C]; set {key} = "
+            f"{show(usual)} (engage simulates any other)."
+            for key, value, usual in known
+            if value != usual
+        ]
         if wrong:
             raise InputError(wrong)
         self.IM, self.Ic, self.cp = clutch.clutch_inertia, clutch.load_inertia, clutch.stiffness

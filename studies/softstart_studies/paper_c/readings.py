@@ -14,28 +14,20 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_simpson, simpson, solve_ivp
+from scipy.integrate import cumulative_simpson, simpson
 
 from softstart.arrays import Vector
+from softstart.clutch import Clutch, engage
 from softstart.study import Table
 from softstart_studies.paper_c.printed import PRINTED
 
 w0, MM, Mc, tM, cp = 230.0, 60.0, 20.0, 1.0, 5.0  # kgf m, s
 LOADS = ("acts from t = 0", "stands until the shaft carries it", "carried by the shaft before t = 0")
-OWN = (
-    "as (1) has it",
-    "A of the other sign",
-    "A = 0",
-)  # of (6): the arctangent leaves the quadrant of alpha open
+OWN = "as (1) has it", "A of the other sign", "A = 0"  # of (6): the arctangent leaves the quadrant open
 INERTIAS = ("as printed", "exchanged")
 CARRIED = (
-    "phi, phi'",
-    "phi, phi' = 0",
-    "phi = 0, phi'",
-    "phi = 0, phi' = 0",
-    "phi, -phi'",
-    "A1 of the other sign",
-)
+    "phi, phi'", "phi, phi' = 0", "phi = 0, phi'", "phi = 0, phi' = 0", "phi, -phi'", "A1 of the other sign"
+)  # fmt: skip
 SLIPS = ("clutch side", "load")
 ROOTS = ("first", "without oscillation")
 PEAKS = ("largest up to tau1", "largest up to tM", "mean + amplitude")
@@ -91,14 +83,14 @@ class _Start(NamedTuple):
 def _engaging(law: str, load: str, own: str, IM: float, Ic: float) -> _Start:
     """(1) up to tM, integrated; or the closed form with its own oscillation A changed."""
     t = np.linspace(0.0, tM, 601)
+    if load == LOADS[1]:
+        return _standing(law, t, IM, Ic)
     if law in POWERS:
         k, q = POWERS[law]
         M = MM * (k * t + q * t * t)
     else:
         M = MM * np.expm1(t) / math.expm1(1.0)
     z0 = Mc / cp if load == LOADS[2] else 0.0
-    if load == LOADS[1]:
-        return _standing(t, M, IM, Ic)
     B = math.sqrt(cp * (1.0 / IM + 1.0 / Ic))
     forced, rate = _forced(law, t, B, IM, Ic)
     factor = dict(zip(OWN, (1.0, -1.0, 0.0), strict=True))[own]
@@ -124,24 +116,17 @@ def _forced(law: str, t: Vector, B: float, IM: float, Ic: float) -> tuple[Vector
     return k * t + q * (t * t - 2.0 / B**2) + load, k + 2.0 * q * t
 
 
-def _standing(t: Vector, M: Vector, IM: float, Ic: float) -> _Start:
-    """A load that stands until the shaft carries it."""
-
-    def slopes(at: float, y: list[float]) -> list[float]:
-        z, wM, wc = y[0], y[1], y[2]
-        torque, T = float(np.interp(at, t, M)), cp * z
-        held = wc <= 0.0 and Mc > T
-        return [
-            wM - wc,
-            (torque - T) / IM,
-            0.0 if held else (T - Mc) / Ic,
-            torque * (w0 - wM),
-            torque * (w0 - wc),
-        ]
-
-    y = solve_ivp(slopes, (0.0, tM), [0.0] * 5, "DOP853", t[::3], rtol=1e-8, atol=1e-8, max_step=0.02).y
-    z, wM, wc, by_clutch, by_load = y[:, -1].tolist()
-    return _Start(z, wM - wc, wM, wc, (by_clutch, by_load), cp * float(y[0].max()))
+def _standing(law: str, t: Vector, IM: float, Ic: float) -> _Start:
+    """A load that stands until the shaft carries it, by the exact clutch; all in kgf m."""
+    clutch = Clutch(
+        clutch_inertia=IM, clutch_torque=MM, drive_speed=w0, engagement_time=tM, stiffness=cp,
+        load_inertia=Ic, load_torque=Mc, load_kind="reactive", law=law,
+    )  # fmt: skip
+    run = engage(clutch, until=tM)
+    at = run.at(t)
+    work = [float(simpson(at["M"] * (w0 - at[w]), x=t)) for w in ("wM", "wc")]
+    z, v, wM, wc = (float(at[name][-1]) for name in ("theta", "v", "wM", "wc"))
+    return _Start(z, v, wM, wc, (work[0], work[1]), run.peak_torque)
 
 
 def _slipping(

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from tests.softstart.balancing.engines import ORDERS, RPM, engine
 
 from softstart.balancing import Counterweights
+from softstart.balancing.engine import ORDERS as HALVES
+from softstart.balancing.engine import TURNS, force_at, largest
 from softstart.balancing.slider_crank import acceleration_harmonics
 
 PHI = np.linspace(0.0, 4.0 * np.pi, 361)
@@ -23,7 +25,7 @@ orders = st.sampled_from(sorted(ORDERS.values()))
 @given(lengths, orders)
 def test_orders_make_up_the_inertia_torque(geometry, order):
     made = engine(order, **geometry)
-    series = (np.exp(1j * np.outer(PHI, made.orders)) @ (W**2 * made.inertia_harmonics)).real
+    series = (np.exp(1j * np.outer(PHI, HALVES)) @ (W**2 * made.inertia_harmonics)).real
     exact = made.inertia_torque(PHI, W)
     scale = len(order) * made.masses.reciprocating * (made.cylinders.crank.r * W) ** 2
     # 24 orders: what is beyond falls with the 24th power of half the ratio
@@ -77,8 +79,8 @@ def test_forces_are_the_loss_of_momentum(order):
         force, couple = force + one, couple + place * one
     found, turning = made.crank_shaking
     scale = len(order) * m * crank.r
-    assert found.at(PHI) == pytest.approx(force, abs=1e-12 * scale)
-    assert turning.at(PHI) == pytest.approx(couple, abs=1e-12 * scale)
+    assert force_at(found, PHI) == pytest.approx(force, abs=1e-12 * scale)
+    assert force_at(turning, PHI) == pytest.approx(couple, abs=1e-12 * scale)
 
 
 def test_firing_follows_the_order_and_throws_follow_the_firing():
@@ -121,7 +123,7 @@ def test_gas_orders_agree_with_an_fft_that_is_refined(order):
 def first_and_second(made):
     force, couple = made.crank_shaking
     unit = made.masses.reciprocating * made.cylinders.crank.r
-    return force.largest[1:3] / unit, couple.largest[1:3] / (unit * made.cylinders.spacing)
+    return largest(force)[1:3] / unit, largest(couple)[1:3] / (unit * made.cylinders.spacing)
 
 
 A2 = acceleration_harmonics(0.042 / 0.14, 2)[2]
@@ -132,9 +134,9 @@ def test_single_cylinder_and_half_of_it_on_the_crank():
     assert force == pytest.approx([1.0, A2], rel=1e-12)
     half = engine((1,), weights=Counterweights(0.5, 1.0))
     shaking = half.crank_shaking[0]
-    assert shaking.forward[1] == pytest.approx(0.0, abs=1e-18)
+    assert shaking[1] == pytest.approx(0.0, abs=1e-18)
     # what is left turns against the crank with constant size m r/2
-    left = shaking.up_to(1).at(PHI)
+    left = force_at(np.where(abs(TURNS) < 2, shaking, 0.0), PHI)
     assert np.abs(left) == pytest.approx(0.5 * 0.5 * 0.042, rel=1e-12)
     assert np.unwrap(np.angle(left)) == pytest.approx(-PHI, abs=1e-9)
 
@@ -162,9 +164,9 @@ def test_four_cylinders_cancel_in_the_first_order_and_add_in_the_second():
 def test_six_cylinders_cancel_up_to_the_fifth_order():
     made = engine((1, 5, 3, 6, 2, 4))
     force, couple = made.crank_shaking
-    assert np.all(force.largest[:6] == 0.0)
-    assert np.all(couple.largest[:6] == 0.0)
-    assert force.largest[6] > 0.0
+    assert np.all(largest(force)[:6] == 0.0)
+    assert np.all(largest(couple)[:6] == 0.0)
+    assert largest(force)[6] > 0.0
 
 
 # units -------------------------------------------------------------------------------------------------
@@ -177,5 +179,5 @@ def test_size_and_speed_scale_as_their_dimensions(k, speed):
     small, large = (engine((1, 2), bore=0.08 * f, stroke=0.084 * f, rod_length=0.14 * f) for f in (1.0, k))
     assert large.inertia_harmonics == pytest.approx(k**2 * small.inertia_harmonics, rel=1e-12)
     assert large.gas_harmonics(W) == pytest.approx(k**3 * small.gas_harmonics(W), rel=1e-9, abs=1e-12)
-    assert large.crank_shaking[0].largest == pytest.approx(k * small.crank_shaking[0].largest, rel=1e-12)
+    assert large.crank_shaking[0] == pytest.approx(k * small.crank_shaking[0], rel=1e-12)
     assert small.inertia_torque(PHI, speed * W) == pytest.approx(speed**2 * small.inertia_torque(PHI, W))

@@ -56,15 +56,13 @@ ONE_SENTENCE = {
     "law": (["--law", "linaer"], ['--law = "linaer"', "did you mean linear?"]),
     "file of a law": (["--law", "none.csv"], ['"none.csv": there is no such file', "law (CSV)"]),
     "key": (["--set", "load.torqe=3"], ["did you mean load.torque?"]),
-    "setting": (["--set", "load.torque"], ["--set", "an equals sign"]),
-    "unit": (["--set", "load.torque=3 N"], ["N is a force, not a torque"]),
     "stiffness": (["--set", "shaft.stiffness=1e20"], ["stiffness = 1e+20", "must be between 1e-09 and"]),
     "soft": (["--set", "shaft.stiffness=1e-20"], ["stiffness = 1e-20", "1.11e-10 1/s"]),
     "until": (["--until", "-1"], ["--until", "above 0 s"]),
     "points alone": (["--points", "3"], ['--points = "3"', "add --optimal"]),
     "count": (["--optimal", "--points", "many"], ['--points = "many"', "from 1 to 200"]),
     "until of an optimum": (["--optimal", "--until", "3"], ["leave it out with --optimal"]),
-    "gap of an optimum": (["--optimal", "--set", "shaft.gap=0.1"], ["gap = 0.1", "without a gap"]),
+    "gap of an optimum": (["--optimal", "--set", "shaft.gap=0.1"], ["gap = 0.1", "set gap = 0"]),
 }
 
 
