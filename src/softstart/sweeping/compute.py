@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice, product
@@ -14,11 +14,11 @@ import numpy as np
 
 from softstart.chain.machines import Machine, varied
 from softstart.controller.base import CompiledController
+from softstart.controller.recipe import Recipe
 from softstart.errors import InputError, Mistakes
 from softstart.start.batch import named, prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
-from softstart.sweeping.maker import Maker
 
 Block = dict[str, Any]  # figure -> array of the chunk's shape
 CODES = {status.name: code for code, status in enumerate(Status)}
@@ -43,7 +43,7 @@ class Question:
     """What is the same for all starts of a sweep. `fitted_to` and `base` as in `simulate`."""
 
     drive: Machine
-    maker: Maker
+    recipe: Recipe
     figures: tuple[str, ...]
     until: float | None = None
     fitted_to: Machine | None = None
@@ -63,18 +63,16 @@ class Task:
 def compute(task: Task) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
     question, shape = task.question, tuple(axis.size for axis in task.axes)
-    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
-    for column, values in _spread(task.axes, shape):
-        given[column.owner][column.field] = values
+    drive, more, name = _sorted(_spread(task.axes, shape))
     # the gap of every start, so that each chunk is a table
     gaps = np.full(math.prod(shape), question.drive.gap_and_inertia[0])
-    machines = varied(question.drive, {"gap": gaps, **given["drive"]})
-    made = question.maker.make(given["parameter"], given["controller"][""])
+    machines = varied(question.drive, {"gap": gaps, **drive})
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
     found = prepared(machines, question.time_limit).figures(
-        made.set_ups(fitted_to or machines), (question.base or machines).mean_torque,
+        question.recipe.make(more, name).set_ups(fitted_to or machines),
+        (question.base or machines).mean_torque,
         until=question.until,
-    )  # fmt: skip
+    )
     block: Block = {
         name: np.ascontiguousarray(found[name][0], dtype=np.float64).reshape(shape)
         for name in question.figures
@@ -94,6 +92,14 @@ def _spread(axes: tuple[Axis, ...], shape: tuple[int, ...]) -> Iterator[tuple[Co
                 yield column, np.broadcast_to(column.values.reshape(along), shape).ravel()
             else:
                 yield column, column.values[0]
+
+
+def _sorted(values: Iterable[tuple[Column, Any]]) -> tuple[dict[str, Any], dict[str, Any], str]:
+    """Values of the machine, parameters of the controller, and its name if that is from an axis."""
+    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
+    for column, value in values:
+        given[column.owner][column.field] = value
+    return given["drive"], given["parameter"], given["controller"][""]
 
 
 def check_corners(question: Question, axes: tuple[Axis, ...]) -> None:
@@ -120,17 +126,14 @@ def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
 
 
 def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
-    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
-    for column, value in values:
-        given[column.owner][column.field] = value
-    wrong = Mistakes()
+    wrong, (drive, more, name) = Mistakes(), _sorted(values)
     with wrong.noted():
-        if any(isinstance(value, np.ndarray) for value in given["drive"].values()):
-            varied(question.drive, given["drive"])
+        if any(isinstance(value, np.ndarray) for value in drive.values()):
+            varied(question.drive, drive)
         else:
-            question.drive.with_values(given["drive"])
+            question.drive.with_values(drive)
     with wrong.noted():
-        question.maker.make(given["parameter"], given["controller"][""])
+        question.recipe.make(more, name)
     wrong.settle()
 
 
@@ -145,7 +148,7 @@ def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
         first = tuple(Axis(axis.name, tuple(_one(c, name) for c in axis.columns)) for axis in axes)
         compute(Task((), question, first))
         design = (question.fitted_to or question.drive).design_drive
-        compiled &= isinstance(question.maker.make({}, name).set_up(design)[0], CompiledController)
+        compiled &= isinstance(question.recipe.make(name=name).set_up(design)[0], CompiledController)
     return compiled
 
 

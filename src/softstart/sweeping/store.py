@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from softstart import __version__
+from softstart.controller.recipe import about_name
 from softstart.errors import InputError
 from softstart.start.status import Status
 from softstart.stopping import at_stop
 from softstart.store import Records, Target, fresh_folder, warn_of_damage
 from softstart.sweeping.compute import Block, Question, known_figures
 from softstart.sweeping.grid import Axis, Plan
-from softstart.sweeping.maker import about_name
 
 if TYPE_CHECKING:
     import xarray
@@ -66,7 +66,7 @@ def empty_results(plan: Plan, axes: tuple[Axis, ...], question: Question) -> xar
         for column in axis.columns:
             about = {"units": column.unit} if column.numeric else {}
             coords[column.name] = axis.name, np.array(column.values), about | {"long_name": column.meaning}
-    shown, fitted_to = question.maker.shown, question.fitted_to
+    shown, fitted_to = question.recipe.label, question.fitted_to
     attributes = {
         **({} if fitted_to is None else {"softstart_fitted_to": fitted_to.to_toml()}),
         "title": f"{question.drive.name}, {shown}" if shown else question.drive.name,
@@ -82,7 +82,7 @@ def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
     fitted_to, base = (one and one.to_toml() for one in (question.fitted_to, question.base))
     found: dict[str, Any] = {
         "drive": question.drive.to_toml(),
-        "controller": question.maker.about(),
+        "controller": question.recipe.about(),
         "order of the axes": [axis.name for axis in axes],
         "figures": list(question.figures),
         "until": question.until,

@@ -214,10 +214,10 @@ def test_labels():
 
 
 @pytest.mark.parametrize("wrong", [
-    {"workers": 0}, {"workers": 1.5}, {"workers": "two"}, {"chunk": 0}, {"figures": "k_dyn"}, {"figures": []},
+    {"workers": 0}, {"workers": 1.5}, {"workers": "two"}, {"chunk": 0}, {"chunk": "many"},
+    {"figures": "k_dyn"}, {"figures": []},
     {"figures": ["k_dyn", 3]}, {"until": 0.0}, {"time_limit": float("nan")}, {"base": "crane-4amtkf"},
     {"fitted_to": records(CRANE, gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
-    {"netcdf": "no/such/folder/out.nc"}, {"netcdf": "."},
 ])  # fmt: skip
 def test_options_that_cannot_be_are_refused_in_one_sentence(wrong):
     with pytest.raises(InputError) as caught:
