@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     import pint
 
 __all__ = [
-    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "check_whole", "doubtful_comma", "multiple",
-    "multiplied", "nearest", "parse", "read_unit", "shortest", "show", "to_si", "values_in", "whole_number",
-    "with_points",
+    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "check_whole", "doubtful_comma",
+    "multiple", "multiplied", "nearest", "parse", "read_unit", "shortest", "show", "to_si", "values_in",
+    "whole_number", "with_points",
 ]  # fmt: skip
 
 Value = float | NDArray[np.float64]

@@ -31,7 +31,6 @@ class Found:
     judged: Judged
     costs: Vector
     restart_costs: Vector
-    kept_default: Any  # whether a job's defaults were best
 
 
 Progress = Callable[[str], object]
@@ -157,4 +156,4 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
     back = np.asarray((before < ours) & inside(trials.question.ranges, defaults, defaults))
     values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
     judged = Judged(*(np.where(back[:, None], *both) for both in zip(default, tuned, strict=True)))
-    return Found(values, judged, np.where(back, before, ours), restart_costs, back)
+    return Found(values, judged, np.where(back, before, ours), restart_costs)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ from softstart.chain.machines import Machine, one_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.records import is_machine
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
+from softstart.optimal.problem import StartTime
 from softstart.parallel import Pool, checked_workers, why_not_sendable
+from softstart.quantities import check_whole
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target
@@ -21,14 +24,13 @@ from softstart.tuning.question import (
     MARGIN,
     Metric,
     Question,
-    bound_of,
     gaps_of,
     inertias_of,
     recipe_of,
     scenarios_drawn,
     scenarios_of,
 )
-from softstart.tuning.ranges import Free, check_number, ranges_of
+from softstart.tuning.ranges import Free, ranges_of
 from softstart.tuning.tables import (
     between_table,
     check_metric,
@@ -165,20 +167,50 @@ def tune(
     R. Storn, K. Price: Differential evolution - a simple and efficient heuristic for global optimization over
     continuous spaces, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
     """
-    drawn = None
+    if not (schedule or robust):
+        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
+    identified = drive if isinstance(drive, Uncertain) else None
     if isinstance(drive, Uncertain):
-        drawn = drive.draws(DRAWN)
         drive = drive.drive
         gaps = [drive.gap] if gaps is None else gaps
         inertias = [drive.load_inertia] if inertias is None else inertias
     drive = one_machine(drive)
     certified = isinstance(drive, Drive) if certified is None else certified
-    question = _question(
-        drive, controller, gaps, inertias, parameters, free, metric, start_time, tolerances, quantile, base,
-        seed, restarts, population, generations, drawn,
+    wrong = Mistakes()
+    whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}
+    whole |= {} if population is None else {"population": (population, 5)}
+    for name, (number, least) in whole.items():
+        with wrong.noted():
+            check_whole(number, name, least)
+    with wrong.noted():
+        scenarios = scenarios_of(drive, tolerances, 0 if wrong.sentences else seed)
+        if identified is not None:
+            scenarios = scenarios_drawn(identified.drive, identified.draws(DRAWN), scenarios)
+    with wrong.noted():
+        recipe = recipe_of(controller, parameters)
+        ranges = ranges_of(recipe.make(), free)
+    with wrong.noted():
+        rows = gaps_of(drive, gaps)
+    with wrong.noted():
+        columns = inertias_of(drive, inertias)
+    with wrong.noted():
+        bound = None if start_time is None else StartTime.of(start_time)
+    share: Any = quantile
+    if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
+        wrong.sentences.append(f"quantile = {share!r}: give a share of the starts above 0, at most 1.")
+    if base is not None and not is_machine(base):
+        wrong.sentences.append(f"base = {base!r}: K_dyn refers to one Drive or Chain; Drive.load reads one.")
+    if not isinstance(metric, str) and not callable(metric):
+        wrong.sentences.append(
+            f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures."
+        )
+    if metric == MARGIN and not has_margin(drive.limits):
+        wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
+    wrong.settle()
+    question = Question(
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), base, seed, restarts,
+        population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations,
     )  # fmt: skip
-    if not (schedule or robust):
-        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
     log = Log(progress)
     log.tell("starts with the defaults")
     sides = {
@@ -233,65 +265,3 @@ def _candidates(part: Any) -> str:
 
 def _optimum(asked: Any) -> str:
     return f"the optimum of cell {asked.cell + 1}"
-
-
-def _question(
-    drive: Machine,
-    controller: str | Controller,
-    gaps: Any,
-    inertias: Any,
-    parameters: Mapping[str, object] | None,
-    free: Free,
-    metric: Any,
-    start_time: Any,
-    tolerances: Any,
-    quantile: Any,
-    base: Any,
-    seed: Any,
-    restarts: Any,
-    population: Any,
-    generations: Any,
-    drawn: Any,
-) -> Question:
-    """All that was given, read; every mistake at once."""
-    wrong: list[str] = []
-
-    def read(what: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return what(*arguments)
-        except InputError as error:
-            wrong.extend(error.sentences)
-            return None
-
-    recipe = read(recipe_of, controller, parameters)
-    ranges = read(lambda: ranges_of(recipe.make(), free)) if recipe is not None else None
-    rows, columns = read(gaps_of, drive, gaps), read(inertias_of, drive, inertias)
-    bound = read(bound_of, start_time, drive, metric)
-    share = read(check_number, "quantile", quantile, 0.0, 1.0, "a share of the starts above 0, at most 1")
-    first = read(_whole, "seed", seed, 0)
-    again = read(_whole, "restarts", restarts, 1)
-    long = read(_whole, "generations", generations, 1)
-    room = None
-    if ranges is not None:
-        room = max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))
-        room = room if population is None else read(_whole, "population", population, 5)
-    scenarios = read(scenarios_of, drive, tolerances, first or 0)
-    if drawn is not None and scenarios is not None:
-        scenarios = read(scenarios_drawn, drive, drawn, scenarios)
-    if base is not None and not is_machine(base):
-        wrong.append(f"base = {base!r}: K_dyn refers to one Drive or Chain; Drive.load reads one.")
-    if not isinstance(metric, str) and not callable(metric):
-        wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
-    if metric == MARGIN and not has_margin(drive.limits):
-        wrong.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
-    if wrong or ranges is None or room is None:
-        raise InputError(wrong)
-    return Question(
-        drive, recipe, rows, columns, ranges, scenarios, metric, bound, share, base, first, again, room, long
-    )
-
-
-def _whole(name: str, value: object, least: int) -> int:
-    if isinstance(value, int) and not isinstance(value, bool) and value >= least:
-        return value
-    raise InputError(f"{name} = {value!r}: give a whole number of {least} or more.")

@@ -50,7 +50,6 @@ def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
     near, apart = zip(*map(_agreement, found.restart_costs, found.costs), strict=True)
     columns["agreement"] = (np.array(near), "1", "searches within 1 % of the best")
     columns["spread"] = (np.array(apart), "1", "how far apart the searches end")
-    columns["kept_default"] = (found.kept_default, "", "whether the defaults were best")
     return _dataset(trials.question, columns)
 
 
@@ -67,19 +66,16 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     near, apart = _agreement(found.restart_costs[0], float(found.costs[0]))
     both = found.judged, trials.default
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
-    over, over_default = (float(excess(one.start_time, trials.bound, quantile)[0]) for one in both)
     return RobustSet(
         parameters=ready.parameters,
         gains=gains,
         defaults={name: float(value[0]) for name, value in trials.defaults.items()},
         worst=worst,
         worst_default=worst_default,
-        excess=over,
-        excess_default=over_default,
+        excess=float(excess(found.judged.start_time, trials.bound, quantile)[0]),
         agreement=near,
         restarts=trials.question.restarts,
         spread=apart,
-        kept_default=bool(found.kept_default[0]),
         cells=_dataset(trials.question, _figures(trials, found.judged)),
         controller=RobustGains("robust", ready, own),
     )

@@ -67,11 +67,11 @@ class Trials:
 
     def _measured(self) -> tuple[Judged, Vector]:
         """What the defaults reach, and the bounds that follow."""
-        bound, default = self.question.bound, self.judged(np.arange(len(self.drives)), {})
-        if bound.kind in ("seconds", "limits"):
-            return default, np.full(self.starts_of.shape, bound.value)
-        if bound.kind == "direct":
-            return default, bound.value * self._direct()[self.starts_of]
+        asked, default = self.question.start_time, self.judged(np.arange(len(self.drives)), {})
+        if asked is not None and asked.multiple:
+            return default, asked.value * self._direct()[self.starts_of]
+        if asked is not None or self.question.limited:
+            return default, np.full(self.starts_of.shape, asked.value if asked else math.inf)
         return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
 
     def _direct(self) -> Vector:
