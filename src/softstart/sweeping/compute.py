@@ -40,15 +40,13 @@ def known_figures(shafts: tuple[str, ...] = ("",)) -> dict[str, tuple[str, str]]
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is the same for all starts of a sweep. `fitted_to` and `base` as in `simulate`."""
+    """What is the same for all starts of a sweep. `until`, `fitted_to` as in `simulate`."""
 
     drive: Machine
     recipe: Recipe
     figures: tuple[str, ...]
     until: float | None = None
     fitted_to: Machine | None = None
-    base: Machine | None = None
-    time_limit: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +66,9 @@ def compute(task: Task) -> Block:
     gaps = np.full(math.prod(shape), question.drive.gap_and_inertia[0])
     machines = varied(question.drive, {"gap": gaps, **drive})
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
-    found = prepared(machines, question.time_limit).figures(
+    found = prepared(machines).figures(
         question.recipe.make(more, name).set_ups(fitted_to or machines),
-        (question.base or machines).mean_torque,
+        machines.mean_torque,
         until=question.until,
     )
     block: Block = {

@@ -22,7 +22,7 @@ from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
-from softstart.parallel import Pool, checked_workers, why_not_sendable
+from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole, nearest, show
 from softstart.start.batch import has_margin
 from softstart.sweeping.compute import Question, Task, check_corners, compute, first_start, known_figures
@@ -44,13 +44,11 @@ def sweep(
     parameters: Mapping[str, object] | None = None,
     until: float | None = None,
     fitted_to: Machine | None = None,
-    base: Machine | None = None,
     to: str | os.PathLike[str] | None = None,
     figures: tuple[str, ...] | list[str] | None = None,
     chunk: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    time_limit: float | None = None,
     progress: Callable[[Progress], object] | None = None,
     allow_code: bool = False,
 ) -> xarray.Dataset:
@@ -72,9 +70,9 @@ def sweep(
         the coordinate is then called `mass_2_inertia`.
     parameters : mapping, optional
         Parameters of the controller that are the same everywhere.
-    until, time_limit : float, optional
+    until : float, optional
         As in `simulate`, s.
-    fitted_to, base : Drive or Chain, optional
+    fitted_to : Drive or Chain, optional
         As in `simulate`.
     to : path, optional
         Zarr folder for the results. It is written chunk by chunk; the same call on it goes on where an
@@ -123,26 +121,14 @@ def sweep(
     """
     if isinstance(drive, str):
         drive = load_machine(drive)
-    question, axes = _question(
-        drive, controller, parameters, allow_code, grid, figures, until, fitted_to, base, time_limit
-    )
-    recipe = question.recipe
+    question, axes = _question(drive, controller, parameters, allow_code, grid, figures, until, fitted_to)
     if chunk is not None:
         check_whole(chunk, "chunk")
-    count = checked_workers(workers, scheduler)
+    checked_workers(workers, scheduler)
     check_corners(question, axes)
     plan = Plan.of([axis.size for axis in axes], [not axis.numeric for axis in axes], chunk)
     threads = first_start(question, axes)
-    if (scheduler is not None or (min(count, plan.chunks) > 1 and not threads)) and why_not_sendable(
-        recipe.given
-    ):
-        if workers is not None or scheduler is not None:
-            raise InputError(
-                f"controller = {recipe.label}: another process cannot load this object of class "
-                f"{type(recipe.given).__qualname__}; give it as path/to/file.py:ClassName with parameters, "
-                "or say workers=1."
-            )
-        count = 1
+    count = sharing(question.recipe.given, "the controller", workers, scheduler, threads)
     with Store(None if to is None else Path(to), plan, axes, question, chunk) as store:
         begin, before = time.monotonic(), store.finished_starts()
         done = before
@@ -181,22 +167,17 @@ def _question(
     figures: object,
     until: Any,
     fitted_to: Any,
-    base: Any,
-    time_limit: Any,
 ) -> tuple[Question, tuple[Axis, ...]]:
     """The question and the axes, if all input is right in itself; all mistakes at once."""
     wrong, axes, recipe, kept = Mistakes(), tuple[Axis, ...](), Recipe(), tuple[str, ...]()
-    for name, other in (("drive", drive), ("fitted_to", fitted_to), ("base", base)):
-        if not is_machine(other) and not (other is None and name != "drive"):
+    for name, other in (("drive", drive), ("fitted_to", fitted_to)):
+        if not is_machine(other) and not (other is None and name == "fitted_to"):
             wrong.sentences.append(
                 f"{name} = {show(other)}: give one Drive or Chain; what varies goes into the grid."
             )
-    for name, value in (("until", until), ("time_limit", time_limit)):
-        good = isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf
-        if value is not None and not good:
-            wrong.sentences.append(
-                f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out."
-            )
+    good = isinstance(until, Real) and not isinstance(until, bool) and 0.0 < float(until) < math.inf
+    if until is not None and not good:
+        wrong.sentences.append(f"until = {show(until)}: give a time above 0 s as a number, or leave it out.")
     with wrong.noted():
         if isinstance(controller, str):
             recipe = Recipe(with_whole_path(controller), dict(parameters or {}), allow_code)
@@ -210,7 +191,7 @@ def _question(
         if is_machine(drive):
             kept = _figures(drive, figures)
     wrong.settle()
-    return Question(drive, recipe, kept, until, fitted_to, base, time_limit), axes
+    return Question(drive, recipe, kept, until, fitted_to), axes
 
 
 def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:

@@ -79,16 +79,13 @@ def empty_results(plan: Plan, axes: tuple[Axis, ...], question: Question) -> xar
 
 def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
-    fitted_to, base = (one and one.to_toml() for one in (question.fitted_to, question.base))
     found: dict[str, Any] = {
         "drive": question.drive.to_toml(),
         "controller": question.recipe.about(),
         "order of the axes": [axis.name for axis in axes],
         "figures": list(question.figures),
         "until": question.until,
-        "time_limit": question.time_limit,
-        "fitted_to": fitted_to,
-        "base": base,
+        "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
         "softstart": __version__,
     }
     for column in (column for axis in axes for column in axis.columns):

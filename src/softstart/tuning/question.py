@@ -42,7 +42,6 @@ class Question:
     metric: Metric
     start_time: StartTime | None
     quantile: float
-    base: Machine | None
     seed: int
     restarts: int
     population: int
@@ -113,7 +112,6 @@ class Question:
             "metric": self.metric if isinstance(self.metric, str) else _code_of(self.metric),
             "start time": self.bound,
             "quantile": self.quantile,
-            "base drive": self.base.to_toml() if self.base else "",
             "seed": self.seed,
             "restarts": self.restarts,
             "population": self.population,

@@ -10,10 +10,9 @@ from typing import Any
 from softstart.chain.machines import Machine, one_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
-from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
-from softstart.parallel import Pool, checked_workers, why_not_sendable
+from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
@@ -62,7 +61,6 @@ def tune(
     schedule: bool = True,
     robust: bool = True,
     certified: bool | None = None,
-    base: Machine | None = None,
     seed: int = 0,
     restarts: int = 3,
     population: int | None = None,
@@ -125,8 +123,6 @@ def tune(
     certified : bool, optional
         Whether to compute each cell's optimum within the same time and its lower bound (only of `k_dyn`).
         By default that of drives; that of a chain takes longer.
-    base : Drive or Chain, optional
-        The drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
     seed, restarts, population, generations : int
         Of the search. The same ones give the same bits, whoever computes.
     workers : int, optional
@@ -198,8 +194,6 @@ def tune(
     share: Any = quantile
     if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
         wrong.sentences.append(f"quantile = {share!r}: give a share of the starts above 0, at most 1.")
-    if base is not None and not is_machine(base):
-        wrong.sentences.append(f"base = {base!r}: K_dyn refers to one Drive or Chain; Drive.load reads one.")
     if not isinstance(metric, str) and not callable(metric):
         wrong.sentences.append(
             f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures."
@@ -208,7 +202,7 @@ def tune(
         wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
     wrong.settle()
     question = Question(
-        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), base, seed, restarts,
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), seed, restarts,
         population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations,
     )  # fmt: skip
     log = Log(progress)
@@ -243,19 +237,12 @@ def tune(
 
 def _pool_for(first: Trials, *_: Trials, workers: int | None, scheduler: str | None) -> Pool:
     """Where candidates are started: threads for compiled controllers, else processes, or a cluster."""
-    question, count = first.question, checked_workers(workers, scheduler)
+    question = first.question
     starts = len(question.cells) * len(question.scenarios) * question.restarts
-    if not first.compiled and starts * question.population * question.generations < WORTH_SHARING:
-        count = 1
-    if scheduler is not None or (count > 1 and not first.compiled):
-        reason = why_not_sendable(question)
-        if reason and (workers is not None or scheduler is not None):
-            given = f"workers = {workers}" if scheduler is None else "scheduler"
-            raise InputError(
-                f"{given}: the controller or the metric cannot be handed to another process ({reason}); "
-                "define it at the top level of a module, or give workers=1."
-            )
-        count = 1 if reason else count
+    small = starts * question.population * question.generations < WORTH_SHARING
+    if small and not first.compiled and scheduler is None:
+        return Pool(1)
+    count = sharing(question, "the controller or the metric", workers, scheduler, first.compiled)
     return Pool(count, threads=first.compiled, scheduler=scheduler, describe=_candidates)
 
 

@@ -189,12 +189,11 @@ Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
 
 
 class Asked(NamedTuple):
-    """An optimum: its cell, the bound on the start time in s, the drive, and that to which K_dyn refers."""
+    """An optimum: its cell, the bound on the start time in s, and the drive, to which K_dyn refers."""
 
     cell: int
     bound: float
     drive: Machine
-    base: Machine | None
 
 
 def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Optima:
@@ -208,7 +207,7 @@ def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Opt
             if record is not None:
                 found[cell, bound] = record
             elif math.isfinite(bound):
-                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell), question.base)
+                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell))
     for done, (one, record) in enumerate(pool.results(optimum_of, missing.values())):
         log.tell("optima", done, len(missing), "cell")
         found[one.cell, one.bound] = record
@@ -226,10 +225,7 @@ def optimum_of(asked: Asked) -> dict[str, Any]:
     ideal = asked.drive.with_values(names)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
-        each = [
-            optimize(one, asked.bound, terminal="reached", base=asked.base)
-            for one in ideal.positions.values()
-        ]
+        each = [optimize(one, asked.bound, terminal="reached") for one in ideal.positions.values()]
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
     except (OptimumError, InputError):

@@ -55,7 +55,7 @@ class Trials:
         self.starts_of = starts.reshape(1 if robust else count, -1)  # job -> its starts, cell by cell
         cells = [question.drive_of(cell) for cell in range(count)]
         self.drives = [question.drive.design_drive] if robust else [one.design_drive for one in cells]
-        self.base = np.repeat([(question.base or one).mean_torque for one in cells], scenarios)
+        self.base = np.repeat([one.mean_torque for one in cells], scenarios)
         self.batch = _starts_of_cells(question)
         set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
         self.compiled = isinstance(set_up[0], CompiledController)

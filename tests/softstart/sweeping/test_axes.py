@@ -88,7 +88,7 @@ def test_all_mistakes_at_once():
             {"gapp": [1], "load.inertia": [-1.0], "controller.tme": [1], "stiffness": ["soft"]},
             figures=["k_dym"],
             until=-1.0,
-            base=records(CRANE, gap=[1.0, 2.0]),
+            fitted_to=records(CRANE, gap=[1.0, 2.0]),
         )
     told = "\n".join(caught.value.sentences)
     assert len(caught.value.sentences) == 7
@@ -99,7 +99,7 @@ def test_all_mistakes_at_once():
         "stiffness",
         "did you mean k_dyn?",
         "until",
-        "base",
+        "fitted_to",
     ):
         assert words in told
 

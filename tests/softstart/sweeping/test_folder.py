@@ -210,8 +210,7 @@ def test_a_folder_that_was_deleted_leaves_no_memory(tmp_path):
         ({"grid": dict(reversed(GRID.items()))}, "another order of the axes;"),
         ({"grid": {**GRID, "stiffness": [300.0]}}, "another order of the axes and axis stiffness;"),
         ({"until": 0.5}, "another until;"),
-        ({"base": CRANE}, "another base;"),
-        ({"figures": ["k_dyn"], "time_limit": 9.0}, "another figures and time_limit;"),
+        ({"figures": ["k_dyn"], "fitted_to": CRANE}, "another figures and fitted_to;"),
         ({"chunk": 4}, "was begun in chunks of 1 x 2 starts; leave chunk out"),
     ],
 )  # fmt: skip

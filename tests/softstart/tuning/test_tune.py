@@ -351,7 +351,6 @@ BAD = {
     "share": ({"tolerances": {"stiffness": "110 %"}}, ["below 100 %"]),
     "impossible": ({"tolerances": {"stiffness": [-3.0]}}, ["tolerances", "stiffness = -3"]),
     "nothing": ({"schedule": False, "robust": False}, ["nothing is asked for"]),
-    "base": ({"base": "crane-4amtkf"}, ["one Drive or Chain"]),
     "drive": ({"drive": records(CRANE, gap=[0.5, 1.0])}, ["one Drive"]),
     "controller": ({"controller": "dirct"}, ["did you mean"]),
     "nothing to tune": ({"controller": "direct"}, ["no parameter to tune", "free="]),
