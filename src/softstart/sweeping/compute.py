@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,7 +14,6 @@ import numpy as np
 from softstart.chain.machines import Machine, varied
 from softstart.controller.base import CompiledController
 from softstart.controller.recipe import Recipe
-from softstart.errors import InputError, Mistakes
 from softstart.start.batch import named, prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
@@ -23,7 +21,6 @@ from softstart.sweeping.grid import Axis, Column
 Block = dict[str, Any]  # figure -> array of the chunk's shape
 CODES = {status.name: code for code, status in enumerate(Status)}
 MOST_CORNERS = 4096
-SHOWN = 5  # combinations in one refusal
 
 
 @cache
@@ -101,17 +98,14 @@ def _sorted(values: Iterable[tuple[Column, Any]]) -> tuple[dict[str, Any], dict[
 
 
 def check_corners(question: Question, axes: tuple[Axis, ...]) -> None:
-    """Raise one InputError if a drive or a controller of the grid is impossible."""
-    wrong: dict[str, str] = {}
+    """Raise the InputError of the first corner of the grid whose drive or controller is impossible."""
     for corner in islice(product(*map(_ends, axes)), MOST_CORNERS):
-        try:
-            _make(question, [pair for place in corner for pair in place])
-        except InputError as error:
-            for sentence in error.sentences:
-                rule = re.sub(r"= (\"[^\"]*\"|\S+)", "", sentence)  # the same mistake with other numbers
-                wrong.setdefault(rule, sentence)
-    if wrong:
-        raise InputError(list(wrong.values())[:SHOWN])
+        drive, more, name = _sorted(pair for place in corner for pair in place)
+        if any(isinstance(value, np.ndarray) for value in drive.values()):
+            varied(question.drive, drive)
+        else:
+            question.drive.with_values(drive)
+        question.recipe.make(more, name)
 
 
 def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
@@ -121,18 +115,6 @@ def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
     (column,) = axis.columns
     ends = (float(column.values.min()), float(column.values.max())) if column.numeric else column.values
     return [((column, value),) for value in dict.fromkeys(ends)]
-
-
-def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
-    wrong, (drive, more, name) = Mistakes(), _sorted(values)
-    with wrong.noted():
-        if any(isinstance(value, np.ndarray) for value in drive.values()):
-            varied(question.drive, drive)
-        else:
-            question.drive.with_values(drive)
-    with wrong.noted():
-        question.recipe.make(more, name)
-    wrong.settle()
 
 
 def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:

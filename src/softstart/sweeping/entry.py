@@ -83,7 +83,7 @@ def sweep(
         of a drive with limits also `margin`, the least share left of the limits of shaft torque and start
         time (below 0 where one is exceeded, NaN without a start), and `keeps_limits`, 1 or 0.
     chunk : int, optional
-        Most starts of a chunk; memory and what an interruption loses go with it.
+        Most starts of a chunk; memory and what an interruption loses go with it. A folder keeps its own.
     workers : int, optional
         How many chunks are computed at once on this machine, by default one for each processor: by threads
         where the controllers are compiled, else by processes. 1 computes in this thread.
@@ -129,7 +129,7 @@ def sweep(
     plan = Plan.of([axis.size for axis in axes], [not axis.numeric for axis in axes], chunk)
     threads = first_start(question, axes)
     count = sharing(question.recipe.given, "the controller", workers, scheduler, threads)
-    with Store(None if to is None else Path(to), plan, axes, question, chunk) as store:
+    with Store(None if to is None else Path(to), plan, axes, question) as store:
         begin, before = time.monotonic(), store.finished_starts()
         done = before
 
