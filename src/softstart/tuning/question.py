@@ -101,21 +101,16 @@ class Question:
 
     def inputs(self) -> dict[str, Any]:
         """All of it as plain data: what saved parts belong to."""
+        plain = "gaps", "load_inertias", "quantile", "seed", "restarts", "population", "generations"
         return {
             "version of softstart": __version__,
             "drive": self.drive.to_toml(),
             "controller": self.recipe.about(),
-            "gaps": list(self.gaps),
-            "inertias": list(self.load_inertias),
             "free parameters": [repr(one) for one in self.ranges],
             "tolerances": [repr(sorted(one.items())) for one in self.scenarios],
             "metric": self.metric if isinstance(self.metric, str) else _code_of(self.metric),
             "start time": self.bound,
-            "quantile": self.quantile,
-            "seed": self.seed,
-            "restarts": self.restarts,
-            "population": self.population,
-            "generations": self.generations,
+            **{name: getattr(self, name) for name in plain},
         }
 
 

@@ -178,8 +178,8 @@ def _named(name: str, ends: Any, unit: str) -> Range:
         values = [float(to_si(end, unit or "1", name=f"free {name}")) for end in both]
     if len(values) != 2 or not values[0] < values[1] or (any(multiples) and values[0] <= 0.0):
         raise InputError(
-            f"free: {name} = {ends!r}: give its lowest and highest value in this order, as (0.1, 0.5), or "
-            'both as multiples of the default above 0, as ("0.5x", "2x").'
+            f"free: {name} = {ends!r}: give its lowest and highest value in this order, or both as multiples "
+            "of the default above 0, as 0.5x and 2x."
         )
     low, high = values
     if any(multiples):

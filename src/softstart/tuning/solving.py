@@ -81,20 +81,16 @@ def tune(
     Parameters
     ----------
     drive : Drive, Chain, Identification or str
-        The nominal drive or chain, or its name or file. A chain starts itself, and its figures are those of
-        all its shafts; the controller is set up for its two masses. With an identification every candidate is
-        judged by the drive found and by 100 drives that its logs leave possible, drawn from their joint
-        distribution: by the worst of them, or by a `quantile`. Gaps and inertias are then those of the
-        drive, if none are given.
+        The nominal drive or chain, or its name or file. A chain starts itself, and the controller is set up
+        for its two masses. With an identification every candidate is judged by the drive found and by 100
+        drives that its logs leave possible; gaps and inertias are then those of the drive, if none are given.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or an object.
-    gaps : iterable, optional
-        Gaps in rad: numbers, texts with a unit, or multiples of the drive's own as "2x". By default 0.5, 1,
-        2 and 4 times its own. Those of a chain are the sum of all its gaps at the motor shaft, widened
-        alike.
-    inertias : iterable, optional
-        Load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1 and 2 times
-        the drive's own. Of a chain that of its load mass.
+    gaps, inertias : iterable, optional
+        Gaps in rad and load inertias in kg m2: numbers, texts with a unit, multiples of the drive's own as
+        "2x", or inertias as multiples of the motor's as "5 J1". By default 0.5, 1, 2 and 4 times its gap, and
+        0.4, 1 and 2 times its load inertia. Those of a chain are the sum of all its gaps at the motor shaft,
+        widened alike, and the inertia of its load mass.
     parameters : mapping, optional
         Parameters of a controller given by name. What is given is not tuned, unless it is `free`.
     free : iterable or mapping, optional
@@ -103,11 +99,9 @@ def tune(
         that it names.
     metric : str or callable
         What is minimised: a figure of a start (of a chain also `k_dyn_2`, that of its second shaft), or a
-        function of the mapping of all figures (arrays, one value
-        a start) that returns one number a start. "margin" is made large: the least share left of the limits
-        of the drive, shaft torque and start time (of a chain the permissible torque of each shaft); the
-        tables have its complement `limit_share`, the largest
-        share of a limit that a start takes.
+        function of the mapping of all figures (arrays, one value a start) that returns one number a start.
+        "margin" is made large: the least share left of the limits of shaft torque and start time (of a chain
+        the permissible torque of each shaft); the tables have its complement `limit_share`.
     start_time : float or str, optional
         Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
         default each start is to be no slower than with the controller's own defaults; for the margin to a

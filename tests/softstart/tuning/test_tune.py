@@ -338,7 +338,7 @@ BAD = {
     "no range": ({"free": ["drop"]}, ["gives no range for drop"]),
     "ends": ({"free": {"torque": (20, 10)}}, ["lowest and highest value in this order"]),
     "one end": ({"free": {"torque": "20"}}, ["lowest and highest"]),
-    "mixed ends": ({"free": {"torque": ("1x", 20)}}, ["both as multiples of the default"]),
+    "mixed ends": ({"free": {"torque": ("1x", 20)}}, ["both as multiples"]),
     "metric": ({"metric": "k_dym"}, ["k_dym", "did you mean k_dyn?"]),
     "no metric": ({"metric": 3}, ["name a figure"]),
     "start time": ({"start_time": "soon"}, ["start_time", "write a time as"]),
