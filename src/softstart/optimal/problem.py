@@ -40,15 +40,16 @@ class StartTime:
         >>> StartTime.of("250 ms"), StartTime.of("1.2x")
         (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
         """
-        found = multiple(given, name)
-        value: Any = found[0] if found else to_si(given, "s", name=name) if isinstance(given, str) else given
+        either = 'or a multiple of the start time of direct, as "1.2x".'
+        try:
+            number, ending = multiple(given, name) or (given, "")
+            value: Any = to_si(number, "s", name=name) if isinstance(number, str) else number
+        except InputError as error:
+            raise InputError(f"{one.removesuffix('.')}, {either}" for one in error.sentences) from None
         if not _number(value) or not 0.0 < float(value) < math.inf:
             shown = f'"{given}"' if isinstance(given, str) else repr(given)
-            raise InputError(
-                f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", or a multiple of the start '
-                'time of direct, as "1.2x".'
-            )
-        return cls(float(value), found is not None)
+            raise InputError(f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", {either}')
+        return cls(float(value), bool(ending))
 
     def seconds(self, direct: Callable[[], float]) -> float:
         """The bound in s; `direct` gives the start time of the drive under its constant starting torque."""
