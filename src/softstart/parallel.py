@@ -282,6 +282,28 @@ def why_not_sendable(value: object) -> str:
     return ""
 
 
+def sharing(
+    value: object, what: str, workers: int | None, scheduler: str | None, threads: bool = False
+) -> int:
+    """How many workers share work on a value; 1 if no other process can load it, and none was asked for.
+
+    >>> sharing(lambda: 1, "the metric", None, None), sharing(abs, "the metric", 3, None)
+    (1, 3)
+    """
+    count = checked_workers(workers, scheduler)
+    if scheduler is None and (threads or count == 1):
+        return count
+    if reason := why_not_sendable(value):
+        if workers is None and scheduler is None:
+            return 1
+        given = f"workers = {workers}" if scheduler is None else "scheduler"
+        raise InputError(
+            f"{given}: {what} cannot be handed to another process ({reason}); define it at the top level of "
+            "a module, or give workers=1."
+        )
+    return count
+
+
 class Pool:
     """Runs tasks in `count` places at once; use it in a `with` block.
 

@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, time
 from decimal import Decimal
 from functools import lru_cache
@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     import pint
 
 __all__ = [
-    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "doubtful_comma", "nearest", "parse",
-    "read_unit", "shortest", "show", "to_si", "values_in", "whole_number", "with_points",
+    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "check_whole", "doubtful_comma",
+    "multiple", "multiplied", "nearest", "parse", "read_unit", "shortest", "show", "to_si", "values_in",
+    "whole_number", "with_points",
 ]  # fmt: skip
 
 Value = float | NDArray[np.float64]
@@ -270,6 +271,32 @@ def to_si(value: object, unit: str, name: str = "value", *, infinite: bool = Fal
         place = "" if refusal.index is None else f"[{', '.join(map(str, refusal.index))}]"
         shown = value if refusal.index is None else refusal.value
         raise InputError(f"{name}{place} = {show(shown)}: {refusal.reason}.") from None
+
+
+def multiple(value: object, name: str, endings: Iterable[str] = ("x",)) -> tuple[float, str] | None:
+    """The number and the ending of a text as "2x", a multiple of something; None for anything else.
+
+    >>> multiple("1.2x", "gap"), multiple("5 J1", "inertia", ("x", "J1")), multiple("2 ms", "time")
+    ((1.2, 'x'), (5.0, 'J1'), None)
+    """
+    text = value.strip() if isinstance(value, str) else ""
+    for ending in endings:
+        if text.casefold().endswith(ending.casefold()):
+            try:
+                return float(parse(text[: -len(ending)], "1")), ending
+            except RefusedError as refusal:
+                raise InputError(f"{name} = {show(value)}: {refusal.reason}.") from None
+    return None
+
+
+def multiplied(value: Any, name: str, units: Mapping[str, float]) -> Any:
+    """A multiple times that of the `units` which it names; anything else as it is.
+
+    >>> multiplied("5 J1", "inertia", {"x": 0.175, "J1": 0.035}), multiplied("2 ms", "time", {"x": 0.5})
+    (0.175, '2 ms')
+    """
+    found = multiple(value, name, units)
+    return value if found is None else float(f"{found[0] * units[found[1]]:.12g}")  # 5 x 0.035 is 0.175
 
 
 def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
@@ -612,6 +639,17 @@ def with_points(texts: Sequence[str]) -> list[str]:
     if any(number.count(",") > 1 for number in numbers) or all(map(_THOUSANDS.fullmatch, numbers)):
         raise RefusedError(f"the comma in {show(comma)} may divide thousands; write decimal points only")
     return [text.replace(",", ".") for text in texts]
+
+
+def check_whole(value: object, name: str, least: int = 1) -> None:
+    """Raise InputError for anything but a whole number of `least` or more.
+
+    >>> check_whole(1.5, "chunk")
+    Traceback (most recent call last):
+    softstart.errors.InputError: chunk = 1.5: give a whole number of 1 or more.
+    """
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise InputError(f"{name} = {show(value)}: give a whole number of {least} or more.")
 
 
 def whole_number(text: str, name: str, least: int = 1, most: int = 10**15) -> int:

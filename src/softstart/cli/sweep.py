@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,18 +14,20 @@ import softstart
 from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.running import Answer, answers, attributed, option_value, working
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.quantities import values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
+    from softstart.controller.recipe import Recipe
     from softstart.sweeping.entry import Progress
-    from softstart.sweeping.maker import Maker, Parameters
+    from softstart.sweeping.grid import Subject
 
 RESULTS = "sweep.zarr"
 MOST_VALUES = 1_000_000  # of a range
+PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 
 
 @click.command()
@@ -45,7 +49,9 @@ MOST_VALUES = 1_000_000  # of a range
 @options.scheduler_option
 @click.option("--chunk", metavar="N", callback=options.count(),
     help="Largest number of starts that are computed and written at once.")  # fmt: skip
-@click.option("--netcdf", metavar="FILE", help="Also write the results as netCDF.")
+@click.option(
+    "--netcdf", metavar="FILE", type=click.Path(path_type=Path), help="Also write the results as netCDF."
+)
 @options.of_drive(options.read_machine)
 @answers(
     f"Write the results chunk by chunk into DIR/{RESULTS}, with figure, table and report.md; an "
@@ -53,7 +59,7 @@ MOST_VALUES = 1_000_000  # of a range
 )
 def sweep(
     *, drive: Machine, controller: str | None, grid: tuple[str, ...], params: dict[str, str],
-    fitted_to: Drive | None, **asked: Any,
+    fitted_to: Drive | None, netcdf: Path | None, **asked: Any,
 ) -> Answer:  # fmt: skip
     """Simulate a grid of drives and controllers of any size.
 
@@ -79,17 +85,21 @@ def sweep(
         working("starting the first drive ...") as show,
         attributed(),
     ):
-        from softstart.sweeping.maker import Maker
+        from softstart.controller.recipe import Recipe
         from softstart.sweeping.summary import summarise
         from softstart.views import sweeps as views
 
-        axes = read_axes(grid, Maker(controller or "", params, code), drive)
+        if netcdf is not None and (netcdf.is_dir() or not os.access(netcdf.parent, os.W_OK)):
+            raise InputError(f"netcdf = {netcdf}: no file can be written there; give another one.")
+        axes = read_axes(grid, Recipe(controller or "", params, code), drive)
         results = softstart.sweep(
             drive, controller, axes, parameters=params, fitted_to=fitted_to, to=to, progress=progress,
             allow_code=code, **asked,
         )  # fmt: skip
         show("summing up")
         summary = summarise(results)
+        if netcdf is not None:
+            results.to_netcdf(netcdf, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
     data = {
         "drive": drive.name,
         "fitted_to": fitted_to.name if fitted_to else None,
@@ -107,25 +117,24 @@ def sweep(
     return lambda: data, views.sweep_sheet(results, summary, drive, fitted_to)
 
 
-def read_axes(texts: Sequence[str], maker: Maker, machine: Machine | None = None) -> dict[str, Any]:
+def read_axes(texts: Sequence[str], recipe: Recipe, machine: Machine) -> dict[str, Any]:
     """The grid of several --axis over a drive or chain.
 
-    >>> from softstart.sweeping.maker import Maker
-    >>> grid = read_axes(["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"], Maker("direct"))
+    >>> from softstart.controller.recipe import Recipe
+    >>> texts = ["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"]
+    >>> grid = read_axes(texts, Recipe("direct"), Drive.load("crane-4amtkf"))
     >>> grid["gap"], grid["load_inertia"].tolist()
     ([0.5, 1.0, 1.5, 2.0], [0.07, 0.175])
     """
+    from softstart.sweeping.grid import Subject
+
     split = options.read_params(texts, "--axis", "shaft.gap=0.25:4:100 or load.inertia=0.07,0.175")
-    parameters: Parameters | None = None
-    grid: dict[str, Any] = {}
-    if "controller" in split:
-        names = values_in(split["controller"], "--axis controller", whole=True)
-        parameters = maker.parameters([options.check_name(name, "--axis controller") for name in names])
-    elif maker.given:
-        parameters = maker.parameters()
+    names = values_in(split["controller"], "--axis controller", whole=True) if "controller" in split else []
+    checked = tuple(options.check_name(name, "--axis controller") for name in names)
+    subject, grid = Subject(machine, recipe, checked), dict[str, Any]()
     for key, values in split.items():
         try:
-            name, read = _read(key, values, parameters, machine)
+            name, read = _read(key, values, subject)
         except InputError as error:
             raise InputError(f"--axis {sentence}" for sentence in error.sentences) from None
         if name in grid:
@@ -134,21 +143,20 @@ def read_axes(texts: Sequence[str], maker: Maker, machine: Machine | None = None
     return grid
 
 
-def _read(key: str, text: str, parameters: Parameters | None, machine: Machine | None) -> tuple[str, Any]:
+def _read(key: str, text: str, subject: Subject) -> tuple[str, Any]:
     """The name and the values of an axis."""
-    from softstart.sweeping.grid import read_column, target_of
 
     def end(part: str) -> tuple[float, str]:
-        column = read_column(key, [part], parameters, machine)
+        column = subject.column(key, [part])
         if not column.numeric:
             raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
         return float(column.values[0]), column.name
 
-    owner, name = target_of(key) or ("unknown", "")
+    owner, _ = subject.target(key)
     if text.count(":") not in (2, 3) or owner == "controller" or ".py" in text:
-        counts = owner == "drive" and name in PARAMETERS and PARAMETERS[name].limit.startswith("a whole")
-        whole = counts or owner in ("controller", "unknown")
-        column = read_column(key, values_in(text, key, whole=whole), parameters, machine)
+        knob = subject.machine.knob(key)
+        counts = owner == "drive" and knob is not None and knob.parameter.limit.startswith("a whole")
+        column = subject.column(key, values_in(text, key, whole=counts or owner == "controller"))
         return column.name, column.values
     found = options.read_values(text, key, end, MOST_VALUES)
     return found[0][1], [value for value, _ in found]

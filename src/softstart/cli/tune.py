@@ -15,7 +15,7 @@ from softstart.cli.options import reading
 from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, SimulationError
-from softstart.quantities import to_si, values_in
+from softstart.quantities import multiple, to_si, values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
@@ -36,9 +36,7 @@ def read_grid(text: str, option: str, unit: str) -> list[Any]:
     """
 
     def read(part: str) -> tuple[float, str]:
-        ending = next((one for one in ("x", "J1") if part.endswith(one)), "")
-        number = part.removesuffix(ending) if ending else part
-        return float(to_si(number, "1" if ending else unit, name=option)), ending
+        return multiple(part, option, ("x", "J1")) or (float(to_si(part, unit, name=option)), "")
 
     found = options.read_values(text, option, read, LARGEST_GRID)
     return [f"{float(f'{one:.12g}')!r}{ending}" if ending else float(f"{one:.12g}") for one, ending in found]
@@ -150,7 +148,7 @@ def tune(
     if any_in_time(tuning):
         return tuning.summary, tuning_sheet(tuning)
     late = SimulationError(
-        f"No gains within these ranges start in time ({tuning.question.bound.text()}); allow more time with "
+        f"No gains within these ranges start in time ({tuning.question.bound}); allow more time with "
         "--start-time, or wider ranges with --free."
     )
     return tuning.summary, tuning_sheet(tuning), late

@@ -14,7 +14,7 @@ import numpy as np
 
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.quantities import to_si
+from softstart.quantities import multiple, to_si
 
 if TYPE_CHECKING:
     from softstart.start.run import Run
@@ -40,23 +40,16 @@ class StartTime:
         >>> StartTime.of("250 ms"), StartTime.of("1.2x")
         (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
         """
-        text = given.strip() if isinstance(given, str) else ""
-        multiple = text[-1:] in ("x", "X")
-        value: Any = given
-        if text:
-            try:
-                value = to_si(text[:-1] if multiple else text, "1" if multiple else "s", name=name)
-            except InputError:
-                if not multiple and (not text.isalpha() or text == "nan"):
-                    raise  # it says what is wrong with number or unit
-                value = math.nan
+        either = 'or a multiple of the start time of direct, as "1.2x".'
+        try:
+            number, ending = multiple(given, name) or (given, "")
+            value: Any = to_si(number, "s", name=name) if isinstance(number, str) else number
+        except InputError as error:
+            raise InputError(f"{one.removesuffix('.')}, {either}" for one in error.sentences) from None
         if not _number(value) or not 0.0 < float(value) < math.inf:
             shown = f'"{given}"' if isinstance(given, str) else repr(given)
-            raise InputError(
-                f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", or a multiple of the start '
-                'time of direct, as "1.2x".'
-            )
-        return cls(float(value), multiple)
+            raise InputError(f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", {either}')
+        return cls(float(value), bool(ending))
 
     def seconds(self, direct: Callable[[], float]) -> float:
         """The bound in s; `direct` gives the start time of the drive under its constant starting torque."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice, product
@@ -14,16 +13,14 @@ import numpy as np
 
 from softstart.chain.machines import Machine, varied
 from softstart.controller.base import CompiledController
-from softstart.errors import InputError, Mistakes
+from softstart.controller.recipe import Recipe
 from softstart.start.batch import named, prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
-from softstart.sweeping.maker import Maker
 
 Block = dict[str, Any]  # figure -> array of the chunk's shape
 CODES = {status.name: code for code, status in enumerate(Status)}
 MOST_CORNERS = 4096
-SHOWN = 5  # combinations in one refusal
 
 
 @cache
@@ -40,15 +37,13 @@ def known_figures(shafts: tuple[str, ...] = ("",)) -> dict[str, tuple[str, str]]
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is the same for all starts of a sweep. `fitted_to` and `base` as in `simulate`."""
+    """What is the same for all starts of a sweep. `until`, `fitted_to` as in `simulate`."""
 
     drive: Machine
-    maker: Maker
+    recipe: Recipe
     figures: tuple[str, ...]
     until: float | None = None
     fitted_to: Machine | None = None
-    base: Machine | None = None
-    time_limit: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,18 +58,16 @@ class Task:
 def compute(task: Task) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
     question, shape = task.question, tuple(axis.size for axis in task.axes)
-    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
-    for column, values in _spread(task.axes, shape):
-        given[column.owner][column.field] = values
+    drive, more, name = _sorted(_spread(task.axes, shape))
     # the gap of every start, so that each chunk is a table
     gaps = np.full(math.prod(shape), question.drive.gap_and_inertia[0])
-    machines = varied(question.drive, {"gap": gaps, **given["drive"]})
-    made = question.maker.make(given["parameter"], given["controller"][""])
+    machines = varied(question.drive, {"gap": gaps, **drive})
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
-    found = prepared(machines, question.time_limit).figures(
-        made.set_ups(fitted_to or machines), (question.base or machines).mean_torque,
+    found = prepared(machines).figures(
+        question.recipe.make(more, name).set_ups(fitted_to or machines),
+        machines.mean_torque,
         until=question.until,
-    )  # fmt: skip
+    )
     block: Block = {
         name: np.ascontiguousarray(found[name][0], dtype=np.float64).reshape(shape)
         for name in question.figures
@@ -96,18 +89,23 @@ def _spread(axes: tuple[Axis, ...], shape: tuple[int, ...]) -> Iterator[tuple[Co
                 yield column, column.values[0]
 
 
+def _sorted(values: Iterable[tuple[Column, Any]]) -> tuple[dict[str, Any], dict[str, Any], str]:
+    """Values of the machine, parameters of the controller, and its name if that is from an axis."""
+    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
+    for column, value in values:
+        given[column.owner][column.field] = value
+    return given["drive"], given["parameter"], given["controller"][""]
+
+
 def check_corners(question: Question, axes: tuple[Axis, ...]) -> None:
-    """Raise one InputError if a drive or a controller of the grid is impossible."""
-    wrong: dict[str, str] = {}
+    """Raise the InputError of the first corner of the grid whose drive or controller is impossible."""
     for corner in islice(product(*map(_ends, axes)), MOST_CORNERS):
-        try:
-            _make(question, [pair for place in corner for pair in place])
-        except InputError as error:
-            for sentence in error.sentences:
-                rule = re.sub(r"= (\"[^\"]*\"|\S+)", "", sentence)  # the same mistake with other numbers
-                wrong.setdefault(rule, sentence)
-    if wrong:
-        raise InputError(list(wrong.values())[:SHOWN])
+        drive, more, name = _sorted(pair for place in corner for pair in place)
+        if any(isinstance(value, np.ndarray) for value in drive.values()):
+            varied(question.drive, drive)
+        else:
+            question.drive.with_values(drive)
+        question.recipe.make(more, name)
 
 
 def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
@@ -117,21 +115,6 @@ def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
     (column,) = axis.columns
     ends = (float(column.values.min()), float(column.values.max())) if column.numeric else column.values
     return [((column, value),) for value in dict.fromkeys(ends)]
-
-
-def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
-    given: dict[str, dict[str, Any]] = {"drive": {}, "parameter": {}, "controller": {"": ""}}
-    for column, value in values:
-        given[column.owner][column.field] = value
-    wrong = Mistakes()
-    with wrong.noted():
-        if any(isinstance(value, np.ndarray) for value in given["drive"].values()):
-            varied(question.drive, given["drive"])
-        else:
-            question.drive.with_values(given["drive"])
-    with wrong.noted():
-        question.maker.make(given["parameter"], given["controller"][""])
-    wrong.settle()
 
 
 def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
@@ -145,7 +128,7 @@ def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
         first = tuple(Axis(axis.name, tuple(_one(c, name) for c in axis.columns)) for axis in axes)
         compute(Task((), question, first))
         design = (question.fitted_to or question.drive).design_drive
-        compiled &= isinstance(question.maker.make({}, name).set_up(design)[0], CompiledController)
+        compiled &= isinstance(question.recipe.make(name=name).set_up(design)[0], CompiledController)
     return compiled
 
 

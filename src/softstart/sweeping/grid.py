@@ -7,23 +7,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import Field, dataclass, fields, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
 from softstart.chain.machines import Machine
 from softstart.controller.finding import quantity
+from softstart.controller.recipe import Recipe
+from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
-from softstart.drive.model import BY_PATH
 from softstart.errors import InputError, Mistakes
 from softstart.input.parameters import Wording, meant_by, read_value
-from softstart.quantities import RefusedError, nearest, show
-from softstart.sweeping.maker import Maker, Parameters
+from softstart.quantities import RefusedError, multiplied, nearest, show
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"
-NO_CONTROLLER = "controller = None: name a controller, or make several an axis of the grid."
+ONE_OF_TWO = "controller: name one, or make several an axis of the grid; one of the two."
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +84,116 @@ class Axis:
         return all(column.numeric for column in self.columns)
 
 
-def read_grid(grid: object, maker: Maker, machine: Machine | None = None) -> tuple[Axis, ...]:
+@dataclass(frozen=True)
+class Subject:
+    """What the axes of a grid vary: a machine and its controller, or the `controllers` that are an axis.
+
+    >>> from softstart.chain import Chain
+    >>> crane = Subject(Chain.load("crane-4-mass"), Recipe("ramp"))
+    >>> crane.column("shaft[2].gap", ["0.5x", "2x"]).values.tolist()
+    [0.1, 0.4]
+    >>> crane.target("load.inertia"), crane.target("controller.time"), crane.target("controller")
+    (('drive', 'load_inertia'), ('parameter', 'time'), ('controller', ''))
+    """
+
+    machine: Machine
+    recipe: Recipe
+    controllers: tuple[str, ...] = ()
+
+    @cached_property
+    def parameters(self) -> dict[str, Field[Any]]:
+        """The parameters that all controllers have, alike in unit and kind."""
+        wrong, tables = Mistakes(), list[dict[str, Field[Any]]]()
+        for name in self.controllers or ("",):
+            with wrong.noted():
+                found = self.recipe.class_of(name) if name or self.recipe.given else Tuned
+                # the fields of tuned gains are what stands in their file
+                tables.append({} if issubclass(found, Tuned) else {f.name: f for f in fields(found)})
+        wrong.settle()
+        return {
+            name: one
+            for name, one in tables[0].items()
+            if all(name in other and _kind(other[name]) == _kind(one) for other in tables)
+        }
+
+    def target(self, key: str) -> tuple[Owner, str]:
+        """Whose parameter a key of the grid names, and which; InputError for an unknown one."""
+        if key == PREFIX:
+            return "controller", ""
+        if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
+            return "parameter", key[len(PREFIX) + 1 :]
+        if (found := self.machine.knob(key)) is not None:
+            return "drive", found.name
+        own = {name: f"{PREFIX}.{name}" for name in self.parameters}
+        words = {word: word for word in (*self.machine.knobs(), PREFIX, *own.values())} | own
+        like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
+        meant = [own[key]] if key in own else [p.name for p in like if self.machine.knob(p.name)]
+        if not meant and (close := nearest(key, words)):
+            meant = [words[close]]
+        other = f"take a parameter of the {self.machine.KIND} or {PREFIX}.NAME."
+        hint = f"did you mean {' or '.join(meant)}?" if meant else other
+        raise InputError(f"{key}: there is no such axis; {hint}")
+
+    def column(self, key: str, values: Any) -> Column:
+        """The values of a parameter, read and checked; InputError in one sentence."""
+        owner, name = self.target(key)
+        if isinstance(values, str | bytes) or not (
+            isinstance(values, Sequence) or hasattr(values, "__array__")
+        ):
+            raise InputError(
+                f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2]."
+            )
+        if owner == "controller":
+            return Column(PREFIX, owner, "", "", "controller", _texts(key, values))
+        if owner == "drive":
+            return self._of_machine(key, name, values)
+        if name not in self.parameters:
+            close, several = nearest(name, self.parameters), ", ".join(self.controllers)
+            lacking = f"not all of {several} have this" if several else f"{self.recipe.label} has no such"
+            hint = f"did you mean {PREFIX}.{close}?" if close else f"there are {', '.join(self.parameters)}."
+            raise InputError(f"{key}: {lacking} parameter; {hint}")
+        if name in self.recipe.values:
+            raise InputError(f"{key}: the parameter {name} has one value already; leave one of the two out.")
+        unit, kind = _kind(self.parameters[name])
+        if kind == "object":
+            raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
+        meaning = self.parameters[name].metadata.get("meaning") or name
+        listed = list(values)
+        read = _texts(key, listed) if kind == "text" else _flat(key, quantity(key, listed, unit))
+        return Column(f"{PREFIX}_{name}", owner, name, unit, meaning, read)
+
+    def _of_machine(self, key: str, name: str, values: Any) -> Column:
+        found = self.machine.knob(name)
+        assert found is not None
+        parameter, wording = found.parameter, Wording(written={name: key})
+        if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
+            raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
+        words = any(isinstance(value, str) and value in parameter.choices for value in values)
+        given: Any = values
+        try:
+            if words or not parameter.unit:
+                texts = _texts(key, values)
+                for given in texts:
+                    read_value(parameter, given)
+                return Column(name, "drive", name, "", parameter.meaning, texts)
+            own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
+            given = [multiplied(value, key, own) for value in values]
+            read = read_value(parameter, given, batch=True)
+        except RefusedError as reason:
+            raise InputError(wording.refused(parameter, given, reason)) from None
+        return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
+
+
+def _kind(field: Field[Any]) -> tuple[str, str]:
+    return field.metadata.get("unit", ""), field.metadata.get("kind", "quantity")
+
+
+def read_grid(grid: object, recipe: Recipe, machine: Machine) -> tuple[Axis, ...]:
     """The axes in the order of the grid, or one InputError for all that is wrong with them.
 
-    `machine` is the one that is varied, of whose values "2x" is a multiple; without it any drive.
-
-    >>> axes = read_grid({"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, 2]}, Maker("direct"))
+    >>> from softstart import Drive
+    >>> grid = {"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, "4x"]}
+    >>> axes = read_grid(grid, Recipe("direct"), Drive.load("crane-4amtkf"))
     >>> [(axis.name, axis.columns[0].values.tolist()) for axis in axes]
     [('load_inertia', [0.07, 0.175]), ('gap', [0.5, 1.0, 2.0])]
     """
@@ -97,12 +202,23 @@ def read_grid(grid: object, maker: Maker, machine: Machine | None = None) -> tup
             f'grid = {show(grid)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
         )
     wrong, axes, first = Mistakes(), list[Axis](), dict[str, str]()
-    parameters = _parameters(grid, maker, wrong)
+    if (PREFIX in grid) == bool(recipe.given):
+        wrong.sentences.append(ONE_OF_TWO)
+    if PREFIX in grid and recipe.values:
+        wrong.sentences.append(
+            f"parameters = {show(dict(recipe.values))}: with several controllers give each parameter as "
+            "an axis, of one value if need be."
+        )
+    wrong.settle()
+    names = grid.get(PREFIX, ())
+    listed = () if isinstance(names, str) or not isinstance(names, Sequence) else names
+    subject = Subject(machine, recipe, tuple(name for name in listed if isinstance(name, str)))
+    _ = subject.parameters  # wrong controllers are told first
     for key, values in grid.items():
         paired, columns = isinstance(values, Mapping), list[Column]()
         for name, given in values.items() if paired else [(key, values)]:
             with wrong.noted():
-                column = read_column(str(name), given, parameters, machine)
+                column = subject.column(str(name), given)
                 columns.append(column)
                 if column.name in first:
                     same = first[column.name]
@@ -114,118 +230,8 @@ def read_grid(grid: object, maker: Maker, machine: Machine | None = None) -> tup
             wrong.sentences += _repeated(columns[0])
         if columns:
             axes.append(Axis(str(key) if paired else columns[0].name, tuple(columns)))
-    wrong.sentences += [
-        f"{axis.name}: a parameter among the samples has the name of this axis; give the axis another one."
-        for axis in axes
-        if axis.paired and axis.name in first
-    ]
     wrong.settle()
     return tuple(axes)
-
-
-def target_of(key: str, machine: Machine | None = None) -> tuple[Owner, str] | None:
-    """Whose parameter a key of the grid names, and which; None for an unknown one.
-
-    >>> target_of("load.inertia"), target_of("controller.torque"), target_of("controller")
-    (('drive', 'load_inertia'), ('parameter', 'torque'), ('controller', ''))
-    """
-    if key == PREFIX:
-        return "controller", ""
-    if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
-        return "parameter", key[len(PREFIX) + 1 :]
-    if machine is not None:
-        found = machine.knob(key)
-        return None if found is None else ("drive", found.name)
-    name = BY_PATH.get(key, key)
-    return ("drive", name) if name in PARAMETERS else None
-
-
-def read_column(
-    key: str, values: object, parameters: Parameters | None, machine: Machine | None = None
-) -> Column:
-    """One column; `parameters` are those of the controllers, None where these are not known.
-
-    >>> from softstart.chain import Chain
-    >>> crane = Chain.load("crane-4-mass")
-    >>> read_column("shaft[2].gap", ["0.5x", "2x"], None, crane).values.tolist()
-    [0.1, 0.4]
-    """
-    target = target_of(key, machine)
-    if target is None:
-        raise InputError(_unknown(key, parameters, machine))
-    owner, field = target
-    if isinstance(values, str | bytes) or not (isinstance(values, Sequence) or hasattr(values, "__array__")):
-        raise InputError(f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2].")
-    if isinstance(values, range):
-        values = list(values)
-    if owner == "controller":
-        return Column(PREFIX, owner, "", "", "controller", _texts(key, values))
-    if owner == "drive":
-        return _of_drive(key, field, values, machine)
-    if parameters is None:  # the controllers themselves are wrong, which is told elsewhere
-        raise InputError([])
-    if field not in parameters:
-        raise InputError(_no_such_parameter(key, field, parameters))
-    if field in parameters.fixed:
-        raise InputError(f"{key}: the parameter {field} has one value already; leave one of the two out.")
-    known = parameters[field]
-    if known.kind == "object":
-        raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
-    read = _texts(key, values) if known.kind == "text" else _flat(key, quantity(key, values, known.unit))
-    return Column(f"{PREFIX}_{field}", owner, field, known.unit, known.meaning or field, read)
-
-
-def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: Mistakes) -> Parameters | None:
-    """The parameters that all controllers of the sweep have."""
-    names = grid.get(PREFIX)
-    if PREFIX in grid and maker.given:
-        wrong.sentences.append(
-            f"controller = {maker.shown}: the controllers are an axis too; leave one of the two out."
-        )
-    if PREFIX in grid and maker.values:
-        wrong.sentences.append(
-            f"parameters = {show(dict(maker.values))}: with several controllers give each parameter as "
-            "an axis, of one value if need be."
-        )
-    listed = [] if isinstance(names, str | bytes) or not isinstance(names, Sequence) else list(names)
-    with wrong.noted():
-        return maker.parameters([n for n in listed if isinstance(n, str)] if PREFIX in grid else None)
-    return None
-
-
-def _of_drive(key: str, name: str, values: object, machine: Machine | None) -> Column:
-    found = None if machine is None else machine.knob(name)
-    parameter = PARAMETERS[name] if found is None else found.parameter
-    if found is not None and parameter.unit and not parameter.many:
-        values = [_multiple(value, found.value) for value in values]  # type: ignore[attr-defined]
-    if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
-        raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
-    wording = Wording(written={name: key})
-    try:
-        words = [value for value in list(values) if isinstance(value, str) and value in parameter.choices]  # type: ignore[call-overload]
-        if parameter.choices and (words or not parameter.unit):
-            texts = _texts(key, values)
-            for text in texts:
-                try:
-                    read_value(parameter, text)
-                except RefusedError as reason:
-                    raise InputError(wording.refused(parameter, text, reason)) from None
-            return Column(name, "drive", name, "", parameter.meaning, texts)
-        read = read_value(parameter, values, batch=True)
-    except RefusedError as reason:
-        raise InputError(wording.refused(parameter, values, reason)) from None
-    return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
-
-
-def _multiple(value: Any, own: Any) -> Any:
-    """What "2x" of the machine's own value is; anything else as it is."""
-    text = value.strip() if isinstance(value, str) else ""
-    if not (text.endswith("x") and isinstance(own, float)):
-        return value
-    try:
-        return float(f"{float(text[:-1]) * own:.12g}")
-    except ValueError:
-        return value  # which is refused with its sentence
 
 
 def _flat(key: str, values: object) -> Any:
@@ -255,8 +261,8 @@ def _repeated(column: Column) -> list[str]:
 
 def _wrong_samples(name: str, columns: list[Column], count: int) -> Iterator[str]:
     """What is wrong with parameters that vary together."""
-    if not name.isidentifier():
-        yield f"{show(name)}: the name of samples is one word of letters and digits, as sample."
+    if not name.isidentifier() or any(column.name == name for column in columns):
+        yield f"{show(name)}: name the samples by one word that is none of their parameters, as sample."
     if not count:
         yield f"{name}: these samples have no parameter; give some, as {{'gap': [0.5, 0.6]}}."
     if len({column.size for column in columns}) > 1:
@@ -265,31 +271,6 @@ def _wrong_samples(name: str, columns: list[Column], count: int) -> Iterator[str
     for column in columns:
         if not column.numeric:
             yield f"{column.name}: samples are numbers; make an axis of its own of these names."
-
-
-def _unknown(key: str, parameters: Parameters | None, machine: Machine | None = None) -> str:
-    like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
-    of_drive = [p.name for p in like if machine is None or machine.knob(p.name)]
-    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else of_drive
-    if not meant:
-        own = [f"{PREFIX}.{name}" for name in parameters or ()]
-        words = BY_PATH if machine is None else machine.knobs()
-        close = nearest(key, [*words, *own, *(parameters or ()), PREFIX])
-        meant = [f"{PREFIX}.{close}" if close in (parameters or ()) else close] if close else []
-    what = "drive" if machine is None else machine.KIND
-    hint = (
-        f"did you mean {' or '.join(meant)}?"
-        if meant
-        else f"take a parameter of the {what} or controller.NAME."
-    )
-    return f"{key}: there is no such axis; {hint}"
-
-
-def _no_such_parameter(key: str, name: str, parameters: Parameters) -> str:
-    close = nearest(name, list(parameters))
-    there = ", ".join(parameters) or "none"
-    hint = f"did you mean {PREFIX}.{close}?" if close else f"there are {there}."
-    return f"{key}: {parameters.lacking}; {hint}"
 
 
 MOST = 16_384  # starts of a chunk: sampled ones take about a second
@@ -357,10 +338,3 @@ class Plan:
     def indices(self) -> Iterator[tuple[int, ...]]:
         """Where each chunk stands, one after another."""
         return map(self.index, range(self.chunks))
-
-
-def checked_chunk(value: object) -> int | None:
-    """The number of starts of a chunk, or None."""
-    if value is None or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
-        return value
-    raise InputError(f"chunk = {value!r}: the starts of a chunk are a whole number of 1 or more.")

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from softstart import __version__
+from softstart.controller.recipe import about_name
 from softstart.errors import InputError
 from softstart.start.status import Status
 from softstart.stopping import at_stop
 from softstart.store import Records, Target, fresh_folder, warn_of_damage
 from softstart.sweeping.compute import Block, Question, known_figures
 from softstart.sweeping.grid import Axis, Plan
-from softstart.sweeping.maker import about_name
 
 if TYPE_CHECKING:
     import xarray
@@ -66,7 +66,7 @@ def empty_results(plan: Plan, axes: tuple[Axis, ...], question: Question) -> xar
         for column in axis.columns:
             about = {"units": column.unit} if column.numeric else {}
             coords[column.name] = axis.name, np.array(column.values), about | {"long_name": column.meaning}
-    shown, fitted_to = question.maker.shown, question.fitted_to
+    shown, fitted_to = question.recipe.label, question.fitted_to
     attributes = {
         **({} if fitted_to is None else {"softstart_fitted_to": fitted_to.to_toml()}),
         "title": f"{question.drive.name}, {shown}" if shown else question.drive.name,
@@ -79,16 +79,13 @@ def empty_results(plan: Plan, axes: tuple[Axis, ...], question: Question) -> xar
 
 def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
-    fitted_to, base = (one and one.to_toml() for one in (question.fitted_to, question.base))
     found: dict[str, Any] = {
         "drive": question.drive.to_toml(),
-        "controller": question.maker.about(),
+        "controller": question.recipe.about(),
         "order of the axes": [axis.name for axis in axes],
         "figures": list(question.figures),
         "until": question.until,
-        "time_limit": question.time_limit,
-        "fitted_to": fitted_to,
-        "base": base,
+        "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
         "softstart": __version__,
     }
     for column in (column for axis in axes for column in axis.columns):
@@ -104,14 +101,11 @@ def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
 class Store:
     """The figures of a sweep, in memory or in a folder, new or with the same inputs. Use it in a `with`.
 
-    `chunk` is the size of the chunks that was asked for, if one was; a folder brings the plan that it was
-    begun with.
+    A folder keeps the chunks that it was begun with.
     """
 
-    def __init__(
-        self, path: Path | None, plan: Plan, axes: tuple[Axis, ...], question: Question, chunk: int | None
-    ) -> None:
-        self.path, self.plan, self._axes, self._question, self._chunk = path, plan, axes, question, chunk
+    def __init__(self, path: Path | None, plan: Plan, axes: tuple[Axis, ...], question: Question) -> None:
+        self.path, self.plan, self._axes, self._question = path, plan, axes, question
         self._target = None if path is None else Target("to", path, "sweep", LIST)
 
     def __enter__(self) -> Self:
@@ -122,7 +116,9 @@ class Store:
             )
         with ExitStack() as stack:
             if self._target is not None:
-                _check_content(self._target)
+                others = (one for one in self._target.path.rglob("*") if not one.is_dir())
+                if not (self._target.path / LIST).exists() and any(others):
+                    raise self._target.foreign()
             inputs = inputs_of(self._question, self._axes)
             self._list = stack.enter_context(Records(self._target, inputs, ["part"]))
             if self._target is None:
@@ -204,14 +200,7 @@ class Store:
 
         begun = self._list.find("chunk")
         if begun is not None:
-            there = Plan(self.plan.shape, tuple(begun["shape"]))
-            if self._chunk is not None and there != self.plan:
-                raise InputError(
-                    f"chunk = {self._chunk}: the sweep in {target.path} was begun in chunks of "
-                    f"{' x '.join(map(str, there.chunk))} starts; leave chunk out to go on, or "
-                    f"{target.other}."
-                )
-            self.plan = there
+            self.plan = Plan(self.plan.shape, tuple(begun["shape"]))
         with target.errors(), fresh_folder(target.path.parent) as fresh:
             _describe(fresh, empty_results(self.plan, self._axes, self._question), self.plan)
             names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
@@ -232,18 +221,6 @@ class Store:
         assert self.path is not None
         for file in self.path.rglob("*.partial"):
             file.unlink(missing_ok=True)
-
-
-def _check_content(target: Target) -> None:
-    """Refuse a folder that holds something else than a sweep with its list."""
-    if (target.path / LIST).exists() or not any(not one.is_dir() for one in target.path.rglob("*")):
-        return
-    if not (target.path / "zarr.json").exists():
-        raise target.foreign()
-    raise target.error(
-        "it has no list of finished chunks that this version of softstart reads (an earlier version "
-        f"wrote another one); {target.other}, or delete this one to begin again."
-    )
 
 
 def _same(file: Path, other: Path) -> bool:

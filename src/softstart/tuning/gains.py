@@ -31,23 +31,20 @@ class Found:
     judged: Judged
     costs: Vector
     restart_costs: Vector
-    kept_default: Any  # whether a job's defaults were best
 
 
 Progress = Callable[[str], object]
 
 
 class Log:
-    """Counts starts, and tells whoever wants to know.
+    """Counts starts, and tells whoever wants to know how far it is.
 
     >>> Log(print).tell("schedule", 1, 40)
     schedule, generation 1 of 40, 0 starts
     """
 
     def __init__(self, progress: Progress | None) -> None:
-        self.progress = progress
-        self.began = time.perf_counter()
-        self.starts = 0
+        self.progress, self.began, self.starts = progress, time.perf_counter(), 0
 
     @property
     def seconds(self) -> float:
@@ -55,7 +52,7 @@ class Log:
         return time.perf_counter() - self.began
 
     def tell(self, title: str, done: int = 0, total: int = 0, unit: str = "generation") -> None:
-        """How far it is."""
+        """What is being done, how much of it is, and how fast."""
         if self.progress is not None:
             parts = f", {unit} {done} of {total}" if total else ""
             rate = f", {self.starts / self.seconds:,.0f}/s" if self.starts else ""
@@ -157,4 +154,4 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
     back = np.asarray((before < ours) & inside(trials.question.ranges, defaults, defaults))
     values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
     judged = Judged(*(np.where(back[:, None], *both) for both in zip(default, tuned, strict=True)))
-    return Found(values, judged, np.where(back, before, ours), restart_costs, back)
+    return Found(values, judged, np.where(back, before, ours), restart_costs)

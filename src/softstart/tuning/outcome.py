@@ -25,7 +25,7 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.tuning.question import Question
+from softstart.tuning.question import Question, given_to
 
 if TYPE_CHECKING:
     import xarray
@@ -52,11 +52,9 @@ class RobustSet:
     worst: float
     worst_default: float
     excess: float
-    excess_default: float
     agreement: int
     restarts: int
     spread: float
-    kept_default: bool
     cells: xarray.Dataset
     controller: RobustGains
 
@@ -67,7 +65,7 @@ class RobustSet:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        found = plain_fields(self, "excess_default", "cells", "controller")
+        found = plain_fields(self, "cells", "controller")
         return {**found, "feasible": self.feasible, "cells": table_of(self.cells)}
 
 
@@ -135,28 +133,13 @@ class Tuning:
         """The controller that takes its gains from the schedule. InputError if none was asked for."""
         return scheduled(self._schedule_file(), "schedule", self.question.recipe.make())
 
-    @property
-    def spread(self) -> tuple[float, float]:
-        """Least and largest metric of the schedule over the grid, or of the robust set if there is none."""
-        table = self.schedule if self.schedule is not None else self._robust().cells
-        return float(table[self.metric].min()), float(table[self.metric].max())
-
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        q = self.question
         return {
-            "drive": self.drive.name,
+            **self._asked(),
             "controller": self.controller,
-            "given": q.recipe.given,
-            "metric": self.metric,
-            "start_time_bound": q.bound.text(),
-            "free": {one.name: one.text() for one in q.ranges},
-            "gaps": list(q.gaps),
-            "load_inertias": list(q.load_inertias),
-            "scenarios": len(q.scenarios),
-            "quantile": q.quantile,
-            "seed": q.seed,
-            "restarts": q.restarts,
+            "given": given_to(self.question.recipe.make()),
+            "free": {one.name: one.text() for one in self.question.ranges},
             "schedule": None if self.schedule is None else table_of(self.schedule),
             "robust": None if self.robust is None else self.robust.summary(),
             "price": None if self.price is None else table_of(self.price),
@@ -186,7 +169,7 @@ class Tuning:
 
         By default the schedule, or the robust set if there is no schedule.
         """
-        about = self._about()
+        about = {"softstart": __version__, **self._asked(), "free": list(self.question.names)}
         if what == "robust" or (what is None and self.schedule is None):
             one = self._robust()
             saved = RobustFile(self._name(), one.parameters, one.controller.nominal)
@@ -206,18 +189,16 @@ class Tuning:
         text = schedule_csv(saved, columns)
         write_whole(Path(path), lambda stream: stream.write(text))
 
-    def _about(self) -> dict[str, Any]:
+    def _asked(self) -> dict[str, Any]:
         q = self.question
         return {
-            "softstart": __version__,
             "drive": self.drive.name,
             "metric": self.metric,
-            "start_time": q.bound.text(),
-            "quantile": q.quantile,
+            "start_time_bound": q.bound,
+            "gaps": list(q.gaps),
+            "load_inertias": list(q.load_inertias),
             "scenarios": len(q.scenarios),
-            "gaps_tuned": list(q.gaps),
-            "load_inertias_tuned": list(q.load_inertias),
-            "tuned": list(q.names),
+            "quantile": q.quantile,
             "seed": q.seed,
             "restarts": q.restarts,
         }
@@ -232,7 +213,7 @@ class Tuning:
             raise InputError("schedule: no schedule was tuned; call tune with schedule=True.")
         q = self.question
         gains = gains_on_grid(q, {one.name: self.schedule[one.name].to_numpy() for one in q.ranges})
-        given = {name: value for name, value in q.recipe.given.items() if name not in gains}
+        given = {k: value for k, value in given_to(q.recipe.make()).items() if k not in gains}
         return ScheduleFile(q.recipe.name, *q.declared(), gains, given)
 
     def _name(self) -> str:
@@ -256,12 +237,11 @@ def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Ga
 
 
 def table_of(dataset: xarray.Dataset) -> dict[str, Any]:
-    """A dataset over the grid as nested lists, one row per gap; NaN is None."""
+    """A dataset over the grid as nested lists, one row per gap; what is not finite is None."""
+
+    def plain(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
     return {
-        str(name): [[_plain(value) for value in row] for row in np.asarray(values).tolist()]
-        for name, values in dataset.items()
+        str(name): [list(map(plain, row)) for row in one.values.tolist()] for name, one in dataset.items()
     }
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

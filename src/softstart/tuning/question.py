@@ -4,64 +4,29 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from numbers import Real
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softstart import __version__
 from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller
-from softstart.controller.base import label_of
+from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
 from softstart.input.parameters import Knob
 from softstart.optimal.problem import StartTime
-from softstart.plugins import CONTROLLERS, registered
-from softstart.quantities import nearest, to_si
+from softstart.quantities import multiplied, nearest, to_si
 from softstart.tuning.ranges import Range
 from softstart.tuning.search import latin
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
 MARGIN = "margin"  # a metric that is made large
-
-
-class Bound(NamedTuple):
-    """The bound on the start time: that of the defaults, a multiple of that of `direct`, or seconds.
-
-    Of kind `limits` there is none: the permissible start time is part of the margin that is made large.
-    """
-
-    kind: Literal["defaults", "direct", "seconds", "limits"]
-    value: float = 1.0
-
-    def text(self) -> str:
-        """The bound in words."""
-        if self.kind == "defaults":
-            return "no slower than with the defaults"
-        if self.kind == "direct":
-            return f"at most {self.value:g} times the start time of direct"
-        if self.kind == "limits":
-            return "by the limits of the drive"
-        return f"at most {self.value:g} s"
-
-
-def bound_of(start_time: object, drive: Machine | None = None, metric: object = "") -> Bound:
-    """The bound asked for: None, seconds, or "1.2x" as a multiple of the start time of `direct`.
-
-    >>> bound_of(None).kind, bound_of("1.2x"), bound_of("300 ms")
-    ('defaults', Bound(kind='direct', value=1.2), Bound(kind='seconds', value=0.3))
-    """
-    if start_time is None:
-        limited = metric == MARGIN and drive is not None and drive.limits.start_time is not None
-        return Bound("limits", math.inf) if limited else Bound("defaults")
-    asked = StartTime.of(start_time)
-    return Bound("direct" if asked.multiple else "seconds", asked.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +40,8 @@ class Question:
     ranges: tuple[Range, ...]
     scenarios: tuple[Scenario, ...]
     metric: Metric
-    bound: Bound
+    start_time: StartTime | None
     quantile: float
-    base: Machine | None
     seed: int
     restarts: int
     population: int
@@ -99,6 +63,18 @@ class Question:
         if self.metric == MARGIN:
             return "limit_share"
         return self.metric if isinstance(self.metric, str) else getattr(self.metric, "__name__", "metric")
+
+    @property
+    def limited(self) -> bool:
+        """Whether the permissible start time is part of the margin, and there is no other bound."""
+        return self.start_time is None and self.metric == MARGIN and self.drive.limits.start_time is not None
+
+    @property
+    def bound(self) -> str:
+        """The bound on the start time in words."""
+        if (asked := self.start_time) is not None:
+            return f"at most {asked.value:g} " + ("times the start time of direct" if asked.multiple else "s")
+        return "by the limits of the drive" if self.limited else "no slower than with the defaults"
 
     def drive_of(self, cell: int) -> Machine:
         """The drive or chain of a cell, as it is."""
@@ -125,25 +101,16 @@ class Question:
 
     def inputs(self) -> dict[str, Any]:
         """All of it as plain data: what saved parts belong to."""
+        plain = "gaps", "load_inertias", "quantile", "seed", "restarts", "population", "generations"
         return {
             "version of softstart": __version__,
             "drive": self.drive.to_toml(),
-            "controller": [
-                self.recipe.name or repr(self.recipe.object),
-                repr(sorted(self.recipe.given.items())),
-            ],
-            "gaps": list(self.gaps),
-            "inertias": list(self.load_inertias),
+            "controller": self.recipe.about(),
             "free parameters": [repr(one) for one in self.ranges],
             "tolerances": [repr(sorted(one.items())) for one in self.scenarios],
             "metric": self.metric if isinstance(self.metric, str) else _code_of(self.metric),
-            "start time": list(self.bound),
-            "quantile": self.quantile,
-            "base drive": self.base.to_toml() if self.base else "",
-            "seed": self.seed,
-            "restarts": self.restarts,
-            "population": self.population,
-            "generations": self.generations,
+            "start time": self.bound,
+            **{name: getattr(self, name) for name in plain},
         }
 
 
@@ -154,32 +121,6 @@ def _code_of(metric: Callable[..., Any]) -> str:
     return f"{getattr(metric, '__module__', '')}.{getattr(metric, '__qualname__', repr(metric))}{told}"
 
 
-LOOSE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """The name of a controller and the parameters given to it, or the object where it has no such name.
-
-    >>> recipe = recipe_of("ramp", {"initial": "10 N*m"})
-    >>> recipe.name, recipe.given, recipe.make().initial
-    ('ramp', {'initial': 10.0}, 10.0)
-    """
-
-    name: str
-    given: dict[str, Any]
-    object: Controller | None = None
-
-    def make(self) -> Controller:
-        """The controller."""
-        return self.object if self.object is not None else make_controller(self.name, self.given)
-
-    @property
-    def label(self) -> str:
-        """How the controller is called."""
-        return label_of(self.make())
-
-
 def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
     """The recipe of a controller; InputError for one whose gains are tuned already."""
     made = make_controller(controller, parameters)
@@ -187,25 +128,16 @@ def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | N
         raise InputError(
             f"controller = {made.name}: its gains are tuned already; tune the controller itself."
         )
-    given = {
+    return Recipe(controller, dict(parameters or {}))
+
+
+def given_to(controller: Controller) -> dict[str, Any]:
+    """The parameters that were given to a controller, those that differ from the defaults of its class."""
+    return {
         f.name: value
-        for f in fields(made)
-        if (value := getattr(made, f.name)) is not None and (f.default is MISSING or value != f.default)
+        for f in fields(controller)
+        if (value := getattr(controller, f.name)) is not None and (f.default is MISSING or value != f.default)
     }
-    name = controller if isinstance(controller, str) else _name_of(made)
-    return Recipe(name, given, None if name else made)
-
-
-def _name_of(controller: Controller) -> str:
-    """The name under which the controller's class is found, or nothing."""
-    cls = type(controller)
-    point = registered(CONTROLLERS).get(cls.name)
-    if point is not None and point.value == f"{cls.__module__}:{cls.__qualname__}":
-        return cls.name
-    if cls.__module__.startswith(LOOSE):
-        file = getattr(sys.modules.get(cls.__module__), "__file__", None)
-        return f"{file}:{cls.__name__}" if file else ""
-    return ""
 
 
 GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
@@ -251,26 +183,17 @@ def _axis(
     listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
     if not listed:
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
-    found: list[float] = []
-    wrong = Mistakes()
-    for value in listed:
-        with wrong.noted():
-            found.append(_value(value, name, unit, units))
     gap, inertia = drive.gap_and_inertia
-    for value in found:
-        with wrong.noted(f"{name}: "):
-            drive.moved(*((value, inertia) if unit == "rad" else (gap, value)))
+    found, wrong = set[float](), Mistakes()
+    for one in listed:
+        with wrong.noted():
+            found.add(value := float(to_si(multiplied(one, name, units), unit, name=name)))
+            try:
+                drive.moved(*((value, inertia) if unit == "rad" else (gap, value)))
+            except InputError as error:
+                raise InputError(f"{name}: {sentence}" for sentence in error.sentences) from None
     wrong.settle()
-    return tuple(sorted(set(found)))
-
-
-def _value(value: Any, name: str, unit: str, units: dict[str, float]) -> float:
-    if isinstance(value, str):
-        for ending, one in units.items():
-            if value.strip().endswith(ending):
-                multiple = float(to_si(value.strip().removesuffix(ending), "1", name=name))
-                return float(f"{multiple * one:.12g}")  # 5 x 0.035 is 0.175, whatever binary makes of it
-    return float(to_si(value, unit, name=name))
+    return tuple(sorted(found))
 
 
 MOST = 16  # scenarios beside the drive as it is; more combinations are sampled

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, fields
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
 from softstart.errors import InputError, Mistakes
-from softstart.quantities import nearest, to_si
+from softstart.quantities import multiple, nearest, to_si
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 
@@ -170,23 +168,23 @@ def _range(controller: str, name: str, ends: Any, known: Mapping[str, Field[Any]
 
 def _named(name: str, ends: Any, unit: str) -> Range:
     """The user's own range."""
-    if isinstance(ends, str) or not isinstance(ends, Iterable) or len(both := list(ends)) != 2:
-        raise InputError(f"free: {name} = {ends!r}: give its lowest and highest value, as (0.1, 0.5).")
-    multiples = [isinstance(end, str) and end.strip()[-1:] in ("x", "X") for end in both]
-    if any(multiples) and not all(multiples):
-        raise InputError(f"free: {name} = {ends!r}: give both ends as values, or both as multiples (2x).")
-    texts = [end.strip()[:-1] if multiples[0] else end for end in both]
-    label = f"free {name}"
-    low, high = (float(to_si(end, "1" if multiples[0] else unit or "1", name=label)) for end in texts)
-    if not low < high:
-        raise InputError(f"free: {name} = {ends!r}: the lowest value must be below the highest.")
-    if multiples[0] and low <= 0.0:
-        raise InputError(f"free: {name} = {ends!r}: multiples of the default must be above 0.")
-    pair = (low, high)
-    if multiples[0]:
-        return Range(name, unit, multiples=pair, logarithmic=True, named=True)
-    wide = low > 0.0 and high >= WIDE * low
-    return Range(name, unit, between=pair, logarithmic=wide, named=True)
+    both = [] if isinstance(ends, str) or not isinstance(ends, Iterable) else list(ends)
+    multiples = [multiple(end, f"free {name}") for end in both]
+    if None not in multiples:
+        values = [found[0] for found in multiples if found]
+    elif any(multiples):
+        values = []
+    else:
+        values = [float(to_si(end, unit or "1", name=f"free {name}")) for end in both]
+    if len(values) != 2 or not values[0] < values[1] or (any(multiples) and values[0] <= 0.0):
+        raise InputError(
+            f"free: {name} = {ends!r}: give its lowest and highest value in this order, or both as multiples "
+            "of the default above 0, as 0.5x and 2x."
+        )
+    low, high = values
+    if any(multiples):
+        return Range(name, unit, multiples=(low, high), logarithmic=True, named=True)
+    return Range(name, unit, between=(low, high), logarithmic=0.0 < WIDE * low <= high, named=True)
 
 
 def inside(ranges: Iterable[Range], values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Any:
@@ -198,12 +196,3 @@ def inside(ranges: Iterable[Range], values: Mapping[str, Any], defaults: Mapping
             slack = 1e-9 * np.maximum(np.abs(low), np.abs(high))
             good = good & (values[one.name] >= low - slack) & (values[one.name] <= high + slack)
     return good
-
-
-def check_number(name: str, value: object, low: float, high: float, meaning: str) -> float:
-    """A finite number above `low` and up to `high`, or an InputError that says what is meant."""
-    if isinstance(value, Real) and not isinstance(value, bool):
-        number = float(value)
-        if math.isfinite(number) and low < number <= high:
-            return number
-    raise InputError(f"{name} = {value!r}: give {meaning}.")

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 from softstart.chain.machines import Machine, one_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
-from softstart.drive.records import is_machine
-from softstart.errors import InputError
-from softstart.parallel import Pool, checked_workers, why_not_sendable
+from softstart.errors import InputError, Mistakes
+from softstart.optimal.problem import StartTime
+from softstart.parallel import Pool, checked_workers, sharing
+from softstart.quantities import check_whole
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target
@@ -21,14 +23,13 @@ from softstart.tuning.question import (
     MARGIN,
     Metric,
     Question,
-    bound_of,
     gaps_of,
     inertias_of,
     recipe_of,
     scenarios_drawn,
     scenarios_of,
 )
-from softstart.tuning.ranges import Free, check_number, ranges_of
+from softstart.tuning.ranges import Free, ranges_of
 from softstart.tuning.tables import (
     between_table,
     check_metric,
@@ -60,7 +61,6 @@ def tune(
     schedule: bool = True,
     robust: bool = True,
     certified: bool | None = None,
-    base: Machine | None = None,
     seed: int = 0,
     restarts: int = 3,
     population: int | None = None,
@@ -81,20 +81,16 @@ def tune(
     Parameters
     ----------
     drive : Drive, Chain, Identification or str
-        The nominal drive or chain, or its name or file. A chain starts itself, and its figures are those of
-        all its shafts; the controller is set up for its two masses. With an identification every candidate is
-        judged by the drive found and by 100 drives that its logs leave possible, drawn from their joint
-        distribution: by the worst of them, or by a `quantile`. Gaps and inertias are then those of the
-        drive, if none are given.
+        The nominal drive or chain, or its name or file. A chain starts itself, and the controller is set up
+        for its two masses. With an identification every candidate is judged by the drive found and by 100
+        drives that its logs leave possible; gaps and inertias are then those of the drive, if none are given.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or an object.
-    gaps : iterable, optional
-        Gaps in rad: numbers, texts with a unit, or multiples of the drive's own as "2x". By default 0.5, 1,
-        2 and 4 times its own. Those of a chain are the sum of all its gaps at the motor shaft, widened
-        alike.
-    inertias : iterable, optional
-        Load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1 and 2 times
-        the drive's own. Of a chain that of its load mass.
+    gaps, inertias : iterable, optional
+        Gaps in rad and load inertias in kg m2: numbers, texts with a unit, multiples of the drive's own as
+        "2x", or inertias as multiples of the motor's as "5 J1". By default 0.5, 1, 2 and 4 times its gap, and
+        0.4, 1 and 2 times its load inertia. Those of a chain are the sum of all its gaps at the motor shaft,
+        widened alike, and the inertia of its load mass.
     parameters : mapping, optional
         Parameters of a controller given by name. What is given is not tuned, unless it is `free`.
     free : iterable or mapping, optional
@@ -103,11 +99,9 @@ def tune(
         that it names.
     metric : str or callable
         What is minimised: a figure of a start (of a chain also `k_dyn_2`, that of its second shaft), or a
-        function of the mapping of all figures (arrays, one value
-        a start) that returns one number a start. "margin" is made large: the least share left of the limits
-        of the drive, shaft torque and start time (of a chain the permissible torque of each shaft); the
-        tables have its complement `limit_share`, the largest
-        share of a limit that a start takes.
+        function of the mapping of all figures (arrays, one value a start) that returns one number a start.
+        "margin" is made large: the least share left of the limits of shaft torque and start time (of a chain
+        the permissible torque of each shaft); the tables have its complement `limit_share`.
     start_time : float or str, optional
         Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
         default each start is to be no slower than with the controller's own defaults; for the margin to a
@@ -123,8 +117,6 @@ def tune(
     certified : bool, optional
         Whether to compute each cell's optimum within the same time and its lower bound (only of `k_dyn`).
         By default that of drives; that of a chain takes longer.
-    base : Drive or Chain, optional
-        The drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
     seed, restarts, population, generations : int
         Of the search. The same ones give the same bits, whoever computes.
     workers : int, optional
@@ -165,20 +157,48 @@ def tune(
     R. Storn, K. Price: Differential evolution - a simple and efficient heuristic for global optimization over
     continuous spaces, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
     """
-    drawn = None
+    if not (schedule or robust):
+        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
+    identified = drive if isinstance(drive, Uncertain) else None
     if isinstance(drive, Uncertain):
-        drawn = drive.draws(DRAWN)
         drive = drive.drive
         gaps = [drive.gap] if gaps is None else gaps
         inertias = [drive.load_inertia] if inertias is None else inertias
     drive = one_machine(drive)
     certified = isinstance(drive, Drive) if certified is None else certified
-    question = _question(
-        drive, controller, gaps, inertias, parameters, free, metric, start_time, tolerances, quantile, base,
-        seed, restarts, population, generations, drawn,
+    wrong = Mistakes()
+    whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}
+    whole |= {} if population is None else {"population": (population, 5)}
+    for name, (number, least) in whole.items():
+        with wrong.noted():
+            check_whole(number, name, least)
+    with wrong.noted():
+        scenarios = scenarios_of(drive, tolerances, 0 if wrong.sentences else seed)
+        if identified is not None:
+            scenarios = scenarios_drawn(identified.drive, identified.draws(DRAWN), scenarios)
+    with wrong.noted():
+        recipe = recipe_of(controller, parameters)
+        ranges = ranges_of(recipe.make(), free)
+    with wrong.noted():
+        rows = gaps_of(drive, gaps)
+    with wrong.noted():
+        columns = inertias_of(drive, inertias)
+    with wrong.noted():
+        bound = None if start_time is None else StartTime.of(start_time)
+    share: Any = quantile
+    if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
+        wrong.sentences.append(f"quantile = {share!r}: give a share of the starts above 0, at most 1.")
+    if not isinstance(metric, str) and not callable(metric):
+        wrong.sentences.append(
+            f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures."
+        )
+    if metric == MARGIN and not has_margin(drive.limits):
+        wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
+    wrong.settle()
+    question = Question(
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), seed, restarts,
+        population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations,
     )  # fmt: skip
-    if not (schedule or robust):
-        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
     log = Log(progress)
     log.tell("starts with the defaults")
     sides = {
@@ -211,19 +231,12 @@ def tune(
 
 def _pool_for(first: Trials, *_: Trials, workers: int | None, scheduler: str | None) -> Pool:
     """Where candidates are started: threads for compiled controllers, else processes, or a cluster."""
-    question, count = first.question, checked_workers(workers, scheduler)
+    question = first.question
     starts = len(question.cells) * len(question.scenarios) * question.restarts
-    if not first.compiled and starts * question.population * question.generations < WORTH_SHARING:
-        count = 1
-    if scheduler is not None or (count > 1 and not first.compiled):
-        reason = why_not_sendable(question)
-        if reason and (workers is not None or scheduler is not None):
-            given = f"workers = {workers}" if scheduler is None else "scheduler"
-            raise InputError(
-                f"{given}: the controller or the metric cannot be handed to another process ({reason}); "
-                "define it at the top level of a module, or give workers=1."
-            )
-        count = 1 if reason else count
+    small = starts * question.population * question.generations < WORTH_SHARING
+    if small and not first.compiled and scheduler is None:
+        return Pool(1)
+    count = sharing(question, "the controller or the metric", workers, scheduler, first.compiled)
     return Pool(count, threads=first.compiled, scheduler=scheduler, describe=_candidates)
 
 
@@ -233,65 +246,3 @@ def _candidates(part: Any) -> str:
 
 def _optimum(asked: Any) -> str:
     return f"the optimum of cell {asked.cell + 1}"
-
-
-def _question(
-    drive: Machine,
-    controller: str | Controller,
-    gaps: Any,
-    inertias: Any,
-    parameters: Mapping[str, object] | None,
-    free: Free,
-    metric: Any,
-    start_time: Any,
-    tolerances: Any,
-    quantile: Any,
-    base: Any,
-    seed: Any,
-    restarts: Any,
-    population: Any,
-    generations: Any,
-    drawn: Any,
-) -> Question:
-    """All that was given, read; every mistake at once."""
-    wrong: list[str] = []
-
-    def read(what: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return what(*arguments)
-        except InputError as error:
-            wrong.extend(error.sentences)
-            return None
-
-    recipe = read(recipe_of, controller, parameters)
-    ranges = read(lambda: ranges_of(recipe.make(), free)) if recipe is not None else None
-    rows, columns = read(gaps_of, drive, gaps), read(inertias_of, drive, inertias)
-    bound = read(bound_of, start_time, drive, metric)
-    share = read(check_number, "quantile", quantile, 0.0, 1.0, "a share of the starts above 0, at most 1")
-    first = read(_whole, "seed", seed, 0)
-    again = read(_whole, "restarts", restarts, 1)
-    long = read(_whole, "generations", generations, 1)
-    room = None
-    if ranges is not None:
-        room = max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))
-        room = room if population is None else read(_whole, "population", population, 5)
-    scenarios = read(scenarios_of, drive, tolerances, first or 0)
-    if drawn is not None and scenarios is not None:
-        scenarios = read(scenarios_drawn, drive, drawn, scenarios)
-    if base is not None and not is_machine(base):
-        wrong.append(f"base = {base!r}: K_dyn refers to one Drive or Chain; Drive.load reads one.")
-    if not isinstance(metric, str) and not callable(metric):
-        wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
-    if metric == MARGIN and not has_margin(drive.limits):
-        wrong.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
-    if wrong or ranges is None or room is None:
-        raise InputError(wrong)
-    return Question(
-        drive, recipe, rows, columns, ranges, scenarios, metric, bound, share, base, first, again, room, long
-    )
-
-
-def _whole(name: str, value: object, least: int) -> int:
-    if isinstance(value, int) and not isinstance(value, bool) and value >= least:
-        return value
-    raise InputError(f"{name} = {value!r}: give a whole number of {least} or more.")

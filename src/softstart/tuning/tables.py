@@ -50,7 +50,6 @@ def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
     near, apart = zip(*map(_agreement, found.restart_costs, found.costs), strict=True)
     columns["agreement"] = (np.array(near), "1", "searches within 1 % of the best")
     columns["spread"] = (np.array(apart), "1", "how far apart the searches end")
-    columns["kept_default"] = (found.kept_default, "", "whether the defaults were best")
     return _dataset(trials.question, columns)
 
 
@@ -67,19 +66,16 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     near, apart = _agreement(found.restart_costs[0], float(found.costs[0]))
     both = found.judged, trials.default
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
-    over, over_default = (float(excess(one.start_time, trials.bound, quantile)[0]) for one in both)
     return RobustSet(
         parameters=ready.parameters,
         gains=gains,
         defaults={name: float(value[0]) for name, value in trials.defaults.items()},
         worst=worst,
         worst_default=worst_default,
-        excess=over,
-        excess_default=over_default,
+        excess=float(excess(found.judged.start_time, trials.bound, quantile)[0]),
         agreement=near,
         restarts=trials.question.restarts,
         spread=apart,
-        kept_default=bool(found.kept_default[0]),
         cells=_dataset(trials.question, _figures(trials, found.judged)),
         controller=RobustGains("robust", ready, own),
     )
@@ -193,12 +189,11 @@ Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
 
 
 class Asked(NamedTuple):
-    """An optimum: its cell, the bound on the start time in s, the drive, and that to which K_dyn refers."""
+    """An optimum: its cell, the bound on the start time in s, and the drive, to which K_dyn refers."""
 
     cell: int
     bound: float
     drive: Machine
-    base: Machine | None
 
 
 def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Optima:
@@ -212,7 +207,7 @@ def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Opt
             if record is not None:
                 found[cell, bound] = record
             elif math.isfinite(bound):
-                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell), question.base)
+                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell))
     for done, (one, record) in enumerate(pool.results(optimum_of, missing.values())):
         log.tell("optima", done, len(missing), "cell")
         found[one.cell, one.bound] = record
@@ -230,10 +225,7 @@ def optimum_of(asked: Asked) -> dict[str, Any]:
     ideal = asked.drive.with_values(names)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
-        each = [
-            optimize(one, asked.bound, terminal="reached", base=asked.base)
-            for one in ideal.positions.values()
-        ]
+        each = [optimize(one, asked.bound, terminal="reached") for one in ideal.positions.values()]
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
     except (OptimumError, InputError):

@@ -55,7 +55,7 @@ class Trials:
         self.starts_of = starts.reshape(1 if robust else count, -1)  # job -> its starts, cell by cell
         cells = [question.drive_of(cell) for cell in range(count)]
         self.drives = [question.drive.design_drive] if robust else [one.design_drive for one in cells]
-        self.base = np.repeat([(question.base or one).mean_torque for one in cells], scenarios)
+        self.base = np.repeat([one.mean_torque for one in cells], scenarios)
         self.batch = _starts_of_cells(question)
         set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
         self.compiled = isinstance(set_up[0], CompiledController)
@@ -67,11 +67,11 @@ class Trials:
 
     def _measured(self) -> tuple[Judged, Vector]:
         """What the defaults reach, and the bounds that follow."""
-        bound, default = self.question.bound, self.judged(np.arange(len(self.drives)), {})
-        if bound.kind in ("seconds", "limits"):
-            return default, np.full(self.starts_of.shape, bound.value)
-        if bound.kind == "direct":
-            return default, bound.value * self._direct()[self.starts_of]
+        asked, default = self.question.start_time, self.judged(np.arange(len(self.drives)), {})
+        if asked is not None and asked.multiple:
+            return default, asked.value * self._direct()[self.starts_of]
+        if asked is not None or self.question.limited:
+            return default, np.full(self.starts_of.shape, asked.value if asked else math.inf)
         return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
 
     def _direct(self) -> Vector:

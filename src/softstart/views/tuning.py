@@ -91,7 +91,7 @@ def question(tuning: Tuning) -> str:
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
-        f"{tuning.controller}: {_metric(tuning)} minimised, start time {q.bound.text()}, "
+        f"{tuning.controller}: {_metric(tuning)} minimised, start time {q.bound}, "
         f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
         f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
     )

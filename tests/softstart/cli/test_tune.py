@@ -156,7 +156,7 @@ ONE_SENTENCE = {
         ["--controller", "direct", "--free", "torque"],
         ["give one, as --free torque=0.5x:2x"],
     ),
-    "ends the wrong way": (["--free", "time=3:1"], ["time = 3:1: the lowest value"]),
+    "ends the wrong way": (["--free", "time=3:1"], ["time = 3:1: give its lowest"]),
 }
 
 

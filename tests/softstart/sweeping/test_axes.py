@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, records, sweep
+from softstart.controller.recipe import Recipe
 from softstart.sweeping.grid import read_grid
-from softstart.sweeping.maker import Maker
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -21,7 +21,8 @@ def test_names_and_units():
             "load_kind": ["reactive", "active"],
             "controller_period": range(1, 3),
         },
-        Maker("ramp"),
+        Recipe("ramp"),
+        CRANE,
     )
     assert [axis.name for axis in axes] == [
         "load_inertia", "gap", "controller_time", "load_kind", "controller_period",
@@ -55,8 +56,8 @@ ONE_SENTENCE = {
     "kind": ({"load.kind": ["activ"]}, "direct", 'did you mean "active"?'),
     "a kind that is a number": ({"load.kind": [1]}, "direct", "takes names"),
     "the drive's name": ({"name": ["a"]}, "direct", "changes no start"),
-    "controller and axis": ({"controller": ["direct"]}, "ramp", "controllers are an axis too"),
-    "no controller": ({"gap": [1]}, None, "controller = None"),
+    "controller and axis": ({"controller": ["direct"]}, "ramp", "one of the two"),
+    "no controller": ({"gap": [1]}, None, "name one, or make several an axis"),
     "unknown in the axis": ({"controller": ["direct", "rmp"]}, None, 'did you mean "ramp"?'),
     "not shared": (
         {"controller": ["direct", "ramp"], "controller.time": [1]}, None,
@@ -65,7 +66,7 @@ ONE_SENTENCE = {
     "samples of two lengths": ({"sample": {"gap": [1], "damping": [1, 2]}}, "direct", "gap has 1, damp"),
     "samples of texts": ({"sample": {"load.kind": ["active"]}}, "direct", "samples are numbers"),
     "no samples": ({"sample": {}}, "direct", "no parameter"),
-    "samples called like a parameter": ({"gap": {"gap": [1], "damping": [2]}}, "direct", "another one"),
+    "samples called like a parameter": ({"gap": {"gap": [1], "damping": [2]}}, "direct", "none of their"),
 }  # fmt: skip
 
 
@@ -87,7 +88,7 @@ def test_all_mistakes_at_once():
             {"gapp": [1], "load.inertia": [-1.0], "controller.tme": [1], "stiffness": ["soft"]},
             figures=["k_dym"],
             until=-1.0,
-            base=records(CRANE, gap=[1.0, 2.0]),
+            fitted_to=records(CRANE, gap=[1.0, 2.0]),
         )
     told = "\n".join(caught.value.sentences)
     assert len(caught.value.sentences) == 7
@@ -98,7 +99,7 @@ def test_all_mistakes_at_once():
         "stiffness",
         "did you mean k_dyn?",
         "until",
-        "base",
+        "fitted_to",
     ):
         assert words in told
 

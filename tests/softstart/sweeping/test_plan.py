@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import InputError
-from softstart.sweeping.grid import Plan, checked_chunk
+from softstart.sweeping.grid import Plan
 
 SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 
@@ -46,9 +44,3 @@ def test_small_grids_have_work_for_many(size):
 
 def test_the_last_index_is_the_fastest():
     assert list(Plan((2, 4), (1, 2)).indices()) == [(0, 0), (0, 1), (1, 0), (1, 1)]
-
-
-@pytest.mark.parametrize("chunk", [0, -1, 1.5, True, "many"])
-def test_a_chunk_has_starts(chunk):
-    with pytest.raises(InputError, match=r"chunk = .*whole number of 1 or more"):
-        checked_chunk(chunk)

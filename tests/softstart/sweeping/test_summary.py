@@ -5,12 +5,10 @@ from __future__ import annotations
 import struct
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import Drive, Status, simulate, sweep
-from softstart.sweeping.entry import Progress, Watch
 from softstart.sweeping.summary import spread, summarise
 from softstart.views.drawing import save_figure
 from softstart.views.sweeps import sweep_figure
@@ -66,16 +64,6 @@ def test_the_worst_case_and_how_starts_ended():
     )
     assert late.statuses == {Status.STOPPED_EARLY.name: 2}
     assert (late.share_reached, late.judged, late.worst) == (0.0, "start_time", {})
-
-
-def test_progress_tells_rate_and_time_left():
-    told: list[Progress] = []
-    watch = Watch(1000, 400, told.append)
-    watch.add(300)
-    assert [(now.done, now.before, now.starts) for now in told] == [(400, 400, 1000), (700, 400, 1000)]
-    assert np.isnan(told[0].left)
-    assert told[1].left == pytest.approx(300 / told[1].rate)
-    assert str(told[0]) == "400 of 1,000 starts (40 %)"
 
 
 def results_over(controller="direct", /, **axes):

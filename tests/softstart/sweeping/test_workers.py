@@ -73,9 +73,7 @@ def test_objects_that_no_other_process_can_load_are_refused():
         def step(self, measured, state):
             return Command(62.0)
 
-    with pytest.raises(
-        InputError, match=r"another process cannot load this object of class .*Local.*workers=1"
-    ):
+    with pytest.raises(InputError, match=r"the controller cannot be handed .*Local.*workers=1"):
         sweep(CRANE, Local(), {"gap": [0.5, 1.0]}, workers=2, chunk=1)
     assert sweep(CRANE, Local(), {"gap": [0.5, 1.0]}, workers=1).status.values.tolist() == [0, 0]
 

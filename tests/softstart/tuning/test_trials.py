@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
-from softstart.tuning.question import Question, bound_of, gaps_of, inertias_of, recipe_of, scenarios_of
+from softstart.tuning.question import Question, gaps_of, inertias_of, recipe_of, scenarios_of
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
@@ -19,7 +19,7 @@ def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
     asked = {
         "drive": drive, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
         "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(drive, tolerances),
-        "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
+        "metric": "k_dyn", "start_time": None, "quantile": 1.0, "seed": 0, "restarts": 1,
         "population": 8, "generations": 2,
     }  # fmt: skip
     return Trials(Question(**(asked | change)), robust)

@@ -1,0 +1,119 @@
+"""A controller as data: what makes it again, in another process too, and what tells it from others."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softstart.controller.base import Controller, label_of
+from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
+from softstart.drive.records import is_machine
+from softstart.plugins import CONTROLLERS, registered
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """A controller by name and parameters, or a finished one; "" where several are an axis of a sweep.
+
+    `allow_code` is that of files of tuned gains, see `make_controller`.
+
+    >>> recipe = Recipe("ramp", {"initial": "10 N*m"})
+    >>> recipe.make({"time": "120 ms"}).parameters["time"], recipe.make().initial
+    (0.12, 10.0)
+    """
+
+    given: str | Controller = ""
+    values: Mapping[str, object] = field(default_factory=dict)
+    allow_code: bool = False
+
+    def make(self, more: Mapping[str, object] | None = None, name: str = "") -> Controller:
+        """The controller with further parameters, which may be arrays; `name` where it is from an axis."""
+        if isinstance(self.given, Controller) and more:
+            return replace(self.given, **more)
+        values = {**self.values, **(more or {})}
+        return make_controller(name or self.given, values, allow_code=self.allow_code)
+
+    def class_of(self, name: str = "") -> type[Controller]:
+        """The class of the controller; `name` where it is from an axis."""
+        given = name or self.given
+        if isinstance(given, str) and not given.lower().endswith(GAIN_FILES):
+            return controller_class(given)
+        return type(make_controller(given, allow_code=self.allow_code))
+
+    @property
+    def label(self) -> str:
+        """What the controller is called in a sentence or a title."""
+        return label_of(self.given) if isinstance(self.given, Controller) else self.given
+
+    @property
+    def name(self) -> str:
+        """The name under which files find the controller, "" for an object whose class is not installed."""
+        if isinstance(self.given, str):
+            return self.given
+        cls = type(self.given)
+        point = registered(CONTROLLERS).get(cls.name)
+        own = f"{cls.__module__}:{cls.__qualname__}"
+        return cls.name if point is not None and point.value == own else ""
+
+    def about(self) -> Any:
+        """All of it as plain data: equal data make controllers that answer alike."""
+        if isinstance(self.given, Controller):
+            return _plain(self.given)
+        return {**about_name(self.given), "parameters": _plain(dict(self.values))}
+
+
+def with_whole_path(name: str) -> str:
+    """The name of a controller with the whole path of its file, so that it is found from anywhere.
+
+    >>> with_whole_path("ramp")
+    'ramp'
+    """
+    path, rest = _split(name)
+    return name if path is None else f"{path.resolve()}{rest}"
+
+
+def about_name(name: str) -> dict[str, str]:
+    """A controller's name as plain data, with a fingerprint of the file that it leads to, if it does."""
+    path, rest = _split(name)
+    return {"name": name} if path is None else {"name": f"{path.name}{rest}", "file": _of_file(path)}
+
+
+def _split(name: str) -> tuple[Path | None, str]:
+    """The file that a name begins with, and what follows."""
+    if name.lower().endswith(GAIN_FILES):
+        return Path(name), ""
+    end = name.index(".py") + 3 if ".py" in name else 0
+    return (Path(name[:end]), name[end:]) if end else (None, name)
+
+
+def _plain(value: Any) -> Any:
+    """A value as plain data that tells it from others, with fingerprints of files and arrays."""
+    if isinstance(value, str | Path):
+        path = Path(value)
+        return [path.name, _of_file(path)] if path.suffix and path.is_file() else str(value)
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    if is_machine(value):
+        return value.to_toml()
+    if isinstance(value, np.ndarray):
+        return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if is_dataclass(value):
+        kind = f"{type(value).__module__}.{type(value).__qualname__}"
+        return {"class": kind} | {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    return repr(value)
+
+
+def _of_file(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "not readable"
