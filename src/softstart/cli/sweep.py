@@ -99,7 +99,9 @@ def sweep(
         show("summing up")
         summary = summarise(results)
         if netcdf is not None:
-            results.to_netcdf(netcdf, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
+            part = netcdf.with_name(f"{netcdf.name}.part")  # nothing half-written under its name
+            results.to_netcdf(part, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
+            part.replace(netcdf)
     data = {
         "drive": drive.name,
         "fitted_to": fitted_to.name if fitted_to else None,
