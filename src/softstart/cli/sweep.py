@@ -100,8 +100,11 @@ def sweep(
         summary = summarise(results)
         if netcdf is not None:
             part = netcdf.with_name(f"{netcdf.name}.part")  # nothing half-written under its name
-            results.to_netcdf(part, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
-            part.replace(netcdf)
+            try:
+                results.to_netcdf(part, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
+                part.replace(netcdf)
+            finally:
+                part.unlink(missing_ok=True)
     data = {
         "drive": drive.name,
         "fitted_to": fitted_to.name if fitted_to else None,
