@@ -46,9 +46,6 @@ class Estimate:
     known : bool
         False if the interval is wider than a factor of 3; of a friction, than a tenth of the torque that
         accelerates.
-    by_profile : bool
-        Whether the interval is where the fit gets worse, with all other parameters refitted, because its
-        quadratic would mislead.
     reason : str
         Why it is unknown; else empty.
 
@@ -67,7 +64,6 @@ class Estimate:
     lower: float
     upper: float
     known: bool
-    by_profile: bool = False
     reason: str = ""
 
     @property
@@ -266,8 +262,8 @@ class Identification:
         path = Path(folder) / FILE
         try:
             kept = json.loads(read_text(path))
-            if not isinstance(kept, dict) or kept.get("format") != FORMAT:
-                raise RefusedError(f"it is not of the format {FORMAT}; identify the drive again")
+            if kept["format"] != FORMAT:
+                raise ValueError(f"it is not of the format {FORMAT}")
             estimates = tuple(
                 Estimate(**{f.name: _or_nan(one[f.name]) for f in fields(Estimate)})
                 for one in kept["estimates"]
@@ -282,11 +278,8 @@ class Identification:
                 notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
-            reason = refusal.reason
             raise InputError(
-                f"{path}: {reason}; name a folder that softstart identify --out has written."
-                if "there is no" in reason
-                else f"{path}: {reason}."
+                f"{path}: {refusal.reason}; name a folder that softstart identify --out has written."
             ) from None
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise InputError(
@@ -343,21 +336,16 @@ def _or_nan(value: Any) -> Any:
 def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
     """That estimates and correlations of a file can be those of an identification."""
     for one in estimates:
-        numbers = (one.lower, one.value, one.upper)
         if math.isnan(one.lower) and math.isnan(one.upper) and math.isfinite(one.value) and not one.known:
             continue  # no interval is stated
-        if not all(isinstance(n, int | float) and math.isfinite(n) for n in numbers) or sorted(numbers) != [
-            *numbers
-        ]:
-            raise RefusedError(
-                f"{one.name}: its value {one.value} does not lie in {one.lower} to {one.upper}"
-            )
-        if one.name in PARAMETERS and one.name not in FRICTIONS and one.lower * one.upper <= 0.0:
-            raise RefusedError(f"{one.name}: its interval {one.lower} to {one.upper} has 0 in it")
+        signed = one.name in PARAMETERS and one.name not in FRICTIONS
+        if not -math.inf < one.lower <= one.value <= one.upper < math.inf or (
+            signed and one.lower * one.upper <= 0.0
+        ):
+            raise ValueError(f"{one.name}: {one.value} in {one.lower} to {one.upper}")
     size = len(estimates)
-    if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):
-        raise RefusedError(f"the correlations of {size} estimates are a symmetric table of {size} rows")
-    if not (
-        np.allclose(np.diag(correlations), 1.0, atol=1e-6) and np.all(np.abs(correlations) <= 1.0 + 1e-6)
-    ):
-        raise RefusedError("correlations lie between -1 and 1, and are 1 of a number with itself")
+    symmetric = correlations.shape == (size, size) and np.allclose(correlations, correlations.T, atol=1e-9)
+    if not symmetric or not np.allclose(np.diag(correlations), 1.0, atol=1e-6):
+        raise ValueError(f"the correlations of {size} estimates are a symmetric table, 1 on its diagonal")
+    if np.any(np.abs(correlations) > 1.0 + 1e-6):
+        raise ValueError("correlations lie between -1 and 1")
