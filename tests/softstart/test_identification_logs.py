@@ -124,7 +124,7 @@ def test_a_unit_in_columns_takes_the_place_of_that_of_the_file(log: Log, tmp_pat
     assert read.kind == "speed"
     assert read.values == pytest.approx(speed * math.pi / 30.0, rel=1e-12, abs=1e-12)
     assert np.array_equal(Log.load(path, columns=names | {"speed": "n"}).values, read.values)
-    with pytest.raises(InputError, match="n .1/min.*frequency"):
+    with pytest.raises(InputError, match=r"n .1/min.*frequency"):
         Log.load(path, columns=names | {"speed": "n [Hz]"})
     with pytest.raises(InputError, match="did you mean torque"):
         Log.load(path, columns={"torqe": "M"})
@@ -146,8 +146,8 @@ FILES = {  # heading, row, decimal mark, encoding, what the columns are called
         "utf-16", {"time": "Time [ms]", "torque": "Torque ref. [Nm]", "angle": "Position [rev]"},
     ),
     "commas": (
-        "Time [ms],M (%),w,fActPosition (\N{DEGREE SIGN})", "{t:.1f},{percent:.8f},0,{deg:.8f}", ".", "cp1252",
-        {"torque": "M", "angle": "fActPosition"},
+        "Time [ms],M (%),w,fActPosition (\N{DEGREE SIGN})", "{t:.1f},{percent:.8f},0,{deg:.8f}", ".",
+        "cp1252", {"torque": "M", "angle": "fActPosition"},
     ),
 }  # fmt: skip
 
@@ -163,7 +163,7 @@ def test_a_file_is_read_by_the_names_of_its_columns(log: Log, kind: str, tmp_pat
     ]
     path = tmp_path / "trace.csv"
     path.write_text("\n".join([heading, *rows]), encoding=encoding)
-    with pytest.raises(InputError, match="there are the columns .*; write --columns"):
+    with pytest.raises(InputError, match=r"there are the columns .*; write --columns"):
         Log.load(path)
     read = Log.load(path, columns=columns, rated_torque="12 N*m")
     assert read.time == pytest.approx(2.0 * log.time, abs=1e-9)

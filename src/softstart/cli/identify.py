@@ -114,8 +114,8 @@ def _folders(names: Sequence[str], _: str) -> Sequence[str]:
 
 @click.command()
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, callback=reading(_folders))
-@click.option("--dates", metavar="DATE,...", callback=reading(options.read_list),
-    help="Dates of the logs, for example 2025-05-31,2026-05. Default: from the folder names.")  # fmt: skip
+@click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
+    help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
 @click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),
     help="Gap of a worn drive, for example '0.2 rad': when it is reached.")  # fmt: skip
 @answers("Write the gaps (CSV), the figure and report.md into this folder.")

@@ -36,19 +36,6 @@ FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an id
 class Estimate:
     """One parameter: its value, its interval of 95 %, and whether the logs tell it.
 
-    Attributes
-    ----------
-    name : str
-        The parameter of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank).
-    value, lower, upper : float
-        In SI. What is unknown has the value at which the search ended. Ends are NaN where no interval is
-        stated, see `Identification.stated`.
-    known : bool
-        False if the interval is wider than a factor of 3; of a friction, than a tenth of the torque that
-        accelerates.
-    reason : str
-        Why it is unknown; else empty.
-
     Examples
     --------
     >>> Estimate("gap", 0.08, 0.079, 0.081, known=True).half_width
@@ -59,12 +46,12 @@ class Estimate:
     docs/identification.md.
     """
 
-    name: str
-    value: float
-    lower: float
+    name: str  #: of the drive, or a position from -1 (opposite flank) to 1 (driving flank)
+    value: float  #: in SI; of what is unknown the one at which the search ended
+    lower: float  #: NaN where no interval is stated
     upper: float
-    known: bool
-    reason: str = ""
+    known: bool  #: whether the interval is narrower than a factor of 3, see `unknowns`
+    reason: str = ""  #: why it is unknown
 
     @property
     def half_width(self) -> float:
@@ -111,27 +98,6 @@ class Estimate:
 class Identification:
     """A drive from its logs.
 
-    Attributes
-    ----------
-    drive : Drive
-        The drive with the values found; it stands wherever a drive does.
-    guess : Drive
-        The drive that the search began from.
-    logs : tuple of Log
-        The logs, in the order given; none if the identification was loaded.
-    estimates : tuple of Estimate
-        One for each parameter that was free, then the position of each log.
-    correlations : array of shape (k, k)
-        Of the logarithms of the estimates (of positions and frictions themselves).
-    ripple : float
-        Standard deviation of the torque error in each sample, N m.
-    searches, agreed : int
-        How many searches were made, and how many of them ended at the best minimum.
-    seconds : float
-        What it took.
-    notes : tuple of str
-        What the logs show that the model has not, what was done to the logs, what cannot be known.
-
     Examples
     --------
     >>> from softstart import identify
@@ -148,17 +114,18 @@ class Identification:
     docs/identification.md.
     """
 
-    drive: Drive
-    guess: Drive
-    logs: tuple[Log, ...]
-    estimates: tuple[Estimate, ...]
-    correlations: Matrix
-    ripple: float
+    drive: Drive  #: with the values found
+    guess: Drive  #: from which the search began
+    logs: tuple[Log, ...]  #: none if the identification was loaded
+    estimates: tuple[Estimate, ...]  #: of the parameters that were free, then of the position of each log
+    correlations: Matrix  #: of the logarithms of the estimates (of positions and frictions themselves)
+    ripple: float  #: standard deviation of the torque error in each sample, N m
     searches: int
-    agreed: int
-    seconds: float
-    notes: tuple[str, ...]
-    residuals: tuple[Vector, ...]  # of each log, in its own unit
+    agreed: int  #: of the searches, which ended at the best minimum
+    notes: tuple[
+        str, ...
+    ]  # what was done to the logs, what they show that the model has not, what is unknown
+    residuals: tuple[Vector, ...]  #: of each log, in its own unit
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter."""
@@ -175,15 +142,7 @@ class Identification:
         return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
 
     def draws(self, count: int = 200, seed: int = 0) -> Records:
-        """Drives that the logs leave possible, drawn from the joint distribution of the estimates.
-
-        >>> from softstart import identify
-        >>> from softstart.identification.planning import made_up_log
-        >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-        >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
-        >>> found.draws(100).shape
-        (100,)
-        """
+        """Drives that the logs leave possible, drawn from the joint distribution of the estimates."""
         if not self.stated:
             raise InputError(
                 f"{self.drive.name}: its identification states no intervals ({self.notes[0]}) Give "
@@ -274,7 +233,7 @@ class Identification:
             found = cls(
                 drive=Drive.load(Path(folder) / DRIVE_FILE), guess=guess, logs=(), estimates=estimates,
                 correlations=correlations, ripple=float(kept["ripple"]), searches=int(kept["searches"]),
-                agreed=int(kept["agreed"]), seconds=float(kept["seconds"]),
+                agreed=int(kept["agreed"]),
                 notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
@@ -305,7 +264,6 @@ class Identification:
             "ripple": self.ripple,
             "searches": self.searches,
             "agreed": self.agreed,
-            "seconds": self.seconds,
             "logs": [
                 {"name": one.name, "samples": one.time.size, "kind": one.kind, "notes": list(one.notes)}
                 for one in self.logs
@@ -334,18 +292,10 @@ def _or_nan(value: Any) -> Any:
 
 
 def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
-    """That estimates and correlations of a file can be those of an identification."""
+    """That estimates and correlations of a file fit together."""
     for one in estimates:
-        if math.isnan(one.lower) and math.isnan(one.upper) and math.isfinite(one.value) and not one.known:
-            continue  # no interval is stated
-        signed = one.name in PARAMETERS and one.name not in FRICTIONS
-        if not -math.inf < one.lower <= one.value <= one.upper < math.inf or (
-            signed and one.lower * one.upper <= 0.0
-        ):
+        if not (-math.inf < one.lower <= one.value <= one.upper < math.inf or math.isnan(one.lower)):
             raise ValueError(f"{one.name}: {one.value} in {one.lower} to {one.upper}")
     size = len(estimates)
-    symmetric = correlations.shape == (size, size) and np.allclose(correlations, correlations.T, atol=1e-9)
-    if not symmetric or not np.allclose(np.diag(correlations), 1.0, atol=1e-6):
-        raise ValueError(f"the correlations of {size} estimates are a symmetric table, 1 on its diagonal")
-    if np.any(np.abs(correlations) > 1.0 + 1e-6):
-        raise ValueError("correlations lie between -1 and 1")
+    if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):
+        raise ValueError(f"the correlations of {size} estimates are a symmetric table")

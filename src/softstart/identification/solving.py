@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Final
@@ -114,7 +113,6 @@ def identify(
     D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
     Analysis, 1988; docs/identification.md.
     """
-    began = time.perf_counter()
     drive = load_machine(drive) if isinstance(drive, str) else drive
     machine, drive = drive, reduced_drive(drive)
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
@@ -162,7 +160,6 @@ def identify(
         ripple=best.sizes.ripple,
         searches=len(minima),
         agreed=agreeing(minima),
-        seconds=time.perf_counter() - began,
         notes=tuple(notes),
         residuals=tuple(fitter.left(best)),
     )
@@ -355,9 +352,7 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
     for model, spot in zip(fitter.models, best.spots, strict=True):
         left = spot.innovations(sizes)
         if (chance := _whiteness(left)) < INDEPENDENT:
-            shown.append(
-                f"{model.log.name}: errors not independent from sample to sample (chance {chance:.1g})"
-            )
+            shown.append(f"{model.log.name}: errors not independent of each other (chance {chance:.1g})")
         if (far := int(np.sum(np.abs(left) > FAR))) > 2 + 0.005 * left.size:
             shown.append(f"{model.log.name}: {far} samples more than {FAR:g} standard deviations off")
     notes = _effects(fitter, best)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -24,31 +22,17 @@ from softstart.start.comparison import INTERVAL
 YEAR: Final = 365.25  # days
 NOT_BY_CHANCE: Final = 3.0  # standard deviations by which a parameter has changed
 CROOKED: Final = 0.01  # chance below which the gap does not grow along a line
-DATE = re.compile(r"(?<!\d)(\d{4})(?:-(\d{2})(?:-(\d{2}))?)?(?!\d)")
 
 
 @dataclass(frozen=True)
 class Line:
-    """The growth of the gap by weighted least squares: `start + slope t`, t in years.
+    """The growth of the gap by weighted least squares: `start + slope t`, t in years."""
 
-    Attributes
-    ----------
-    start, slope : float
-        Gap at t = 0, rad, and its growth, rad a year.
-    covariance : array of shape (2, 2)
-        Of both, from the intervals of the gaps, wider by as much as the gaps scatter more than these say.
-    chance : float
-        That gaps with such intervals scatter as much about a line; 1 for two gaps.
-    quantile : float
-        Of 95 %: normal, or Student's with n - 2 degrees of freedom where the n gaps scatter more than their
-        intervals say, so that the variance is theirs.
-    """
-
-    start: float
-    slope: float
-    covariance: Matrix
-    chance: float
-    quantile: float
+    start: float  #: gap at t = 0, rad
+    slope: float  #: rad a year
+    covariance: Matrix  #: of both, wider where the gaps scatter more than their intervals say
+    chance: float  #: that gaps with such intervals scatter as much about a line; 1 for two gaps
+    quantile: float  #: of 95 %: normal, or Student's where the scatter of the gaps is the variance
 
     @staticmethod
     def through(years: Vector, gaps: Vector, deviations: Vector) -> Line:
@@ -110,21 +94,6 @@ class Line:
 class Wear:
     """How the gap of a drive grows, and when it reaches its limit.
 
-    Attributes
-    ----------
-    found : tuple of Identification
-        The identifications, the oldest first.
-    names : tuple of str
-        What they are called.
-    dates : tuple of datetime.date
-        When their logs were taken.
-    line : Line
-        The growth of the gap.
-    limit : float or None
-        The gap at which the drive is worn, rad.
-    notes : tuple of str
-        What else has changed, and what the line cannot tell.
-
     Examples
     --------
     >>> from softstart import Drive, identify
@@ -144,12 +113,12 @@ class Wear:
     docs/identification.md.
     """
 
-    found: tuple[Identification, ...]
+    found: tuple[Identification, ...]  #: the oldest first
     names: tuple[str, ...]
-    dates: tuple[date, ...]
+    dates: tuple[date, ...]  #: of their logs
     line: Line
-    limit: float | None
-    notes: tuple[str, ...]
+    limit: float | None  #: the gap of a worn drive, rad
+    notes: tuple[str, ...]  #: what else has changed, and what the line cannot tell
 
     @property
     def gaps(self) -> tuple[Estimate, ...]:
@@ -201,7 +170,7 @@ class Wear:
 
 def follow_wear(
     found: Sequence[Identification | str | os.PathLike[str]],
-    dates: Sequence[str | date] | None = None,
+    dates: Sequence[str | date],
     limit: float | str | None = None,
 ) -> Wear:
     """Follow the gap of a drive through its identifications, and say when it is worn.
@@ -210,9 +179,8 @@ def follow_wear(
     ----------
     found : sequence of Identification or path
         Two or more identifications of one drive, or the folders that `softstart identify --out` wrote.
-    dates : sequence of str or date, optional
-        When their logs were taken, as "2026-05-31", "2026-05" (its middle) or "2026". By default what stands
-        in the names of the folders.
+    dates : sequence of str or date
+        When their logs were taken, as "2026-05-31".
     limit : float or str, optional
         Gap at which the drive is worn, rad or with a unit.
 
@@ -239,22 +207,20 @@ def follow_wear(
     given = [found] if isinstance(found, Identification | str | os.PathLike) else list(found)
     if len(given) < 2:
         raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
-    in_names = dates is None and not any(isinstance(one, Identification) for one in given)
     names = [f"log {i}" if isinstance(one, Identification) else str(one) for i, one in enumerate(given, 1)]
-    told = [Path(name).name for name in names] if in_names else list(dates or ())
-    if len(told) != len(given):
+    if len(dates) != len(given):
         raise InputError(
-            f"dates: there are {len(told)} for {len(given)} identifications; give the date of each, as "
+            f"dates: there are {len(dates)} for {len(given)} identifications; give the date of each, as "
             "2026-05-31."
         )
     rows = []
-    for when, name, one in zip(told, names, given, strict=True):
+    for when, name, one in zip(dates, names, given, strict=True):
         read = one if isinstance(one, Identification) else Identification.load(one)
         gap = next((estimate for estimate in read.estimates if estimate.name == "gap"), None)
         if gap is None or not gap.known:
             reason = gap.reason if gap else "it was not free"
             raise InputError(f"wear: {name} does not know the gap; {reason}.")
-        rows.append((_date_of(when, in_names), name, read))
+        rows.append((_date_of(when), name, read))
     rows.sort(key=lambda row: row[0])
     days, names, each = map(list, zip(*rows, strict=True))
     if days[0] == days[-1]:
@@ -271,24 +237,11 @@ def follow_wear(
     return Wear(tuple(each), tuple(names), tuple(days), line, worn, tuple(_notes(each, line)))
 
 
-def _date_of(given: object, from_name: bool) -> date:
-    """A date; a month or a year alone stands for its middle.
-
-    >>> _date_of("2026-05", False), _date_of("found-2026-05-31", True)
-    (datetime.date(2026, 5, 15), datetime.date(2026, 5, 31))
-    """
-    if isinstance(given, date):
-        return given
-    text = str(given)
-    found = DATE.search(text) if from_name else DATE.fullmatch(text.strip())
+def _date_of(given: str | date) -> date:
     try:
-        if found is not None:
-            year, month, day = (int(part) if part else 0 for part in found.groups())
-            return date(year, month or 7, day or (15 if month else 1))
+        return given if isinstance(given, date) else date.fromisoformat(given)
     except ValueError:
-        pass
-    what = "the folder {} has no date in its name; give --dates" if from_name else "{} is no date; write one"
-    raise InputError(f"dates: {what.format(show(text))}, as 2026-05-31, 2026-05 or 2026.")
+        raise InputError(f"dates: {show(given)} is no date; write one as 2026-05-31.") from None
 
 
 def _date_after(first: date, years: float) -> date | None:

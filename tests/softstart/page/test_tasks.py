@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.softstart.test_identification_chains import stiff_behind_the_gap
+from tests.softstart.test_identification_chains import chain_log, stiff_behind_the_gap
 
 from softstart import (
     Chain,
