@@ -54,6 +54,20 @@ NEAR: Final = 0.01  # relative distance of a design to its limits: for positions
 class Experiment:
     """A torque demand and what it would tell.
 
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    profile : TorqueProfile
+        The torque demand; `end`, s, is when the log ends.
+    widths : dict
+        Half an interval of 95 % over the value for each parameter; infinite where it would be unknown.
+    peak, travel : float
+        Peak of the shaft torque, N m, and travel of the load, rad at the motor shaft, on the exact plant,
+        each from the worst position in the gap.
+    score : float
+        Root mean square of the half intervals of the wanted parameters; less is better.
+
     Examples
     --------
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
@@ -67,17 +81,26 @@ class Experiment:
     """
 
     name: str
-    profile: TorqueProfile  #: the torque demand
-    end: float  #: of the log, s
-    widths: dict[str, float]  #: half an interval of 95 % over the value; infinite where it would be unknown
-    peak: float  #: of the shaft torque on the exact plant, N m, from the worst position in the gap
-    travel: float  #: of the load from where it stood at most, rad at the motor shaft
-    score: float = math.nan  #: root mean square of the widths that are wanted; less is better
+    profile: TorqueProfile
+    end: float
+    widths: dict[str, float]
+    peak: float
+    travel: float
+    score: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Experiments for a drive: the standard ones, then the planned one.
+
+    Attributes
+    ----------
+    drive : Drive
+        The drive as it is thought to be.
+    experiments : tuple of Experiment
+        The standard ones, then the planned one.
+    log_period, ripple : float
+        Sample period of the log, s; torque error in each sample, N m.
 
     Examples
     --------
@@ -93,10 +116,10 @@ class Plan:
     docs/identification.md.
     """
 
-    drive: Drive  #: as it is thought to be
-    experiments: tuple[Experiment, ...]  #: the standard ones, then the planned one
-    log_period: float  #: s
-    ripple: float  #: torque error in each sample, N m
+    drive: Drive
+    experiments: tuple[Experiment, ...]
+    log_period: float
+    ripple: float
 
     def __getitem__(self, name: str) -> Experiment:
         """The experiment of this name."""

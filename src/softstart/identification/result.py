@@ -36,6 +36,16 @@ FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an id
 class Estimate:
     """One parameter: its value, its interval of 95 %, and whether the logs tell it.
 
+    Attributes
+    ----------
+    name : str
+        The parameter of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank).
+    value, lower, upper : float
+        In SI. What is unknown has the value at which the search ended. Ends are NaN where none is stated.
+    known, reason : bool, str
+        Not known is what has an interval wider than a factor of 3 (of a friction, than a tenth of the torque
+        that accelerates), and for what reason.
+
     Examples
     --------
     >>> Estimate("gap", 0.08, 0.079, 0.081, known=True).half_width
@@ -46,12 +56,12 @@ class Estimate:
     docs/identification.md.
     """
 
-    name: str  #: of the drive, or a position from -1 (opposite flank) to 1 (driving flank)
-    value: float  #: in SI; of what is unknown the one at which the search ended
-    lower: float  #: NaN where no interval is stated
+    name: str
+    value: float
+    lower: float
     upper: float
-    known: bool  #: whether the interval is narrower than a factor of 3, see `unknowns`
-    reason: str = ""  #: why it is unknown
+    known: bool
+    reason: str = ""
 
     @property
     def half_width(self) -> float:
@@ -98,6 +108,23 @@ class Estimate:
 class Identification:
     """A drive from its logs.
 
+    Attributes
+    ----------
+    drive, guess : Drive
+        The drive with the values found, and that from which the search began.
+    logs : tuple of Log
+        The logs, in the order given; none if the identification was loaded. `residuals` are in their units.
+    estimates : tuple of Estimate
+        One for each parameter that was free, then the position of each log.
+    correlations : array of shape (k, k)
+        Of the logarithms of the estimates (of positions and frictions themselves).
+    ripple : float
+        Standard deviation of the torque error in each sample, N m.
+    searches, agreed : int
+        How many searches were made, and how many of them ended at the best minimum.
+    notes : tuple of str
+        What was done to the logs, what they show that the model has not, what cannot be known.
+
     Examples
     --------
     >>> from softstart import identify
@@ -114,18 +141,18 @@ class Identification:
     docs/identification.md.
     """
 
-    drive: Drive  #: with the values found
-    guess: Drive  #: from which the search began
-    logs: tuple[Log, ...]  #: none if the identification was loaded
-    estimates: tuple[Estimate, ...]  #: of the parameters that were free, then of the position of each log
-    correlations: Matrix  #: of the logarithms of the estimates (of positions and frictions themselves)
-    ripple: float  #: standard deviation of the torque error in each sample, N m
+    drive: Drive
+    guess: Drive
+    logs: tuple[Log, ...]
+    estimates: tuple[Estimate, ...]
+    correlations: Matrix
+    ripple: float
     searches: int
-    agreed: int  #: of the searches, which ended at the best minimum
+    agreed: int
     notes: tuple[
         str, ...
     ]  # what was done to the logs, what they show that the model has not, what is unknown
-    residuals: tuple[Vector, ...]  #: of each log, in its own unit
+    residuals: tuple[Vector, ...]
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter."""

@@ -399,7 +399,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         shapes.append(math.sqrt(model.block) * spot.response.sum(axis=1))
         for shape, column in zip(shapes, columns.values(), strict=True):
             column.append(spot.rotation @ shape / np.sqrt(spot.variance(best.sizes)))
-    found, amount, error = "", 0.0, 1.0 / SURE
+    sure = [(SURE, "", 0.0, 0.0)]
     for name, parts in columns.items():
         shape = np.concatenate(parts)
         alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
@@ -409,21 +409,20 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         size, deviation = -float(alone @ residual) / strength, 1.0 / math.sqrt(strength)
         drives = size < -had.get(name, math.inf)
         far = name == "offset" and abs(size) > fitter.largest_torque  # of a small effect alone J tells
-        if not (drives or far) and abs(size) / deviation > max(SURE, abs(amount) / error):
-            found, amount, error = name, size, deviation
-    if found == "offset":
-        return [
-            f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
-            "the model has not: gap and load torque may be far off."
-        ]
-    if found:
+        if not drives and not far:
+            sure.append((abs(size) / deviation, name, size, deviation))
+    _, found, amount, error = max(sure)
+    if not found:
+        return []
+    what, unit, remedy = "an offset of the torque signal", "N m", ""
+    if found != "offset":
         one = PARAMETERS[found]
-        return [
-            f"The logs show {one.meaning} of {had[found] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
-            f"the drive has {had[found]:.3g}: gap and load torque may be far off. "
-            f"Remedy: find it too, --free +{one.path}."
-        ]
-    return []
+        what, unit, remedy = one.meaning, one.unit, f" Remedy: find it too, --free +{one.path}."
+    given = had.get(found, 0.0)
+    return [
+        f"The logs show {what} of {given + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
+        f"{given:.3g}: gap and load torque may be far off.{remedy}"
+    ]
 
 
 def _slow_torque(response: Matrix, jacobian: Matrix, residual: Vector) -> float:

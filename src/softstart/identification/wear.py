@@ -28,11 +28,11 @@ CROOKED: Final = 0.01  # chance below which the gap does not grow along a line
 class Line:
     """The growth of the gap by weighted least squares: `start + slope t`, t in years."""
 
-    start: float  #: gap at t = 0, rad
-    slope: float  #: rad a year
-    covariance: Matrix  #: of both, wider where the gaps scatter more than their intervals say
-    chance: float  #: that gaps with such intervals scatter as much about a line; 1 for two gaps
-    quantile: float  #: of 95 %: normal, or Student's where the scatter of the gaps is the variance
+    start: float  # gap at t = 0, rad
+    slope: float  # rad a year
+    covariance: Matrix  # of both, wider where the gaps scatter more than their intervals say
+    chance: float  # that gaps with such intervals scatter as much about a line; 1 for two gaps
+    quantile: float  # of 95 %: normal, or Student's where the scatter of the gaps is the variance
 
     @staticmethod
     def through(years: Vector, gaps: Vector, deviations: Vector) -> Line:
@@ -94,6 +94,17 @@ class Line:
 class Wear:
     """How the gap of a drive grows, and when it reaches its limit.
 
+    Attributes
+    ----------
+    found, names, dates : tuple
+        The identifications, the oldest first; what they are called, and when their logs were taken.
+    line : Line
+        The growth of the gap.
+    limit : float or None
+        The gap at which the drive is worn, rad.
+    notes : tuple of str
+        What else has changed, and what the line cannot tell.
+
     Examples
     --------
     >>> from softstart import Drive, identify
@@ -113,12 +124,12 @@ class Wear:
     docs/identification.md.
     """
 
-    found: tuple[Identification, ...]  #: the oldest first
+    found: tuple[Identification, ...]
     names: tuple[str, ...]
-    dates: tuple[date, ...]  #: of their logs
+    dates: tuple[date, ...]
     line: Line
-    limit: float | None  #: the gap of a worn drive, rad
-    notes: tuple[str, ...]  #: what else has changed, and what the line cannot tell
+    limit: float | None
+    notes: tuple[str, ...]
 
     @property
     def gaps(self) -> tuple[Estimate, ...]:
