@@ -331,6 +331,11 @@ def _other_scale(guess: Drive, found: Drive) -> list[str]:
 def misfits(fitter: Fitter, best: Point) -> list[str]:
     """What the logs show that the model has not."""
     sizes, shown = best.sizes, list[str]()
+    largest = fitter.largest_torque
+    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
+    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
+        share = 100.0 * sizes.ripple / largest
+        shown.append(f"a torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest")
     slow = min(
         _slow_torque(
             one.rotation @ one.response / root[:, None], one.jacobian / root[:, None], one.residual / root
@@ -344,11 +349,6 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
     samples = sum(one.residual.size for one in best.spots)
     if counted and sizes.noise**2 - 1.0 > TOO_NOISY * math.sqrt(2.0 / samples):
         shown.append(f"an angle {sizes.noise:.3g} times as far off as the encoder rounds")
-    largest = fitter.largest_torque
-    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
-    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
-        share = 100.0 * sizes.ripple / largest
-        shown.append(f"a torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest")
     for model, spot in zip(fitter.models, best.spots, strict=True):
         left = spot.innovations(sizes)
         if (chance := _whiteness(left)) < INDEPENDENT:
