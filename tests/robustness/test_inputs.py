@@ -121,9 +121,9 @@ OPTIONS: dict[str, list[str]] = {
     "init": ["--set", "--json"],
     "identify": [
         "--columns", "--torque-is", "--torque-constant", "--rated-torque", "--free", "--restarts",
-        "--time-limit", "--controllers", "--set", "--json",
+        "--controllers", "--set", "--json",
     ],
-    "wear": ["--dates", "--worn-gap", "--controllers", "--json"],
+    "wear": ["--dates", "--worn-gap", "--json"],
     "plan": [
         "--log-period", "--ripple", "--free", "--max-torque", "--max-travel", "--wanted", "--set", "--json",
     ],

@@ -18,7 +18,6 @@ from softstart.controller import make_controller
 from softstart.identification.fitting import Fitter, Point, Sizes
 from softstart.identification.model import FILTER, LogModel, edges, filtered
 from softstart.identification.planning import Bench, Experiment, Plan, made_up_log, steps_of
-from softstart.identification.solving import _advice
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
@@ -34,7 +33,7 @@ TRUTH = Drive.load("crane-4amtkf").replace(
 GUESS = TRUTH.replace(
     gap=0.2, stiffness=200, load_inertia=0.4, motor_inertia=0.02, load_torque=12, damping=0.9
 )
-REVERSE, LONGER = "two levels, then reverse", "reversed three times"
+REVERSE = "two levels, then reverse"
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque", "torque_lag")
 
 
@@ -246,16 +245,8 @@ def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> 
     assert not alone["gap"].known
     assert alone["gap"].lower < 0.08 < alone["gap"].upper
     assert "position" in alone["gap"].reason
-    assert any(note.startswith("Unknown: gap") and LONGER in note for note in alone.notes)
+    assert any(note.startswith("Unknown: gap") and "softstart plan" in note for note in alone.notes)
     assert alone["motor_inertia"].known
-
-
-def test_a_log_slower_than_any_standard_experiment_is_told_to_be_quicker() -> None:
-    start = made_up_log(TRUTH, "start", log_period=1e-2, ripple=1.0, seed=4)
-    found = identify(start, TRUTH, searches=1)
-    slow = Log(1.5 * start.time, start.torque, angle=start.values, torque_is="demand")
-    notes = _advice(found.drive, found.estimates, [slow])
-    assert any("take samples more often than each 15 ms" in note for note in notes)
 
 
 RUBBED = TRUTH.replace(motor_friction=1.0)
@@ -371,7 +362,7 @@ def test_where_another_machine_made_the_log_no_interval_is_stated(
         angle = np.floor(states["phi"][:, 0] / coarse.count + 0.3) * coarse.count
     found = identify(Log(coarse.time, torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
     assert not found.stated
-    assert any("something else moves this drive" in note for note in found.notes)
+    assert any("Something else moves this drive" in note for note in found.notes)
     assert any("no interval is stated" in note for note in found.notes)
     assert not any(one.known for one in found.estimates)
     found.save(tmp_path)
@@ -392,14 +383,6 @@ def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None
     assert "at the limit of the search" in [cell for row in estimates_table(found).rows for cell in row]
 
 
-def test_a_fit_whose_time_is_up_says_what_it_lacks(coarse: Log) -> None:
-    found = identify(coarse, TRUTH, searches=3, time_limit=0.0)
-    assert found.searches == 1
-    assert not found.stated
-    assert found["gap"].value == pytest.approx(0.08, rel=0.1)
-    assert any(note.startswith("The time limit of 0 s came before the intervals") for note in found.notes)
-
-
 @pytest.mark.parametrize("wrong", [pytest.param("cut", marks=pytest.mark.slow), "rpm"])
 def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -> None:
     kept = np.r_[0:150, 200 : log.time.size] if wrong == "cut" else np.arange(log.time.size)
@@ -410,7 +393,7 @@ def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -
         turned = played(log, log.torque, {"position": -0.6})["w"][:, 0]
         bad = Log(time, torque, speed=turned * 30.0 / math.pi, torque_is="demand")
     notes = identify(bad, TRUTH, searches=1).notes
-    told = "something else moves this drive" if wrong == "cut" else "look at the units of the log"
+    told = "Something else moves this drive" if wrong == "cut" else "look at the units of the log"
     assert any(told in note for note in notes)
 
 
@@ -447,20 +430,14 @@ def test_a_file_with_units_commas_and_other_names(log: Log, tmp_path: Path) -> N
     assert read.count == pytest.approx(2.0 * math.pi / 4096.0, rel=1e-6)
 
 
-def test_missing_samples_wraps_and_spikes_are_mended_and_told(log: Log) -> None:
-    values, torque = np.mod(log.values + 1.0, 2.0 * math.pi), log.torque.copy()
-    values[50], torque[60] = math.nan, math.nan
-    values[90] += 0.4
-    read = Log(log.time, torque, angle=values, torque_is="demand")
-    told = " ".join(read.notes)
-    assert "wraps" in told
-    assert "missing" in told
-    assert "far off" in told
-    assert math.isnan(read.values[50])
-    assert math.isnan(read.values[90])
+def test_an_angle_may_wrap_and_lack_samples(log: Log) -> None:
+    values = np.mod(log.values + 1.0, 2.0 * math.pi)
+    values[50] = math.nan
+    read = Log(log.time, log.torque, angle=values, torque_is="demand")
+    assert "wraps" in " ".join(read.notes)
     kept = np.isfinite(read.values)
+    assert np.flatnonzero(~kept).tolist() == [50]
     assert read.values[kept] - read.values[0] == pytest.approx(log.values[kept] - log.values[0], abs=1e-9)
-    assert read.torque[60] == pytest.approx(0.5 * (torque[59] + torque[61]))
 
 
 @pytest.mark.parametrize(
@@ -533,16 +510,14 @@ def loads(one: Experiment, position: float) -> Run:
 @pytest.mark.slow
 def test_the_planned_torque_tells_no_less_and_keeps_its_limits(planned: Plan) -> None:
     one = planned["planned"]
-    standard = [one for one in planned.experiments if one.found_by == "standard"]
-    allowed = [one for one in standard if one.peak <= 70.0]
-    assert "COBYLA" in one.found_by
+    allowed = [other for other in planned.experiments[:-1] if other.peak <= 70.0]
     assert one.score < min(other.score for other in allowed)
     peaks = [loads(one, 0.04 * place).peak_torque for place in np.linspace(-1.0, 1.0, 257)]
     assert 0.999 * one.peak <= max(peaks) <= one.peak <= 70.0
     others = np.random.default_rng(3).uniform(-0.04, 0.04, 100)
     assert max(loads(one, position).peak_torque for position in others) <= one.peak
     assert np.max(np.abs(one.profile.torque)) <= TRUTH.starting_torque
-    assert one.end == planned[one.found_by.split('"')[1]].end
+    assert any(one.end == pytest.approx(other.end, rel=1e-12) for other in planned.experiments[:-1])
 
 
 def test_peak_and_travel_are_those_of_the_worst_position() -> None:
@@ -608,7 +583,7 @@ def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_on
         ({"wanted": ["gpa"]}, "did you mean gap"),
         ({"free": ["gap", "motor.friction"]}, "it is 0 in the drive; give a guess of it"),
         ({"max_torque": "0.01 N*m"}, "raise the limit"),
-        ({"max_travel": 0.0}, "a limit is above 0"),
+        ({"max_travel": 0.0}, "give a value above 0"),
     ],
 )
 def test_plans_that_cannot_be_are_refused(given: dict[str, Any], sentence: str) -> None:

@@ -24,10 +24,6 @@ STRATEGIES = ["direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 free_option = click.option("--free", metavar="NAME,...", callback=reading(options.read_list),
     help="Parameters to identify, for example gap,stiffness,position; +motor.friction adds one to the "
     "default set.")  # fmt: skip
-strategies_option = click.option(
-    "--controllers", metavar="NAME,...", callback=reading(options.read_names), default=",".join(STRATEGIES),
-    help=f"Strategies to simulate. Default: {','.join(STRATEGIES)}.",
-)  # fmt: skip
 
 
 @click.command()
@@ -49,7 +45,6 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
     DRIVE is your estimate, as a TOML file or the name of a shipped drive (see: softstart drives). The
     expected accuracy of standard experiments is computed, and of one that is designed for this drive.
     """
-    asked["wanted"] = asked["wanted"] or ()
     with working("planning experiments ...") as progress:
         made = softstart.plan_experiments(drive, optimise=not standard, progress=progress, **asked)
     from softstart.views.identification import plan_sheet
@@ -83,11 +78,10 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
 @free_option
 @click.option("--restarts", "searches", metavar="N", callback=options.count(), default="12",
     help="Largest number of independent searches. Default: 12.")  # fmt: skip
-@click.option("--time-limit", metavar="TIME", default="120 s",
-    callback=options.quantity("s", least=0.0),
-    help="Time after which the best fit so far is the answer, without intervals. Default: 120 s."
+@click.option(
+    "--controllers", metavar="NAME,...", callback=reading(options.read_names), default=",".join(STRATEGIES),
+    help=f"Strategies to simulate. Default: {','.join(STRATEGIES)}.",
 )  # fmt: skip
-@strategies_option
 @answers("Write the identified drive (drive.toml), residuals, figure and report.md into this folder.")
 def identify(
     *, logs: tuple[str, ...], drive: Machine, controllers: list[str], **asked: Any
@@ -95,8 +89,8 @@ def identify(
     """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
     LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with units in the first
-    line, "time [ms];torque [N*m];speed [rpm]", or a measurement file (MDF). It begins at standstill. Several
-    logs of the same drive are fitted together.
+    line, "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs of the same drive are
+    fitted together.
     """
     asked["columns"] = asked["columns"] or {}
     with working("fitting the drive to the logs ...") as progress:
@@ -120,19 +114,17 @@ def _folders(names: Sequence[str], _: str) -> Sequence[str]:
 
 @click.command()
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, callback=reading(_folders))
-@click.option("--dates", metavar="DATE,...", callback=reading(options.read_list),
-    help="Dates of the logs, for example 2025-05-31,2026-05. Default: from the folder names.")  # fmt: skip
+@click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
+    help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
 @click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),
-    help="Gap of a worn drive, for example '0.2 rad', at which the strategies are evaluated.")  # fmt: skip
-@strategies_option
+    help="Gap of a worn drive, for example '0.2 rad': when it is reached.")  # fmt: skip
 @answers("Write the gaps (CSV), the figure and report.md into this folder.")
 def wear(*, folders: tuple[str, ...], **asked: Any) -> Answer:
     """Compute the growth of the gap from several identifications, and when it is worn.
 
     Each FOLDER is what softstart identify --out has written of the same drive, in another year.
     """
-    with working("starting the worn drive ..."):
-        found = softstart.follow_wear(folders, **asked)
+    found = softstart.follow_wear(folders, **asked)
     from softstart.views.identification import wear_sheet
 
     return found.summary, wear_sheet(found)

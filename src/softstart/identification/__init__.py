@@ -10,7 +10,7 @@ unknown, with the reason; what the model has not is a note, and then no interval
 Which experiment should be run? `plan_experiments` computes expected intervals of standard experiments, and
 designs a torque (`planning.py`).
 
-Read in this order: logs.py and traces.py (a log read and checked), model.py (what the exact plant would have
-logged), unknowns.py (which numbers a fit finds), fitting.py, solving.py, result.py (the answer, its file,
-draws, and K_dyn with its interval); wear.py (the gap over the years) and chains.py (more than two masses).
+Read in this order: logs.py (a log read and checked), model.py (what the exact plant would have logged),
+unknowns.py (which numbers a fit finds), fitting.py, solving.py, result.py (the answer, its file, draws, and
+K_dyn with its interval); wear.py (the gap over the years).
 """

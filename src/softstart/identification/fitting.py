@@ -20,7 +20,6 @@ is larger by 1.96^2 (profile likelihood): its error of the torque, which is not 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
@@ -242,7 +241,7 @@ class Fitter:
 
     # ---- the search --------------------------------------------------------------------------------------
 
-    def search(self, most: int, seed: int, deadline: float = math.inf) -> list[tuple[Vector, float]]:
+    def search(self, most: int, seed: int) -> list[tuple[Vector, float]]:
         """Minima of the plain squares, best first: from the guess, then from points all over the range.
 
         Each search follows the logs from their beginning, over longer and longer parts: what comes early is
@@ -268,7 +267,7 @@ class Fitter:
             except (InputError, SimulationError):
                 continue
             found.sort(key=lambda one: one[1])
-            if agreeing(found) >= AGREED or time.perf_counter() > deadline:
+            if agreeing(found) >= AGREED:
                 break
         if not found:
             raise InputError("The logs cannot be computed with any of the values tried; check their units.")
@@ -358,16 +357,13 @@ class Fitter:
         small = point.sizes.ripple <= MOST_RIPPLE * self.largest_torque
         return point._replace(drift=self.drift(point)) if small else point
 
-    def step(
-        self, point: Point, held: int | None = None, beyond: tuple[Vector, Vector] | None = None
-    ) -> tuple[Vector, float]:
-        """The step to the least L, were it quadratic, and what is gained by it; so far beyond the bounds."""
-        less, more = beyond or (0.0, 0.0)
+    def step(self, point: Point, held: int | None = None) -> tuple[Vector, float]:
+        """The step to the least L, were it quadratic, and what is gained by it."""
         residual, jacobian = point.white
         damped = np.vstack([jacobian, np.sqrt(self.weights)])
         force = jacobian @ np.linalg.solve(damped.T @ damped, point.drift)
         free = np.array([i for i in range(point.x.size) if i != held])
-        room = np.array([self.lower - point.x - less - 1e-12, self.upper - point.x + more + 1e-12])[:, free]
+        room = np.array([self.lower - point.x - 1e-12, self.upper - point.x + 1e-12])[:, free]
         wanted = np.concatenate([-residual - force, np.zeros(point.x.size)])
         step = np.zeros(point.x.size)
         step[free] = lsq_linear(damped[:, free], wanted, bounds=(room[0], room[1]), method="bvls").x

@@ -1,28 +1,39 @@
-"""A log of an inverter: torque, and angle or speed of the motor, over time; read, checked, and made ready."""
+"""A log of an inverter: torque, and angle or speed of the motor, over time; read from CSV, and checked."""
 
 from __future__ import annotations
 
+import csv
 import math
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.identification.traces import COLUMNS, FEWEST, Kind, asked_columns, check_times, read_signals
-from softstart.input.files import write_whole
-from softstart.quantities import show, to_si
+from softstart.input.columns import Wanted, read_columns
+from softstart.input.files import read_text, write_whole
+from softstart.quantities import RefusedError, nearest, parse, show, to_si
 
+Kind = Literal["angle", "speed"]
 TorqueIs = Literal["demand", "measured"]
 
+COLUMNS: Final = {
+    "time": Wanted(("time", "t"), "s"),
+    "torque": Wanted(("torque", "u", "demand"), "N*m"),
+    "current": Wanted(("current", "i", "iq"), "A"),
+    "angle": Wanted(("angle", "phi", "position"), "rad"),
+    "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
+}
+FORM: Final = "time [ms];torque [N*m];speed [rpm]"
+FEWEST: Final = 30  # samples
 MOST_ROWS: Final = 1000  # samples of angle or speed that the fit looks at
 LEAST_COUNT: Final = 1e-5  # of the largest difference: a smaller step is rounding
-SPIKE: Final = 15.0  # times the usual distance from the line through the neighbours
 HOLE: Final = 20.0  # typical sample periods without a sample
 TURN: Final = 2.0 * math.pi
 
@@ -101,14 +112,14 @@ class Log:
         for key, column in columns.items():
             if column.ndim != 1 or column.size != columns["time"].size:
                 raise InputError(f"{name}: {key} has the shape {column.shape}; give one number a sample.")
+            if key != kind and not np.isfinite(column).all():
+                i = int(np.argmin(np.isfinite(column)))
+                raise InputError(f"{name}: the {key} of sample {i + 1} is missing; cut the log there.")
         seconds, torques, values = columns.values()
+        _check_times(seconds, name)
         notes: list[str] = []
-        torques = _whole(torques, seconds, name, notes)
-        check_times(seconds, name)
-        _check_holes(seconds, name)
         if kind == "angle":
             values = _unwrapped(values, notes)
-        values = _without_spikes(values, notes)
         vars(self).update(
             time=seconds, torque=torques, values=values, kind=kind, torque_is=torque_is, name=name,
             count=_count(values),
@@ -131,14 +142,9 @@ class Log:
         torque_constant: float | str | None = None,
         rated_torque: float | str | None = None,
     ) -> Log:
-        """A log from a CSV file whose first line names the columns, as `time [ms];torque [N*m];speed [rpm]`.
+        """A log from a CSV file whose heading names the columns, as `time [ms];torque [N*m];speed [rpm]`.
 
-        Names, units and the sample time may also stand in lines of a preamble, and each column may have times
-        of its own to its left, as scopes of inverters write it.
-
-        Also from a measurement file, MDF 3 or 4 (`.mf4`, `.mdf`, `.dat`), by the package `asammdf`. Its
-        channels may be sampled at different instants: the torque, which is straight or constant between its
-        samples, is then known at all of them.
+        The heading is the last line above the numbers; what stands above it is passed over.
 
         Parameters
         ----------
@@ -147,7 +153,6 @@ class Log:
         columns : mapping, optional
             What the file calls time, torque (or current), angle and speed; a name after a minus has the other
             sign, and a unit in brackets behind it takes the place of that of the file: `-n_act [rpm]`.
-            A torque may be in %, or in 0.1 %.
         torque_is : {"measured", "demand"}
             As for `Log`.
         torque_constant : float or str, optional
@@ -157,26 +162,22 @@ class Log:
             The torque at 100 % in N m, or with a unit, where the file has it in %.
         """
         where = os.fspath(path)
-        asked = asked_columns(columns or {})
         rated = None if rated_torque is None else _above_0("rated_torque", rated_torque, "N*m")
         constant = None if torque_constant is None else _above_0("torque_constant", torque_constant, "N*m/A")
-        cause = "torque" if constant is None else "current"
-        for key in asked:
-            if key in ("torque", "current") and key != cause:
-                raise InputError(
-                    'columns: current: give the torque constant with it, as --torque-constant "1.2 N*m/A".'
-                    if constant is None
-                    else "columns: torque: with a torque constant the current is read; name it with "
-                    "current=, or leave out --torque-constant."
-                )
-        found = read_signals(where, asked, cause, rated, held=torque_is == "demand")
-        signs = {key: asked[key].sign if key in asked else 1.0 for key in (cause, found.kind)}
-        torque = signs[cause] * (1.0 if constant is None else constant) * found.cause
-        values: dict[str, Any] = {found.kind: signs[found.kind] * found.values}
-        log = cls(found.time, torque, torque_is=torque_is, name=Path(where).name, **values)
-        notes = list(found.notes)
+        cause, other = ("torque", "current") if constant is None else ("current", "torque")
+        asked = _asked_columns(columns or {})
+        if other in asked:
+            raise InputError(
+                f"columns: {other}: a current is read with the torque constant, and a torque without it; "
+                'give --torque-constant "1.2 N*m/A", or leave it out.'
+            )
+        found, notes = _read_columns(where, asked, cause, rated)
+        torque = found.pop(cause)
         if constant is not None:
+            torque = constant * torque
             notes.append(f"the torque is {constant:g} N m/A times the current")
+        values: dict[str, Any] = found
+        log = cls(values.pop("time"), torque, torque_is=torque_is, name=Path(where).name, **values)
         return log.changed(notes=(*notes, *log.notes))
 
     def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
@@ -188,7 +189,7 @@ class Log:
         write_whole(Path(path), lambda stream: stream.write("\n".join(lines) + "\n"))
 
     @classmethod
-    def planned(cls, time: Vector, torque: Vector, kind: Kind) -> Log:
+    def planned(cls, time: Vector, torque: Vector, kind: Kind = "angle") -> Log:
         """A demand whose motion is not known yet."""
         blank = object.__new__(cls)
         return blank.changed(
@@ -232,10 +233,17 @@ class Log:
     @property
     def scale(self) -> float:
         """A residual that is small: a count, or a ten-thousandth of the largest value."""
-        return max(
-            self.count,
-            1e-4 * float(np.nanmax(np.abs(self.values - self.values[np.isfinite(self.values)][0]))),
-        )
+        first = self.values[np.isfinite(self.values)][0]
+        return max(self.count, 1e-4 * float(np.nanmax(np.abs(self.values - first))))
+
+    @property
+    def moved(self) -> tuple[Vector, Vector]:
+        """Speed of the motor, and impulse of its torque until then, N m s, in the samples of the motion."""
+        seen = np.isfinite(self.values)
+        time, values, torque = self.time[seen], self.values[seen], self.torque
+        speed = values if self.kind == "speed" else np.gradient(values, time)
+        impulse = np.append(0.0, np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(self.time)))
+        return speed, impulse[seen]
 
     def _check_motion(self) -> None:
         name, kind = self.name, self.kind
@@ -246,32 +254,133 @@ class Log:
             )
         if not np.any(self.torque):
             raise InputError(f"{name}: the torque is 0 in every sample; log the torque of the motor with it.")
-        time, values = self.time[seen], self.values[seen]
-        speed = values if kind == "speed" else np.gradient(values, time)
+        speed, impulse = self.moved
         fastest = float(np.max(np.abs(speed)))
         if fastest == 0.0:
             raise InputError(f"{name}: the {kind} never changes; log a start in which the motor moves.")
-        first = speed[0] if kind == "speed" else (values[1] - values[0]) / (time[1] - time[0])
-        one = self.count if kind == "speed" else self.count / (time[1] - time[0])  # a motor at rest may be
+        period = float(np.diff(self.time[seen])[0])
+        first = float(speed[0])
+        one = self.count if kind == "speed" else self.count / period  # a motor at rest may be
         if abs(first) - 1.01 * one > 0.2 * fastest:  # just below the next count
             raise InputError(
                 f"{name}: the motor turns at {first:.3g} rad/s where the log begins; begin the log at "
                 "standstill."
             )
-        impulse = np.concatenate(
-            [[0.0], np.cumsum(0.5 * (self.torque[1:] + self.torque[:-1]) * np.diff(self.time))]
-        )
         # before half the impulse and half the speed: a motor that hits the flank of a load at rest flies back
-        early = (np.abs(impulse[seen]) <= 0.5 * np.max(np.abs(impulse))) & (np.abs(speed) <= 0.5 * fastest)
+        early = (np.abs(impulse) <= 0.5 * np.max(np.abs(impulse))) & (np.abs(speed) <= 0.5 * fastest)
         share = slice(0, max(4, int(np.argmin(early)) if not early.all() else early.size))
-        if float(np.sum(speed[share] * impulse[seen][share])) < 0.0:
-            word = "rises" if float(speed[share][-1]) > 0.0 else "falls"
-            side = "below" if word == "rises" else "above"
+        if float(np.sum(speed[share] * impulse[share])) < 0.0:
+            word, side = ("rises", "below") if float(speed[share][-1]) > 0.0 else ("falls", "above")
             raise InputError(
-                f"{name}: the {'speed' if kind == 'speed' else 'angle'} {word} where the torque is "
-                f"{side} 0; one of "
-                "the two has the wrong sign; write --columns torque=-NAME to turn that of the torque round."
+                f"{name}: the {kind} {word} where the torque is {side} 0; one of the two has the wrong sign; "
+                "write --columns torque=-NAME to turn that of the torque round."
             )
+
+
+# ---- the file -------------------------------------------------------------------------------------------
+
+
+class _Asked(NamedTuple):
+    """What a file calls a signal: name, sign, and a unit that takes the place of its own."""
+
+    name: str
+    sign: float
+    unit: str
+
+
+def _asked_columns(columns: Mapping[str, str]) -> dict[str, _Asked]:
+    """The columns as people write them.
+
+    >>> _asked_columns({"speed": "-n_act [rpm]"})
+    {'speed': _Asked(name='n_act', sign=-1.0, unit='rpm')}
+    """
+    found = {}
+    for key, text in columns.items():
+        part = re.fullmatch(r"\s*(-?)\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
+        if key not in COLUMNS or part is None:
+            near = nearest(key, COLUMNS) if key not in COLUMNS else key
+            raise InputError(
+                f"columns: {key} = {show(text)}: "
+                + (f"did you mean {near}=NAME?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act.")
+            )
+        found[key] = _Asked(part[2], -1.0 if part[1] else 1.0, part[3] or "")
+    return found
+
+
+def _read_columns(
+    where: str, asked: Mapping[str, _Asked], cause: str, rated: float | None
+) -> tuple[dict[str, Vector], list[str]]:
+    """Time, torque or current, and angle or speed of a file in SI; `rated`: the torque at 100 %."""
+    try:
+        text = read_text(Path(where), also="cp1252")
+        if "\0" in text:
+            raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
+        lines = text.splitlines()
+        rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+        first = next((i for i in rows if re.match(r"\s*[+-]?[.,]?[0-9]", lines[i])), 0)
+        above = [i for i in rows if i < first]
+        if not above:
+            raise RefusedError(f"no line above the numbers names the columns; write it there, as {FORM}")
+        lines[: above[-1]] = ["#"] * above[-1]
+        mark = next((one for one in ";\t" if any(one in line for line in lines)), ",")
+        cells = next(csv.reader([lines[above[-1]]], delimiter=mark, skipinitialspace=True))
+        named = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?\s*", cell, re.DOTALL) for cell in cells]
+        names, units = ([part[i] or "" if part else "" for part in named] for i in (1, 2))
+        heading, factors, notes = [""] * len(cells), {}, list[str]()
+        for key, i in _places(names, cells, asked, cause).items():
+            own = asked.get(key, _Asked("", 1.0, ""))
+            unit = (own.unit or units[i]).strip()
+            heading[i], factors[key] = key, own.sign * _in_si(unit, key, cells[i], rated)
+            notes += [f"the torque is in % of {rated:.5g} N m"] if unit == "%" else []
+    except RefusedError as refusal:
+        raise InputError(f"log = {where}: {refusal.reason}.") from None
+    lines[above[-1]] = mark.join(heading)
+    wanted = [Wanted((key,), COLUMNS[key].unit) for key in factors]
+    columns = read_columns("\n".join(lines), f"log = {where}", wanted, headed="names", missing=True).values
+    each = zip(factors.items(), columns, strict=True)
+    return {key: factor * column for (key, factor), column in each}, notes
+
+
+def _places(names: list[str], cells: list[str], asked: Mapping[str, _Asked], cause: str) -> dict[str, int]:
+    """In which column each signal stands."""
+
+    def places(key: str) -> list[int]:
+        known = [asked[key].name] if key in asked else COLUMNS[key].names
+        return [i for i, name in enumerate(names) if name.lower() in [one.lower() for one in known]]
+
+    motions = [key for key in ("angle", "speed") if key in asked] or [
+        key for key in ("angle", "speed") if places(key)
+    ]
+    found = {key: places(key) for key in ("time", cause, *motions)}
+    wrong = [
+        f"{f'{len(columns)} are' if columns else 'none is'} called {asked[key].name if key in asked else key}"
+        for key, columns in found.items()
+        if len(columns) != 1
+    ]
+    if len(motions) != 1:
+        wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
+    if wrong:
+        current = "; a current takes --torque-constant" if cause == "torque" and places("current") else ""
+        raise RefusedError(
+            f"there are the columns {', '.join(filter(None, cells))}; {' and '.join(wrong)}; write --columns "
+            f'"time=NAME [ms],{cause}=NAME,speed=NAME [rpm]" with names of this file{current}'
+        )
+    return {key: columns[0] for key, columns in found.items()}
+
+
+def _in_si(unit: str, key: str, cell: str, rated: float | None) -> float:
+    """One of this unit in SI; a torque in % is a share of the rated torque."""
+    if unit == "%" and key == "torque":
+        if rated is None:
+            raise RefusedError(f'{show(cell)} is in %; give the torque at 100 %, as --rated-torque "12 N*m"')
+        return 0.01 * rated
+    try:
+        return float(parse(f"1 {unit}", COLUMNS[key].unit))
+    except RefusedError as refusal:
+        raise RefusedError(
+            f'{show(cell)}: {refusal.reason}; or name the unit that is meant, as --columns "{key}=NAME '
+            f'[{COLUMNS[key].unit}]"'
+        ) from None
 
 
 def _above_0(name: str, given: float | str, unit: str) -> float:
@@ -283,33 +392,25 @@ def _above_0(name: str, given: float | str, unit: str) -> float:
     return value
 
 
-def _whole(torque: Vector, time: Vector, name: str, notes: list[str]) -> Vector:
-    """The torque with single missing samples filled by straight lines."""
-    missing = ~np.isfinite(torque)
-    if not missing.any():
-        return torque
-    runs = np.diff(np.flatnonzero(np.concatenate([[True], ~missing, [True]])))
-    if int(runs.max()) > 3 or missing[0] or missing[-1]:
-        raise InputError(
-            f"{name}: {int(missing.sum())} samples of the torque are missing, more than two in a row "
-            "or at an end; what moves the drive must be known; cut the log there."
-        )
-    notes.append(
-        f"{int(missing.sum())} missing samples of the torque lie on straight lines between their neighbours"
-    )
-    return np.interp(time, time[~missing], torque[~missing])
+# ---- the samples ----------------------------------------------------------------------------------------
 
 
-def _check_holes(time: Vector, name: str) -> None:
+def _check_times(time: Vector, name: str) -> None:
+    if time.size < FEWEST:
+        raise InputError(f"{name}: {time.size} samples; a fit needs {FEWEST} or more.")
     steps = np.diff(time)
+    if np.any(steps <= 0.0):
+        i = int(np.argmax(steps <= 0.0))
+        raise InputError(
+            f"{name}: time goes from {time[i]:g} s to {time[i + 1]:g} s at sample {i + 2}; it must rise."
+        )
     typical = float(np.median(steps))
     if float(steps.max()) > HOLE * typical:
         i = int(np.argmax(steps))
         raise InputError(
-            f"{name}: there is no sample from {time[i]:g} s to {time[i + 1]:g} s, and every "
-            f"{typical:g} s elsewhere; "
-            "the torque in between is not known; cut the log there, and give the parts that begin at "
-            "standstill."
+            f"{name}: there is no sample from {time[i]:g} s to {time[i + 1]:g} s, and every {typical:g} s "
+            "elsewhere; the torque in between is not known; cut the log there, and give the parts that begin "
+            "at standstill."
         )
 
 
@@ -327,23 +428,6 @@ def _unwrapped(angle: Vector, notes: list[str]) -> Vector:
     whole = angle.copy()
     whole[seen] = np.unwrap(values)
     return whole
-
-
-def _without_spikes(values: Vector, notes: list[str]) -> Vector:
-    """The values without single samples that lie far off the line through their neighbours."""
-    off = np.zeros(values.size)
-    off[1:-1] = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-    seen = np.isfinite(off)
-    usual = 1.5 * float(np.median(np.abs(off[seen]))) + _count(values)
-    beside = 0.5 * (np.roll(off, 1) + np.roll(off, -1))
-    # a spike of the height h is h off its own line and -h/2 off those of its neighbours
-    spikes = seen & (np.abs(off) > SPIKE * usual) & (np.abs(beside + 0.5 * off) < 0.15 * np.abs(off))
-    if not spikes.any() or int(spikes.sum()) > 0.02 * values.size + 1:
-        return values
-    number = int(spikes.sum())
-    were = "s lie far off their neighbours and were" if number > 1 else " lies far off its neighbours and was"
-    notes.append(f"{number} sample{were} left out")
-    return np.where(spikes, math.nan, values)
 
 
 def _count(values: Vector) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -17,17 +16,16 @@ from scipy.optimize import minimize
 
 from softstart.arrays import Vector
 from softstart.chain.machines import records
-from softstart.controller import Controller, make_controller
+from softstart.controller import make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import Fitter, Point, Sizes, data_of
-from softstart.identification.logs import Log, TorqueIs
+from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
-from softstart.identification.traces import FEWEST, Kind
-from softstart.identification.unknowns import chosen, unknowns_of, usual, values_of
+from softstart.identification.unknowns import Unknown, chosen, unknowns_of, usual, values_of
 from softstart.kernel.records import S_PHI
 from softstart.profile import TorqueProfile
-from softstart.quantities import nearest, show, to_si
+from softstart.quantities import show, to_si
 from softstart.start.batch import prepared
 from softstart.start.comparison import INTERVAL
 from softstart.start.engine import ended
@@ -42,11 +40,11 @@ DESIGN, COARSE = 2, 4  # of these every second while a torque is designed, and e
 KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
 EXACT: Final = 1e-9  # relative error of a largest value
 SHORTEST: Final = 1e-13  # of the gap, between positions
+LEAST: Final = 0.05  # of the levels of a standard experiment: a smaller torque is none
 PIECES: Final = 9  # levels of a designed torque at least
 ROUGH: Final = 150  # samples at most while a torque is designed
-DRAWS: Final = 40  # random torques, from the best of which
-TRIALS: Final = 200  # torques are then tried in search of a better one
-EXACTLY, EVERY = 10, 4  # so many of these, one in so many of the best, are computed exactly
+DRAWS, TRIALS = 40, 200  # random torques, and torques tried from the best of them on
+EXACTLY: Final = 5  # so many of the best are computed exactly
 SPREAD: Final = 0.15  # of the largest level: the first steps
 WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may go
 NEAR: Final = 0.01  # relative distance of a design to its limits: for positions between those checked then
@@ -61,19 +59,14 @@ class Experiment:
     name : str
         What it is called.
     profile : TorqueProfile
-        The torque demand.
-    end : float
-        When the log ends, s.
+        The torque demand; `end`, s, is when the log ends.
     widths : dict
         Half an interval of 95 % over the value for each parameter; infinite where it would be unknown.
-    peak : float
-        Peak of the shaft torque on the exact plant, N m, from the worst position in the gap.
-    travel : float
-        How far the load is moved at most from where it stood, rad at the motor shaft.
-    wanted : tuple of str
-        The parameters that `score` is about; all of them if it is empty.
-    found_by : str
-        "standard", or what the torque was designed with.
+    peak, travel : float
+        Peak of the shaft torque, N m, and travel of the load, rad at the motor shaft, on the exact plant,
+        each from the worst position in the gap.
+    score : float
+        Root mean square of the half intervals of the wanted parameters; less is better.
 
     Examples
     --------
@@ -93,23 +86,12 @@ class Experiment:
     widths: dict[str, float]
     peak: float
     travel: float
-    wanted: tuple[str, ...] = ()
-    found_by: str = "standard"
-
-    @property
-    def score(self) -> float:
-        """Root mean square of the half intervals of the wanted parameters; less is better.
-
-        Of logarithms, so that units do not matter (A-optimal). A determinant (D-optimal) would pay for a
-        vague gap with a sharp inertia.
-        """
-        widths = np.array([self.widths[name] for name in self.wanted or self.widths])
-        return float(np.sqrt(np.mean(np.minimum(widths, 1e3) ** 2)))
+    score: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Experiments for a drive, the standard ones and the best one found.
+    """Experiments for a drive: the standard ones, then the planned one.
 
     Attributes
     ----------
@@ -138,7 +120,6 @@ class Plan:
     experiments: tuple[Experiment, ...]
     log_period: float
     ripple: float
-    lines: float
 
     def __getitem__(self, name: str) -> Experiment:
         """The experiment of this name."""
@@ -155,14 +136,13 @@ class Plan:
             "drive": self.drive.name,
             "log_period": self.log_period,
             "ripple": self.ripple,
-            "encoder_lines": self.lines,
+            "encoder_lines": float(self.drive.encoder_lines),
             "experiments": [
                 {
                     "name": one.name,
                     "half_width_percent": {name: 100.0 * width for name, width in one.widths.items()},
                     "peak_shaft_torque": one.peak,
                     "travel": one.travel,
-                    "found_by": one.found_by,
                     "time": one.profile.time.tolist(),
                     "torque": one.profile.torque.tolist(),
                     "end": one.end,
@@ -186,8 +166,7 @@ def plan_experiments(
     log_period: float | str = "4 ms",
     ripple: float | str | None = None,
     free: Sequence[str] | None = None,
-    signal: Kind = "angle",
-    wanted: Sequence[str] = (),
+    wanted: Sequence[str] | None = None,
     max_torque: float | str | None = None,
     max_travel: float | str | None = None,
     optimise: bool = True,
@@ -197,13 +176,13 @@ def plan_experiments(
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
     interval that a fit would have (Fisher information). The position in the gap is unknown in each where the
-    load is reactive.
+    load is reactive. The log has the angle of the motor.
 
-    The planned torque has at least nine levels, on edges of the best standard experiment that keeps the
-    limits, and its duration. From the best of 40 random torques the levels are improved by linear
-    approximations (COBYLA: M. J. D. Powell), minimising `Experiment.score` with the peak of the shaft torque
-    from each position and the travel within the limits. The best torque that keeps all limits on the exact
-    plant is returned: never less than the best standard experiment tells within them. It is a local optimum.
+    The planned torque has at least nine levels, and the duration of the best standard experiment that keeps
+    the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA:
+    M. J. D. Powell), minimising `Experiment.score` with the peak of the shaft torque from each position and
+    the travel within the limits. The best torque that keeps all limits on the exact plant is returned: never
+    less than the best standard experiment tells within them. It is a local optimum.
 
     Parameters
     ----------
@@ -215,9 +194,6 @@ def plan_experiments(
         Standard deviation of the torque error in each sample, N m; 2.5 % of 0.65 Ms by default.
     free : sequence of str, optional
         What is to be found, as in `identify`.
-    signal : {"angle", "speed"}
-        What the log holds beside the torque. An angle has the drive's encoder; a speed the difference of its
-        counts.
     wanted : sequence of str, optional
         The parameters that the planned torque is to tell best; all that are to be found by default.
     max_torque : float or str, optional
@@ -251,39 +227,34 @@ def plan_experiments(
     A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992; docs/identification.md.
     """
     drive = Drive.load(drive) if isinstance(drive, str) else drive
-    period = float(to_si(log_period, "s", name="log_period"))
-    if not 0.0 < period < math.inf:
-        raise InputError(f"log_period = {show(log_period)}: the sample period of the log is above 0.")
-    level = _level(drive)
-    error = RIPPLE * level if ripple is None else float(to_si(ripple, "N*m", name="ripple"))
-    if not 0.0 < error <= float(drive.Ms):
-        raise InputError(
-            f"ripple = {show(ripple)}: the torque error of a sample is above 0 and at most the "
-            f"starting torque, {float(drive.Ms):.4g} N m."
-        )
-    shortest = min(float(np.sum(durations)) for durations, _ in standard_levels(drive, level).values())
-    if period > shortest / FEWEST:
-        raise InputError(
-            f"log_period = {show(log_period)}: the shortest experiment lasts {shortest:.3g} s, and a "
-            f"fit needs {FEWEST} samples; give a sample period of {shortest / FEWEST:.2g} s or less."
-        )
+    standard = standard_levels(drive)
+    longest = min(float(np.sum(durations)) for durations, _ in standard.values()) / FEWEST
+    period = _between("log_period", log_period, "s", longest, f"a fit needs {FEWEST} samples of each log")
+    error = RIPPLE * _level(drive)
+    if ripple is not None:
+        error = _between("ripple", ripple, "N*m", float(drive.Ms), "more is no error of the torque")
     asked = _asked(free, drive)
-    for name in wanted:
-        if name not in asked:
-            near = nearest(name, asked)
-            hint = f"did you mean {near}?" if near else f"those are {', '.join(asked)}."
-            raise InputError(f"wanted = {show(name)}: it is no parameter that is to be found; {hint}")
-    bench = Bench(drive, period, error, asked, signal, tuple(wanted), progress or (lambda _: None))
-    standard = [bench.experiment(name, *levels) for name, levels in standard_levels(drive, level).items()]
-    usual_peak = max(one.peak for one in standard)
-    usual_peak = usual_peak if drive.permissible_torque is None else drive.permissible_torque
-    torque = float(to_si(usual_peak if max_torque is None else max_torque, "N*m", name="max_torque"))
-    travel = math.inf if max_travel is None else float(to_si(max_travel, "rad", name="max_travel"))
-    for key, limit, given in (("max_torque", torque, max_torque), ("max_travel", travel, max_travel)):
-        if not limit > 0.0:
-            raise InputError(f"{key} = {show(given)}: a limit is above 0.")
-    planned = [bench.designed(standard, torque, travel)] if optimise else []
-    return Plan(drive, (*standard, *planned), period, error, float(drive.encoder_lines))
+    aims = chosen(wanted, asked, asked, "this plan", key="wanted")
+    bench = Bench(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
+    experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
+    if optimise:
+        usual_peak = drive.permissible_torque or max(one.peak for one in experiments)
+        limits = [("max_torque", max_torque, usual_peak, "N*m"), ("max_travel", max_travel, math.inf, "rad")]
+        torque, travel = (
+            usual if given is None else _between(key, given, unit, math.inf, "")
+            for key, given, usual, unit in limits
+        )
+        experiments.append(bench.designed(standard, torque, travel))
+    return Plan(drive, tuple(experiments), period, error)
+
+
+def _between(name: str, given: float | str, unit: str, most: float, why: str) -> float:
+    """A number above 0 and at most this."""
+    value = float(to_si(given, unit, name=name))
+    if not 0.0 < value <= most:
+        limit = f" and at most {most:.3g} {unit}: {why}" if most < math.inf else ""
+        raise InputError(f"{name} = {show(given)}: give a value above 0{limit}.")
+    return value
 
 
 def made_up_log(
@@ -307,13 +278,10 @@ def made_up_log(
     >>> made_up_log(crane, "start").kind
     'angle'
     """
-    levels = standard_levels(drive, _level(drive))
     if isinstance(experiment, Experiment):
         profile, end = experiment.profile, experiment.end
-    elif experiment in levels:
-        profile, end = steps_of(*levels[experiment])
     else:
-        raise InputError(f"experiment = {show(experiment)}: it is none of {', '.join(levels)}.")
+        profile, end = steps_of(*standard_levels(drive)[experiment])
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
     generator = np.random.default_rng(seed)
@@ -332,7 +300,8 @@ def made_up_log(
 
 
 def _moving(drive: Drive) -> bool:
-    return drive.start_position == "unknown" or drive.load_kind == "reactive"
+    """Whether the position in the gap is unknown."""
+    return (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
 
 
 def _at_rest(drive: Drive) -> Drive:
@@ -353,23 +322,22 @@ def _level(drive: Drive) -> float:
     return max(LEVEL * Ms, min(Ms, 1.5 * Mc))
 
 
-def standard_levels(drive: Drive, level: float) -> dict[str, tuple[Vector, Vector]]:
+def standard_levels(drive: Drive) -> dict[str, tuple[Vector, Vector]]:
     """Durations and levels of the standard experiments."""
+    level, Mc = _level(drive), abs(float(drive.Mc))
     crossing = math.sqrt(2.0 * float(drive.gap) * float(drive.J1) / level)
     part = 1.5 * crossing + 2.0 * float(drive.elastic_period) + 4.0 * float(drive.torque_lag)
-    Mc = abs(float(drive.Mc))
-    lower = Mc + 0.25 * (level - Mc)
-    found = {
-        "start": ([2.0 * part], [level]),
-        "two levels": ([part, part], [level, lower]),
+    lower, back = Mc + 0.25 * (level - Mc), -LEVEL * level
+    table: dict[str, tuple[list[float], list[float]]] = {
+        "start": ([2.0], [level]),
+        "two levels": ([1.0, 1.0], [level, lower]),
     }
     if drive.load_kind == "reactive":
-        back = LEVEL * level
-        found["two levels, then reverse"] = ([part, part, 2.0 * part], [level, lower, -back])
-        found["reversed three times"] = ([part] * 2 + [2.0 * part] * 3, [level, lower, -back, back, -back])
+        table["two levels, then reverse"] = ([1.0, 1.0, 2.0], [level, lower, back])
+        table["reversed three times"] = ([1.0, 1.0, 2.0, 2.0, 2.0], [level, lower, back, -back, back])
         if Mc > 0.0:
-            found["shaking"] = ([part] * 4, [0.8 * Mc, -0.8 * Mc, 0.8 * Mc, -0.8 * Mc])
-    return {name: (np.array(times), np.array(levels)) for name, (times, levels) in found.items()}
+            table["shaking"] = ([1.0] * 4, [0.8 * Mc, -0.8 * Mc, 0.8 * Mc, -0.8 * Mc])
+    return {name: (part * np.array(parts), np.array(levels)) for name, (parts, levels) in table.items()}
 
 
 def largest(figure: Callable[[Vector], tuple[Vector, Vector]], places: Vector) -> float:
@@ -398,10 +366,6 @@ def largest(figure: Callable[[Vector], tuple[Vector, Vector]], places: Vector) -
         values, counts = np.insert(values, after, more[0]), np.insert(counts, after, more[1])
 
 
-def _player(profile: TorqueProfile) -> Controller:
-    return make_controller("profile", {"profile": profile})
-
-
 def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     """The torque of these levels, and when it ends.
 
@@ -412,36 +376,28 @@ def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     return TorqueProfile.steps(edges, levels), float(edges[-1])
 
 
+def _score(widths: Sequence[float]) -> float:
+    """Of logarithms, so that units do not matter: A-optimal.
+
+    A determinant (D-optimal) would pay for a vague gap with a sharp inertia.
+    """
+    return float(np.sqrt(np.mean(np.minimum(widths, 1e3) ** 2)))
+
+
 @dataclass(frozen=True, eq=False)
 class Bench:
     """A drive, an inverter's log and an encoder: what any torque would tell.
 
-    Attributes
-    ----------
-    drive : Drive
-        The drive as it is thought to be.
-    period, ripple : float
-        Sample period of the log, s; torque error in each sample, N m.
-    free, wanted : tuple of str
-        What is to be found, and what of it `Experiment.score` is about.
-    signal : {"angle", "speed"}
-        What the log holds.
-    progress : callable
-        Called with the name of each experiment.
+    `period` is that of the samples, s, `ripple` the torque error in each, N m; `free` is what is to be found,
+    and `wanted` what of it a score is about.
     """
 
     drive: Drive
     period: float
     ripple: float
     free: tuple[str, ...]
-    signal: Kind = "angle"
     wanted: tuple[str, ...] = ()
     progress: Callable[[str], None] = lambda _: None
-
-    @property
-    def moving(self) -> bool:
-        """Whether the position in the gap is unknown."""
-        return _moving(self.drive) and float(self.drive.gap) > 0.0
 
     @property
     def wide(self) -> Drive:
@@ -453,24 +409,38 @@ class Bench:
     def places(self) -> Vector:
         """Positions of the motor in the gap, rad."""
         half = 0.5 * float(self.drive.gap)
-        return np.linspace(-half, half, CHECKED) if self.moving else np.zeros(1)
+        return np.linspace(-half, half, CHECKED) if _moving(self.drive) else np.zeros(1)
 
-    def experiment(self, name: str, durations: Vector, levels: Vector, rough: bool = False) -> Experiment:
-        """What these levels would tell; roughly, for a design."""
+    def experiment(self, name: str, durations: Vector, levels: Vector) -> Experiment:
+        """What these levels would tell, and how they load the drive."""
         self.progress(name)
         profile, end = steps_of(durations, levels)
-        period = max(self.period, end / (ROUGH if rough else SAMPLES))
+        widths = {
+            one.name: self.width(one, x, half) if one.known(x, half) else math.inf
+            for one, x, half in self.halves(profile, end, SAMPLES)
+        }
+        score = _score([widths[one] for one in self.wanted or widths])
+        return Experiment(name, profile, end, widths, *self.load(profile, end), score)
+
+    @staticmethod
+    def width(one: Unknown, x: float, half: float) -> float:
+        """Half an interval of a value as a share of it."""
+        return math.sinh(half) if one.kind == "logarithm" else one.share(x, half)
+
+    def halves(self, profile: TorqueProfile, end: float, samples: int) -> list[tuple[Unknown, float, float]]:
+        """Each parameter of the drive, its number x of the fit, and half the expected interval of that."""
+        drive = self.drive
+        period = max(self.period, end / samples)
         time = np.arange(0.0, end + 0.5 * period, period)
-        log = Log.planned(time, profile.at(time), self.signal)
-        unknowns = unknowns_of(self.free, self.drive, [log], [self.moving])
+        log = Log.planned(time, profile.at(time))
+        unknowns = unknowns_of(self.free, drive, [log], [_moving(drive)])
         numbers = {POSITION: PLACE, "offset": 0.0}
         x = np.array([
-            one.number(float(numbers.get(one.name, getattr(self.drive, one.name, 0.0)))) for one in unknowns
+            one.number(float(numbers.get(one.name, getattr(drive, one.name, 0.0)))) for one in unknowns
         ])  # fmt: skip
-        model = LogModel.of(log, _at_rest(self.drive), SAMPLES)
+        model = LogModel.of(log, _at_rest(drive), SAMPLES)
         signal = model.signals([values_of(unknowns, x, 0)])[0]
-        count = 2.0 * math.pi / (4.0 * float(self.drive.encoder_lines)) if self.drive.encoder_lines else 0.0
-        count = count if self.signal == "angle" else count / period
+        count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
         model = replace(model, log=log.changed(values=signal, count=count))
         logged = np.round(signal / count) * count if count else signal
         fitter = Fitter((model,), unknowns, (data_of(model, logged),))
@@ -478,15 +448,9 @@ class Bench:
         # a longer period stands for samples left out: the same error of the torque in each of them
         sizes = Sizes(1.0, self.ripple * math.sqrt(self.period / period))
         variances = np.diag(fitter.covariance(Point(x, sizes, (spot,), np.zeros(x.size))))
-        widths = {}
-        for one, number, variance in zip(unknowns, x.tolist(), variances.tolist(), strict=True):
-            half = min(INTERVAL.quantile * math.sqrt(variance), 50.0)
-            if one.log is None:
-                width = math.sinh(half) if one.kind == "logarithm" else one.share(number, half)
-                # a design needs the slope of what is unknown
-                widths[one.name] = width if rough or one.known(number, half) else math.inf
-        peak, travel = (math.nan, math.nan) if rough else self.load(profile, end)
-        return Experiment(name, profile, end, widths, peak, travel, self.wanted)
+        reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
+        each = zip(unknowns, x.tolist(), reach, strict=True)
+        return [(one, number, half) for one, number, half in each if one.log is None]
 
     def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
@@ -495,8 +459,9 @@ class Bench:
 
     def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
         """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
-        starts = records(self.wide, start_position=places) if self.moving else [self.wide]
-        notes = prepared(starts).notes([_player(profile).set_up(self.wide)], until=end)
+        starts = records(self.wide, start_position=places) if _moving(self.drive) else [self.wide]
+        player = make_controller("profile", {"profile": profile}).set_up(self.wide)
+        notes = prepared(starts).notes([player], until=end)
         for one in notes.starts:
             ended(one, int(one["status"]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
         return notes.peaks[:, 0], notes["gap_events"]
@@ -509,90 +474,76 @@ class Bench:
         times = np.union1d(profile.time[profile.time < end], end)
         if self.drive.load_kind != "reactive":
             times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
-        model = LogModel.of(Log.planned(times, profile.at(times), self.signal), _at_rest(self.drive))
+        model = LogModel.of(Log.planned(times, profile.at(times)), _at_rest(self.drive))
         found = np.empty((2, places.size))
         for i, share in enumerate((places / (0.5 * float(self.drive.gap) or 1.0)).tolist()):
-            motion = model.motion({POSITION: share} if self.moving else {})
+            motion = model.motion({POSITION: share} if _moving(self.drive) else {})
             angles = motion.states[:, S_PHI]
             found[:, i] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
         return found[0], found[1]
 
-    def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> float:
-        """By which share the worst of some positions exceeds the limits, below 0 where all keep them."""
-        places = self.places[::DESIGN]
-        found = float(self.peaks(profile, end, places)[0].max()) / torque
+    def over(self, durations: Vector, levels: Vector, torque: float, travel: float) -> float:
+        """The worst of some positions over the limits."""
+        played = steps_of(durations, levels)
+        found = float(self.peaks(*played, self.places[::DESIGN])[0].max()) / torque
         if travel < math.inf:
-            found = max(
-                found, float(self.travels(profile, end, self.places[:: 4 * COARSE])[0].max()) / travel
-            )
-        return found - 1.0
+            found = max(found, float(self.travels(*played, self.places[:: 4 * COARSE])[0].max()) / travel)
+        return found
 
-    def keeping(self, one: Experiment, torque: float, travel: float) -> Experiment | None:
-        """The experiment, its levels made smaller until it keeps the limits."""
-        edges = edges_of(one)
-        durations = np.diff([*edges, one.end])
-        for share in (1.0, 0.99, 0.98, 0.97, 0.95, 0.93, *0.85 ** np.arange(1, 20)):
-            levels = share * one.profile.at(edges)
-            if self.excess(*steps_of(durations, levels), torque, travel) > 0.0:
-                continue
-            found = one if share == 1.0 else self.experiment(one.name, durations, levels)
-            if found.peak <= torque and found.travel <= travel:
-                return found
+    def within(
+        self, name: str, durations: Vector, levels: Vector, torque: float, travel: float
+    ) -> Experiment | None:
+        """The experiment, its levels made smaller until it keeps the limits; None if hardly any is left."""
+        share = 1.0
+        while share > LEAST:
+            over = self.over(durations, share * levels, torque, travel)
+            if over <= 1.0:
+                found = self.experiment(name, durations, share * levels)
+                over = max(found.peak / torque, found.travel / travel)
+                if over <= 1.0:
+                    return found
+            share *= (1.0 - NEAR) / over
         return None
 
-    def designed(self, seeds: Sequence[Experiment], torque: float, travel: float) -> Experiment:
-        """The torque within the limits that tells most, from the best of the seeds."""
-        kept = [one for one in (self.keeping(seed, torque, travel) for seed in seeds) if one is not None]
+    def designed(
+        self, standard: dict[str, tuple[Vector, Vector]], torque: float, travel: float
+    ) -> Experiment:
+        """The torque within the limits that tells most, from the best of the standard ones."""
+        each = {name: self.within("planned", *levels, torque, travel) for name, levels in standard.items()}
+        kept = {name: one for name, one in each.items() if one is not None}
         if not kept:
             raise InputError(
                 f"max_torque = {torque:.4g} N m, max_travel = {travel:.4g} rad: no experiment keeps them, "
                 "however small its torque; raise the limit."
             )
-        seed = min(kept, key=lambda one: one.score)
-        durations, levels = self._pieces(seed)
+        seed = min(kept, key=lambda name: kept[name].score)
+        durations = standard[seed][0]
+        pieces = math.ceil(PIECES / durations.size)
+        levels = np.repeat(kept[seed].profile.at(np.cumsum(durations) - durations), pieces)
+        durations = np.repeat(durations / pieces, pieces)
         scale = float(np.max(np.abs(levels)))
         lower = max(min(float(levels.min()), float(self.drive.minimum_torque)) / scale, -WIDER)
         upper = min(float(self.drive.Ms) / scale, WIDER)
-
-        def limited(shares: Vector) -> Vector:
-            """Levels within the bounds, made smaller until some positions keep the limits."""
-            shares = np.clip(shares, lower, upper)
-            for _ in range(3):
-                over = self.excess(*steps_of(durations, scale * shares), torque, travel) + NEAR
-                if over <= 0.0:
-                    break
-                shares = shares * (1.0 - NEAR) / (1.0 + over)
-            return np.asarray(shares)
-
         tried: list[tuple[float, Vector]] = []
 
         def score(shares: Vector) -> float:
-            kept = scale * limited(shares)
-            tried.append((self.experiment("planned", durations, kept, rough=True).score, kept))
+            """Of levels within the bounds, made smaller until some positions keep the limits."""
+            played = scale * np.clip(shares, lower, upper)
+            for _ in range(3):
+                over = self.over(durations, played, torque, travel) + NEAR
+                if over <= 1.0:
+                    break
+                played = played * (1.0 - NEAR) / over
+            # a design needs the slope of what is unknown
+            halves = self.halves(*steps_of(durations, played), ROUGH)
+            widths = {one.name: self.width(one, x, half) for one, x, half in halves}
+            tried.append((_score([widths[name] for name in self.wanted or widths]), played))
             return math.log(tried[-1][0])
 
+        self.progress("planned")
         generator = np.random.default_rng(0)
         draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
-        options = {"rhobeg": SPREAD, "maxiter": TRIALS}
-        minimize(score, min(draws, key=score), method="COBYLA", options=options)
+        minimize(score, min(draws, key=score), method="COBYLA", options={"rhobeg": SPREAD, "maxiter": TRIALS})
         tried.sort(key=lambda one: one[0])
-        best = seed
-        for _, each in tried[: EVERY * EXACTLY : EVERY]:
-            exact = self.keeping(self.experiment("planned", durations, each), torque, travel)
-            best = min((one for one in (best, exact) if one is not None), key=lambda one: one.score)
-        by = f'"{seed.name}"' if best is seed else f'COBYLA, from "{seed.name}"'
-        return replace(best, name="planned", found_by=by)
-
-    def _pieces(self, seed: Experiment) -> tuple[Vector, Vector]:
-        """Durations and levels of a seed, cut into more pieces with edges on samples."""
-        edges = np.append(edges_of(seed), seed.end)
-        each = math.ceil(PIECES / (edges.size - 1))
-        cut = np.concatenate([np.linspace(*ends, each, endpoint=False) for ends in pairwise(edges)])
-        period = max(self.period, seed.end / ROUGH)
-        cut = np.unique(np.round(cut / period)) * period
-        return np.diff(np.append(cut, seed.end)), seed.profile.at(cut)
-
-
-def edges_of(one: Experiment) -> Vector:
-    """Where the levels of an experiment begin, s."""
-    return np.unique(np.concatenate([[0.0], one.profile.time]))[: None if one.profile.end < one.end else -1]
+        exact = (self.within("planned", durations, played, torque, travel) for _, played in tried[:EXACTLY])
+        return min((one for one in (kept[seed], *exact) if one is not None), key=lambda one: one.score)

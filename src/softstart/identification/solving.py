@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Final
@@ -15,30 +14,22 @@ from scipy.stats import chi2
 from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
-from softstart.errors import InputError, SimulationError, listed
-from softstart.identification.chains import reduced_drive, reduction_notes
-from softstart.identification.fitting import (
-    MOST_RIPPLE,
-    STEP,
-    Fitter,
-    Point,
-    Progress,
-    agreeing,
-)  # fmt: skip
-from softstart.identification.logs import Log, TorqueIs
+from softstart.errors import InputError, listed
+from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Progress, agreeing
+from softstart.identification.logs import TURN, Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
-from softstart.identification.planning import plan_experiments
 from softstart.identification.result import AT_LIMIT, Estimate, Identification
 from softstart.identification.unknowns import FREE, Unknown, chosen, unknowns_of, usual, values_of
 from softstart.parallel import on_one_thread
-from softstart.quantities import show, to_si
+from softstart.quantities import show
+from softstart.vibration import reduce_chain
 
-CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
+DOMINANT: Final = 0.5  # of all gaps of a chain, at the motor shaft
 SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
 UNSETTLED: Final = 4.0  # gain of the likelihood by another step, from which the fit is none
-CHANCE: Final = 1e-5  # that errors alone look like this
+CHANCE, INDEPENDENT = 1e-5, 1e-4  # that errors alone leave such a slow torque, such correlations
 WAVES: Final = 20  # torques that change slowly, of which none must be left
 LAGS: Final = 20  # samples over which what is left must not be correlated
 TOO_NOISY: Final = 5.0  # standard deviations of a variance that is larger than the encoder explains
@@ -58,7 +49,6 @@ def identify(
     rated_torque: float | str | None = None,
     searches: int = 12,
     seed: int = 0,
-    time_limit: float | str | None = None,
     progress: Progress | None = None,
 ) -> Identification:
     """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
@@ -73,10 +63,10 @@ def identify(
     Parameters
     ----------
     logs : Log, path, or sequence of them
-        Logs of one drive, each beginning at standstill, or their CSV or MDF files (`Log.load`).
+        Logs of one drive, each beginning at standstill, or their CSV files (`Log.load`).
     drive : Drive, Chain or str
         The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
-        dominant gap the two masses that stand for it are found, and the error of that is predicted. The
+        dominant gap the two masses that stand for it are found. The
         position in the gap is free for each log where the load is reactive or the drive says "unknown".
     free : iterable of str, optional
         What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping, load
@@ -95,16 +85,14 @@ def identify(
         At most so many searches.
     seed : int
         Of the points at which searches begin.
-    time_limit : float or str, optional
-        Time in s, after which the best fit so far is the answer, without intervals.
     progress : callable, optional
         Called with a text that says what is being done.
 
     Returns
     -------
     Identification
-        Drive, intervals (none where the drive does not explain the logs, or time was short), what is
-        unknown and why, what the logs show that the model has not.
+        Drive, intervals (none where the drive does not explain the logs), what is unknown and why, what the
+        logs show that the model has not.
 
     Raises
     ------
@@ -125,7 +113,6 @@ def identify(
     D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
     Analysis, 1988; docs/identification.md.
     """
-    began = time.perf_counter()
     drive = load_machine(drive) if isinstance(drive, str) else drive
     machine, drive = drive, reduced_drive(drive)
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
@@ -135,8 +122,6 @@ def identify(
         "columns": columns, "torque_is": torque_is, "torque_constant": torque_constant,
         "rated_torque": drive.rated if rated_torque is None else rated_torque,
     }  # fmt: skip
-    rated = "" if drive.rated_torque or drive.rated is None else f" in % of {drive.rated:.5g} N m"
-    power = ", rated_power/rated_speed"
     read = [one if isinstance(one, Log) else Log.load(one, **files) for one in given]
     read = [one.summed(float(drive.encoder_lines)) for one in read]
     if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
@@ -147,39 +132,21 @@ def identify(
     base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
     unknowns = unknowns_of(asked, drive, read, [moving for _ in read])
     fitter = Fitter.of([LogModel.of(one, base) for one in read], unknowns, progress)
-    limit = None if time_limit is None else float(to_si(time_limit, "s", name="time_limit"))
-    deadline = math.inf if limit is None else began + limit
-    minima = fitter.search(searches, seed, deadline)
+    minima = fitter.search(searches, seed)
     best = fitter.refined(minima[0][0])
     doubts, estimates = misfits(fitter, best), list[Estimate]()
     if not doubts:
-        timed = replace(fitter, progress=_until(deadline, fitter.progress))
-        try:
-            timed.progress("other explanations")
-            best, others = timed.explanations(timed.valued(best, best), bool(_untold(timed, best)))
-            doubts = misfits(fitter, best)
-            estimates = [] if doubts else _estimates(timed, best, others)
-        except _TimeIsUpError:
-            doubts = [
-                f"The time limit of {limit:g} s came before the intervals: none is stated, and another drive "
-                "may explain the logs as well. Remedy: a longer --time-limit, or fewer samples."
-            ]
+        fitter.progress("other explanations")
+        best, others = fitter.explanations(fitter.valued(best, best), bool(_untold(fitter, best)))
+        doubts = misfits(fitter, best)
+        estimates = [] if doubts else _estimates(fitter, best, others)
     estimates = estimates or _without_intervals(unknowns, best.x)
-
-    def told(log: Log) -> dict[str, float]:
-        """What another log tells, by the fit alone."""
-        other = Fitter.of([LogModel.of(log, base)], unknowns_of(asked, drive, [log], [moving]), progress)
-        point = other.refined(other.search(1, seed)[0][0])
-        lost = [] if misfits(other, point) else _untold(other, point)
-        each = enumerate(zip(other.unknowns, point.x.tolist(), strict=True))
-        return {one.name: one.value(x) for i, (one, x) in each if one.log is None and i not in lost}
-
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     notes = [
-        *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
-        *reduction_notes(machine, drive, read[0], told),
+        *(f"{one.name}: {note}" for one in read for note in one.notes),
+        *_left_out(machine),
         *doubts,
-        *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
+        *([] if doubts else _unknown(estimates)),
         *_other_scale(drive, drive.replace(**changes)),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
@@ -193,29 +160,44 @@ def identify(
         ripple=best.sizes.ripple,
         searches=len(minima),
         agreed=agreeing(minima),
-        seconds=time.perf_counter() - began,
         notes=tuple(notes),
         residuals=tuple(fitter.left(best)),
     )
 
 
-class _TimeIsUpError(Exception):
-    """The time of a fit is up."""
+def reduced_drive(machine: Any) -> Drive:
+    """The drive of two masses that stands for a machine; refused where no gap is the larger part of all.
+
+    >>> reduced_drive(Chain.load("crane-4-mass"))
+    Traceback (most recent call last):
+    softstart.errors.InputError: drive = Crane travel drive as a chain of four masses: its widest gap is 40 %
+    of all; ...
+    """
+    gaps = machine.gaps
+    whole = float(gaps.sum())
+    if whole > 0.0 and float(gaps.max()) <= DOMINANT * whole:
+        raise InputError(
+            f"drive = {machine.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
+            "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
+        )
+    drive: Drive = machine.two_masses
+    return drive
 
 
-def _until(deadline: float, progress: Progress) -> Progress:
-    """Progress that is refused after a deadline."""
-
-    def timed(text: str) -> None:
-        if time.perf_counter() > deadline:
-            raise _TimeIsUpError
-        progress(text)
-
-    return timed
+def _left_out(chain: Any) -> list[str]:
+    """What the reduction of more than two masses leaves out."""
+    if len(chain.mass_names) <= 2:
+        return []
+    first, second = (reduce_chain(chain, force=True).vibration.Omega[1:3] / TURN).tolist()
+    return [
+        f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it, with "
+        f"its first natural frequency, {first:.4g} Hz. Those from {second:.4g} Hz on are left out, and the "
+        "intervals do not hold the error of that."
+    ]
 
 
 def _source(drive: Drive, logs: Sequence[Log]) -> str:
-    names = ", ".join(one.name for one in logs[:3]) + (f" and {len(logs) - 3} more" if len(logs) > 3 else "")
+    names = ", ".join(one.name for one in logs)
     return f"identified from {names}" + (f"; else: {drive.source}" if drive.source else "")
 
 
@@ -249,12 +231,7 @@ def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tupl
 
 def _check_inertia(log: Log, drive: Drive) -> None:
     """Refuse a log whose units cannot be right: torque over acceleration is not near the inertia guessed."""
-    seen = np.isfinite(log.values)
-    time, values = log.time[seen], log.values[seen]
-    speed = values if log.kind == "speed" else np.gradient(values, time)
-    impulse = np.concatenate(
-        [[0.0], np.cumsum(0.5 * (log.torque[1:] + log.torque[:-1]) * np.diff(log.time))]
-    )[seen]
+    speed, impulse = log.moved
     inertia = float(np.max(np.abs(impulse))) / max(float(np.max(np.abs(speed))), 1e-300)
     low, high = float(drive.J1), float(drive.J1 + drive.J2)
     if low / SUSPECT <= inertia <= high * SUSPECT:
@@ -300,7 +277,6 @@ def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Est
             continue
         fitter.progress(f"interval of {one.title}")
         ends = [fitter.end(i, sign, half, best, others) for sign in (-1.0, 1.0)]
-        bent = max(abs(ends[0] - x + half), abs(ends[1] - x - half)) > CURVED * half
         known = i not in untold and one.known(x, 0.5 * (ends[1] - ends[0]))
         known = known and not (one.kind == "position" and "gap" in lost)  # a share of the gap
         limited = one.limited(x) or (known and any(map(one.limited, ends)))
@@ -308,7 +284,7 @@ def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Est
         if reason:
             lost.add(one.name)
         lower, upper = sorted(map(one.value, ends))
-        found.append(Estimate(one.title, one.value(x), lower, upper, not reason, bent, reason))
+        found.append(Estimate(one.title, one.value(x), lower, upper, not reason, reason))
     return found
 
 
@@ -324,30 +300,18 @@ def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
     return "the motion of the motor hardly depends on it in these logs"
 
 
-def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) -> list[str]:
-    """What is unknown, why, and the experiment that would tell it."""
-    unknown = [one for one in estimates if not one.known and not one.name.startswith(POSITION)]
-    if not unknown:
-        return []
-    names = [one.name for one in unknown]
-    drive = drive.replace(**{one.name: 0.5 * one.upper for one in unknown if one.value == 0.0})
+def _unknown(estimates: Sequence[Estimate]) -> list[str]:
+    """What is unknown, why, and what helps."""
     reasons: dict[str, list[str]] = {}
-    for one in unknown:
-        reasons.setdefault(one.reason, []).append(one.name)
-    told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
+    for one in estimates:
+        if not one.known and not one.name.startswith(POSITION):
+            reasons.setdefault(one.reason, []).append(one.name)
+    if not reasons:
+        return []
+    remedy = "a log of an experiment that tells it (softstart plan)"
     if AT_LIMIT in reasons:
-        return [f"Unknown: {told}. Remedy: begin from another guess of {listed(reasons[AT_LIMIT])} (--set)."]
-    period = float(np.median(np.diff(logs[0].time)))
-    try:
-        tried = plan_experiments(drive, log_period=period, optimise=False).experiments
-    except (InputError, SimulationError):  # too short for a log as slow as this one, or no motion at all
-        return [f"Unknown: {told}. Remedy: take samples more often than each {1e3 * period:.3g} ms."]
-    would = [one for one in tried if all(one.widths.get(name, math.inf) < math.inf for name in names)]
-    remedy = "give what is known of it, and leave it out of --free: no standard experiment would tell it"
-    if would:
-        best = min(would, key=lambda one: max(one.widths[name] for name in names))
-        widths = listed([f"{name} within {100.0 * best.widths[name]:.2g} %" for name in names])
-        remedy = f'a log of "{best.name}" would tell {widths} (softstart plan)'
+        remedy = f"begin from another guess of {listed(reasons[AT_LIMIT])} (--set)"
+    told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
     return [f"Unknown: {told}. Remedy: {remedy}."]
 
 
@@ -365,9 +329,13 @@ def _other_scale(guess: Drive, found: Drive) -> list[str]:
 
 
 def misfits(fitter: Fitter, best: Point) -> list[str]:
-    """What the logs show that the model has not, each tried as a torque of its own shape."""
-    sizes = best.sizes
-    notes = _effects(fitter, best)
+    """What the logs show that the model has not."""
+    sizes, shown = best.sizes, list[str]()
+    largest = fitter.largest_torque
+    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
+    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
+        share = 100.0 * sizes.ripple / largest
+        shown.append(f"a torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest")
     slow = min(
         _slow_torque(
             one.rotation @ one.response / root[:, None], one.jacobian / root[:, None], one.residual / root
@@ -375,40 +343,35 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
         for one in best.spots
         for root in [np.sqrt(one.variance(sizes))]
     )
+    if slow < CHANCE:
+        shown.append(f"a torque that changes slowly (chance {slow:.1g})")
     counted = all(one.log.kind == "angle" and one.log.count for one in fitter.models)
-    excess = sizes.noise**2 - 1.0 - TOO_NOISY * math.sqrt(2.0 / sum(one.residual.size for one in best.spots))
-    if slow < CHANCE or (counted and excess > 0.0):
-        left = (
-            f"A torque that changes slowly is left (chance {slow:.1g})"
-            if slow < CHANCE
-            else f"What is left of the angle is {sizes.noise:.3g} times what the encoder rounds"
-        )
-        notes.append(
-            f"{left}: something else moves this drive (another friction or load, cogging, a torque that was "
-            "not realised), or the times of the samples are not exact."
-        )
-    largest = fitter.largest_torque
-    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
-    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
-        share = 100.0 * sizes.ripple / largest
-        notes.append(
-            f"A torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest, is "
-            "needed to explain the logs: something else moves this drive (a second gap, a cut or clipped "
-            "signal, another kind of load), or the torque signal is poor."
-        )
+    samples = sum(one.residual.size for one in best.spots)
+    if counted and sizes.noise**2 - 1.0 > TOO_NOISY * math.sqrt(2.0 / samples):
+        shown.append(f"an angle {sizes.noise:.3g} times as far off as the encoder rounds")
     for model, spot in zip(fitter.models, best.spots, strict=True):
-        left_over = spot.innovations(sizes)
-        chance = _whiteness(left_over)
-        if chance < 1e-4:
-            notes.append(
-                f"{model.log.name}: what is left is not independent from sample to sample (chance "
-                f"{chance:.1g}): the log holds something that the model has not, as a second gap, an elastic "
-                "part, a filter."
-            )
-        far = int(np.sum(np.abs(left_over) > FAR))
-        if far > 2 + 0.005 * left_over.size:
-            notes.append(f"{model.log.name}: {far} samples lie more than {FAR:g} standard deviations off.")
-    notes.extend(_unsettled(fitter, best))
+        left = spot.innovations(sizes)
+        if (chance := _whiteness(left)) < INDEPENDENT:
+            shown.append(f"{model.log.name}: errors not independent of each other (chance {chance:.1g})")
+        if (far := int(np.sum(np.abs(left) > FAR))) > 2 + 0.005 * left.size:
+            shown.append(f"{model.log.name}: {far} samples more than {FAR:g} standard deviations off")
+    notes = _effects(fitter, best)
+    if shown:
+        notes.append(
+            "Something else moves this drive (another friction or load, cogging, a second gap, an elastic "
+            "part, a demand that was not realised), or the signals are filtered, clipped, cut or poor: "
+            f"{'; '.join(shown)}."
+        )
+    wider = [
+        replace(one, lower=one.lower - (0.0 if one.is_friction else 1e3), upper=one.upper + 1e3)
+        if one.kind in ("logarithm", "power")
+        else one
+        for one in fitter.unknowns
+    ]
+    if replace(fitter, unknowns=tuple(wider)).step(best)[1] > UNSETTLED:
+        ends = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
+        where = f"beyond the limit of the search for {listed(ends)}" if ends else "elsewhere"
+        notes.append(f"The fit would be better {where}: begin from another guess (--set).")
     if notes:
         notes.append(
             "The drive does not explain the logs: the values are its best fit, and no interval is stated."
@@ -436,7 +399,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         shapes.append(math.sqrt(model.block) * spot.response.sum(axis=1))
         for shape, column in zip(shapes, columns.values(), strict=True):
             column.append(spot.rotation @ shape / np.sqrt(spot.variance(best.sizes)))
-    found, amount, error = "", 0.0, 1.0 / SURE
+    sure = [(SURE, "", 0.0, 0.0)]
     for name, parts in columns.items():
         shape = np.concatenate(parts)
         alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
@@ -446,36 +409,19 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         size, deviation = -float(alone @ residual) / strength, 1.0 / math.sqrt(strength)
         drives = size < -had.get(name, math.inf)
         far = name == "offset" and abs(size) > fitter.largest_torque  # of a small effect alone J tells
-        if not (drives or far) and abs(size) / deviation > max(SURE, abs(amount) / error):
-            found, amount, error = name, size, deviation
-    if found == "offset":
-        return [
-            f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
-            "the model has not: gap and load torque may be far off."
-        ]
-    if found:
-        one = PARAMETERS[found]
-        return [
-            f"The logs show {one.meaning} of {had[found] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
-            f"the drive has {had[found]:.3g}: gap and load torque may be far off. "
-            f"Remedy: find it too, --free +{one.path}."
-        ]
-    return []
-
-
-def _unsettled(fitter: Fitter, best: Point) -> list[str]:
-    """That the likelihood still grows from where the fit ended, beyond a limit of the search or before it."""
-    shared = np.array([one.kind in ("logarithm", "power") for one in fitter.unknowns])
-    frictions = np.array([one.is_friction for one in fitter.unknowns])
-    reach = np.where(shared, 1e3, 0.0)
-    if fitter.step(best, beyond=(np.where(frictions, 0.0, reach), reach))[1] < UNSETTLED:
+        if not drives and not far:
+            sure.append((abs(size) / deviation, name, size, deviation))
+    _, found, amount, error = max(sure)
+    if not found:
         return []
-    limits = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
-    if not limits:
-        return ["The search for the most likely drive did not settle: begin from another guess (--set)."]
+    what, unit, remedy = "an offset of the torque signal", "N m", ""
+    if found != "offset":
+        one = PARAMETERS[found]
+        what, unit, remedy = one.meaning, one.unit, f" Remedy: find it too, --free +{one.path}."
+    given = had.get(found, 0.0)
     return [
-        f"The fit would be better beyond the limit of the search for {listed(limits)}: begin from another "
-        "guess (--set), unless something else moves this drive."
+        f"The logs show {what} of {given + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
+        f"{given:.3g}: gap and load torque may be far off.{remedy}"
     ]
 
 

@@ -183,7 +183,11 @@ def usual(drive: Drive, *, lag: bool) -> list[str]:
 
 
 def chosen(
-    free: Iterable[str] | None, usual: Sequence[str], possible: Sequence[str], where: str
+    free: Iterable[str] | None,
+    usual: Sequence[str],
+    possible: Sequence[str],
+    where: str,
+    key: str = "free",
 ) -> list[str]:
     """The parameters to find: those named, or with a plus before a name the usual ones and that one.
 
@@ -201,6 +205,6 @@ def chosen(
         if name not in possible:
             near = nearest(name, possible)
             hint = f"did you mean {near}?" if near else f"those are {', '.join(possible)}."
-            raise InputError(f"free = {show(given)}: it is no parameter that {where} can tell; {hint}")
+            raise InputError(f"{key} = {show(given)}: it is no parameter that {where} can tell; {hint}")
         found.append(name)
     return list(dict.fromkeys(found))

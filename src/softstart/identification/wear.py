@@ -1,14 +1,12 @@
-"""Wear: how the gap grows from identification to identification, and which strategies stand it."""
+"""Wear: how the gap grows from identification to identification, and when it reaches a limit."""
 
 from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -16,42 +14,25 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import varied
-from softstart.controller import Controller
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
 from softstart.quantities import show, to_si
-from softstart.start.comparison import INTERVAL, compared, make_controllers
-from softstart.start.recommendation import Row
+from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
 NOT_BY_CHANCE: Final = 3.0  # standard deviations by which a parameter has changed
 CROOKED: Final = 0.01  # chance below which the gap does not grow along a line
-DATE = re.compile(r"(?<!\d)(\d{4})(?:-(\d{2})(?:-(\d{2}))?)?(?!\d)")
 
 
 @dataclass(frozen=True)
 class Line:
-    """The growth of the gap by weighted least squares: `start + slope t`, t in years.
+    """The growth of the gap by weighted least squares: `start + slope t`, t in years."""
 
-    Attributes
-    ----------
-    start, slope : float
-        Gap at t = 0, rad, and its growth, rad a year.
-    covariance : array of shape (2, 2)
-        Of both, from the intervals of the gaps, wider by as much as the gaps scatter more than these say.
-    chance : float
-        That gaps with such intervals scatter as much about a line; 1 for two gaps.
-    quantile : float
-        Of 95 %: normal, or Student's with n - 2 degrees of freedom where the n gaps scatter more than their
-        intervals say, so that the variance is theirs.
-    """
-
-    start: float
-    slope: float
-    covariance: Matrix
-    chance: float
-    quantile: float
+    start: float  # gap at t = 0, rad
+    slope: float  # rad a year
+    covariance: Matrix  # of both, wider where the gaps scatter more than their intervals say
+    chance: float  # that gaps with such intervals scatter as much about a line; 1 for two gaps
+    quantile: float  # of 95 %: normal, or Student's where the scatter of the gaps is the variance
 
     @staticmethod
     def through(years: Vector, gaps: Vector, deviations: Vector) -> Line:
@@ -111,23 +92,16 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Wear:
-    """How the gap of a drive grows, and what its strategies do when it has reached its limit.
+    """How the gap of a drive grows, and when it reaches its limit.
 
     Attributes
     ----------
-    found : tuple of Identification
-        The identifications, the oldest first.
-    names : tuple of str
-        What they are called.
-    dates : tuple of datetime.date
-        When their logs were taken.
+    found, names, dates : tuple
+        The identifications, the oldest first; what they are called, and when their logs were taken.
     line : Line
         The growth of the gap.
     limit : float or None
         The gap at which the drive is worn, rad.
-    now, then : tuple of Row
-        Each strategy on the drive found last, and on that drive with the gap at the limit; set up for the
-        drive found last in both, each with intervals over all that its logs leave open.
     notes : tuple of str
         What else has changed, and what the line cannot tell.
 
@@ -140,7 +114,7 @@ class Wear:
     >>> plan = {"log_period": 8e-3, "ripple": 1.0}
     >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
     ...     for one in (crane, worn)]
-    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15, controllers=["direct"])
+    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
     >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
     True
 
@@ -155,8 +129,6 @@ class Wear:
     dates: tuple[date, ...]
     line: Line
     limit: float | None
-    now: tuple[Row, ...]
-    then: tuple[Row, ...]
     notes: tuple[str, ...]
 
     @property
@@ -190,10 +162,6 @@ class Wear:
             **growth,
             "limit": self.limit,
             **({} if self.worn is None else {k: v and str(v) for k, v in zip(worn, self.worn, strict=True)}),
-            "strategies": [
-                {"now": one.summary(), "at_the_limit": two.summary()}
-                for one, two in zip(self.now, self.then, strict=True)
-            ],
             "notes": list(self.notes),
         }
 
@@ -213,10 +181,8 @@ class Wear:
 
 def follow_wear(
     found: Sequence[Identification | str | os.PathLike[str]],
-    dates: Sequence[str | date] | None = None,
+    dates: Sequence[str | date],
     limit: float | str | None = None,
-    *,
-    controllers: Sequence[str | Controller] | None = None,
 ) -> Wear:
     """Follow the gap of a drive through its identifications, and say when it is worn.
 
@@ -224,18 +190,15 @@ def follow_wear(
     ----------
     found : sequence of Identification or path
         Two or more identifications of one drive, or the folders that `softstart identify --out` wrote.
-    dates : sequence of str or date, optional
-        When their logs were taken, as "2026-05-31", "2026-05" (its middle) or "2026". By default what stands
-        in the names of the folders.
+    dates : sequence of str or date
+        When their logs were taken, as "2026-05-31".
     limit : float or str, optional
-        Gap at which the drive is worn, rad or with a unit: when it is reached, and what strategies do then.
-    controllers : sequence of str or Controller, optional
-        The strategies, by default all that need no parameter.
+        Gap at which the drive is worn, rad or with a unit.
 
     Returns
     -------
     Wear
-        Growth of the gap with its interval, date of the limit, strategies then.
+        Growth of the gap with its interval, and the date of the limit.
 
     Raises
     ------
@@ -255,70 +218,41 @@ def follow_wear(
     given = [found] if isinstance(found, Identification | str | os.PathLike) else list(found)
     if len(given) < 2:
         raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
-    names = [
-        f"log {i}" if isinstance(one, Identification) else os.fspath(one) for i, one in enumerate(given, 1)
-    ]
-    if dates is None and any(isinstance(one, Identification) for one in given):
-        raise InputError("dates: give the date of each identification, as 2026-05-31.")
-    told = [Path(name).name for name in names] if dates is None else list(dates)
-    if len(told) != len(given):
-        raise InputError(f"dates: there are {len(told)} for {len(given)} identifications; give one for each.")
-    days = [_date_of(one, dates is None) for one in told]
-    each = [one if isinstance(one, Identification) else Identification.load(one) for one in given]
-    for name, one in zip(names, each, strict=True):
-        gap = next((estimate for estimate in one.estimates if estimate.name == "gap"), None)
+    names = [f"log {i}" if isinstance(one, Identification) else str(one) for i, one in enumerate(given, 1)]
+    if len(dates) != len(given):
+        raise InputError(
+            f"dates: there are {len(dates)} for {len(given)} identifications; give the date of each, as "
+            "2026-05-31."
+        )
+    rows = []
+    for when, name, one in zip(dates, names, given, strict=True):
+        read = one if isinstance(one, Identification) else Identification.load(one)
+        gap = next((estimate for estimate in read.estimates if estimate.name == "gap"), None)
         if gap is None or not gap.known:
-            raise InputError(
-                f"wear: {name} does not know the gap; {gap.reason if gap else 'it was not free'}."
-            )
-    order = sorted(range(len(days)), key=days.__getitem__)
-    days, names, each = ([one[i] for i in order] for one in (days, names, each))  # type: ignore[assignment]
+            reason = gap.reason if gap else "it was not free"
+            raise InputError(f"wear: {name} does not know the gap; {reason}.")
+        rows.append((_date_of(when), name, read))
+    rows.sort(key=lambda row: row[0])
+    days, names, each = map(list, zip(*rows, strict=True))
     if days[0] == days[-1]:
         raise InputError(f"dates: all identifications are of {days[0]}; growth takes two dates.")
-    years = np.array([(one - days[0]).days / YEAR for one in days])
     gaps = [one["gap"] for one in each]
     line = Line.through(
-        years,
+        np.array([(one - days[0]).days / YEAR for one in days]),
         np.array([one.value for one in gaps]),
         np.array([0.5 * (one.upper - one.lower) / INTERVAL.quantile for one in gaps]),
     )
     worn = None if limit is None else float(to_si(limit, "rad", name="limit"))
     if worn is not None and not worn > 0.0:
         raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
-    now: tuple[Row, ...] = ()
-    then: tuple[Row, ...] = ()
-    if worn is not None:
-        last, drawn = each[-1].drive, each[-1].draws()
-        made = make_controllers(controllers, {})
-        now = tuple(compared(last, one, None, worst_case=(), drawn=drawn) for one in made)
-        wide, all_wide = last.with_gap(worn), varied(drawn, {"gap": worn})
-        then = tuple(compared(wide, one, None, None, last, (), all_wide) for one in made)
-    return Wear(
-        tuple(each), tuple(names), tuple(days), line, worn, now, then, tuple(_notes(each, days, line))
-    )
+    return Wear(tuple(each), tuple(names), tuple(days), line, worn, tuple(_notes(each, line)))
 
 
-def _date_of(given: object, from_name: bool) -> date:
-    """A date; a month or a year alone stands for its middle.
-
-    >>> _date_of("2026-05", False), _date_of("found-2026-05-31", True)
-    (datetime.date(2026, 5, 15), datetime.date(2026, 5, 31))
-    """
-    if isinstance(given, date):
-        return given
-    text = str(given)
-    found = DATE.search(text) if from_name else DATE.fullmatch(text.strip())
+def _date_of(given: str | date) -> date:
     try:
-        if found is not None:
-            year, month, day = (int(part) if part else 0 for part in found.groups())
-            return date(year, month or 7, day or (15 if month else 1))
+        return given if isinstance(given, date) else date.fromisoformat(given)
     except ValueError:
-        pass
-    raise InputError(
-        f"dates: the folder {show(text)} has no date in its name, as 2026-05-31; give --dates."
-        if from_name
-        else f"dates: {show(text)} is no date; write one as 2026-05-31, 2026-05 or 2026."
-    )
+        raise InputError(f"dates: {show(given)} is no date; write one as 2026-05-31.") from None
 
 
 def _date_after(first: date, years: float) -> date | None:
@@ -329,7 +263,7 @@ def _date_after(first: date, years: float) -> date | None:
     return date.fromordinal(round(day)) if 1.0 <= day <= date.max.toordinal() else None
 
 
-def _notes(each: Sequence[Identification], days: Sequence[date], line: Line) -> list[str]:
+def _notes(each: Sequence[Identification], line: Line) -> list[str]:
     """What else has changed, and what the line cannot tell."""
     notes = []
     growth, lower, _ = line.growth
@@ -343,22 +277,14 @@ def _notes(each: Sequence[Identification], days: Sequence[date], line: Line) -> 
             f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
             "runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the intervals."
         )
-    first, last = each[0], each[-1]
-    both = {one.name for one in first.shared if one.known} & {one.name for one in last.shared if one.known}
-    for one in (one for one in first.shared if one.name in both - {"gap"}):
-        other = last[one.name]
-        change = math.log(abs(other.value / one.value))
-        spread = math.hypot(
-            *(0.5 * math.log(abs(e.upper / e.lower)) / INTERVAL.quantile for e in (one, other))
-        )
-        if abs(change) > NOT_BY_CHANCE * spread:
+    first, last = ({one.name: one for one in found.shared if one.known} for found in (each[0], each[-1]))
+    for name in (name for name in first if name in last and name != "gap"):
+        both = first[name], last[name]
+        spread = math.hypot(*(0.5 * (one.upper - one.lower) / INTERVAL.quantile for one in both))
+        if abs(both[1].value - both[0].value) > NOT_BY_CHANCE * spread:
             notes.append(
-                f"{one.name} has changed from {one.value:.4g} to {other.value:.4g} between {days[0]} "
-                f"and {days[-1]}, by more than its intervals: "
-                + (
-                    "no wear does that; look at the scale of the torque signal."
-                    if one.name == "motor_inertia"
-                    else "another load, temperature, or wear of more than the gap."
-                )
+                f"{name} has changed from {both[0].value:.4g} to {both[1].value:.4g}, by more than its "
+                "intervals: another load or temperature, wear of more than the gap, or, if it is an inertia, "
+                "another scale of the torque signal."
             )
     return notes

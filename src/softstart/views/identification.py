@@ -15,14 +15,13 @@ from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, Column, Table, number, short
+from softstart.views.numbers import NOTHING, Table, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
     from softstart.identification.planning import Experiment, Plan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
-    from softstart.start.recommendation import Row
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
 FIGURES = {"peak shaft torque, N m": "peak", "load moves, rad": "travel", "lasts, s": "end"}
@@ -149,7 +148,8 @@ def plan_table(plan: Plan) -> Table:
 
 def plan_sheet(plan: Plan) -> Sheet:
     """What is shown of a plan of experiments."""
-    encoder = f"{plan.lines:g} encoder lines" if plan.lines else "an ideal encoder"
+    lines = float(plan.drive.encoder_lines)
+    encoder = f"{lines:g} encoder lines" if lines else "an ideal encoder"
     table = plan_table(plan)
     files: dict[str, str | Writer] = {"plan.csv": table_file(table)}
     for one in plan.experiments:
@@ -167,7 +167,6 @@ def plan_sheet(plan: Plan) -> Sheet:
         ],
         tables=[table],
         found=[f'"{plan.best.name}" tells most{f", and leaves {lost} unknown" if lost else ""}.'],
-        notes=[f"{one.name}: {one.found_by}" for one in plan.experiments if one.found_by != "standard"],
         figures={"experiments": partial(plan_figure, plan)},
         files=files,
         machine=plan.drive,
@@ -215,43 +214,24 @@ def wear_conclusion(wear: Wear) -> list[str]:
     return said
 
 
-def _wear_tables(wear: Wear) -> tuple[Table, Table]:
-    """The gap of each identification; each strategy now and with the gap at its limit."""
-
-    def k_dyn(row: Row) -> list[str]:
-        return [number(row.run.k_dyn, 3), " to ".join(number(end, 3) for end in row.intervals["k_dyn"])]
-
+def wear_sheet(wear: Wear) -> Sheet:
+    """What is shown of wear."""
+    drive = wear.found[-1].drive
     gaps = [
         [str(day), name, *(_digits(value, one) for value in (one.value, one.lower, one.upper))]
         for day, name, one in zip(wear.dates, wear.names, wear.gaps, strict=True)
     ]
-    limited = bool(wear.found[-1].drive.limits)
-    rows = [
-        [now.name, *k_dyn(now), *k_dyn(then), f"{then.intervals['peak_torque'][1]:.4g}",
-         *((now.against_limits, then.against_limits) if limited else ())]
-        for now, then in sorted(zip(wear.now, wear.then, strict=True), key=lambda pair: pair[1].run.k_dyn)
-    ]  # fmt: skip
-    headings = ["strategy", "K_dyn\nnow", "95 %", "K_dyn\nworn", "95 %", "peak to\nN m", "limits now", "worn"]
-    columns = [Column(heading, i in (1, 3, 5)) for i, heading in enumerate(headings[: 8 if limited else 6])]
-    return (
-        Table.of_rows(
-            "Gap, with intervals of 95 %", ("date", "identification"), ("gap rad", "from", "to"), gaps
-        ),
-        Table(f"Strategies now, and with a gap of {short(float(wear.limit or 0.0))} rad", columns, rows),
+    table = Table.of_rows(
+        "Gap, with intervals of 95 %", ("date", "identification"), ("gap rad", "from", "to"), gaps
     )
-
-
-def wear_sheet(wear: Wear) -> Sheet:
-    """What is shown of wear."""
-    drive, tables = wear.found[-1].drive, _wear_tables(wear)
     return Sheet(
         f"{drive.name}: wear of the gap",
         [f"{drive.name}: wear from {wear.dates[0]} to {wear.dates[-1]}"],
-        tables=tables,
+        tables=[table],
         found=wear_conclusion(wear),
         notes=wear.notes,
         figures={"wear": wear.plot},
-        files={"wear.csv": table_file(tables[0])},
+        files={"wear.csv": table_file(table)},
         machine=drive,
     )
 

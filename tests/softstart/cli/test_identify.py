@@ -48,7 +48,7 @@ def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> N
         ),
         (
             ["plan", "crane-4amtkf", "--set", "load.kind=reactive", "--wanted", "gpa"],
-            '--wanted = "gpa": it is no parameter that is to be found; did you mean gap?',
+            '--wanted = "gpa": it is no parameter that this plan can tell; did you mean gap?',
         ),
         (
             ["identify", "a.csv", "--drive", "crane-4amtkf", "--columns", "torque="],

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.softstart.test_identification_chains import stiff_behind_the_gap
+from tests.softstart.test_identification_chains import chain_log, stiff_behind_the_gap
 
 from softstart import (
     Chain,
@@ -30,8 +30,8 @@ from softstart import (
     tune,
 )  # fmt: skip
 from softstart.controller import make_controller
-from softstart.identification.chains import chain_log, reduced_drive
 from softstart.identification.planning import made_up_log
+from softstart.identification.solving import reduced_drive
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
@@ -116,7 +116,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     assert found.drive == alone.rounded().drive
     assert Drive.from_toml(found.files["identified-drive.toml"]).gap == found.drive.gap
     assert all(plain(note) in text for note in alone.notes)
-    with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none has a name"):
+    with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none is called time"):
         done(tasks.identified, b"a,b\n1,2\n", "rig.csv", drive, "demand", {})
     with pytest.raises(InputError, match="write signal=name"):
         tasks.columns_of("torque")
@@ -125,7 +125,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
 def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path) -> None:
     chain = replace(stiff_behind_the_gap(), units="deg, rpm")
     played = made_up_log(reduced_drive(chain), "two levels, then reverse", log_period=4e-3, ripple=1.0)
-    chain_log(chain, played, 4096.0).to_csv(tmp_path / "rig.csv")
+    chain_log(chain, played).to_csv(tmp_path / "rig.csv")
     found, _, _ = done(tasks.identified, (tmp_path / "rig.csv").read_bytes(), "rig.csv", chain, "demand", {})
     written = identify(tmp_path / "rig.csv", chain, torque_is="demand").rounded().drive
     assert (found.drive.gap, found.drive.stiffness) == (written.gap, written.stiffness)
