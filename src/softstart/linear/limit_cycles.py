@@ -54,8 +54,9 @@ from softstart.linear.plant import in_contact
 from softstart.linear.systems import zeros_of
 from softstart.start.recorded import Recorder
 
-SHARES = np.geomspace(1e-4, 1.0, 400)  # n, of the grid
-SLOW, HOLDING = 1e-4 * math.pi, 10.0  # rad a sample; |1 + L| there with the gap open, of a loop that holds a speed
+SHARES = np.geomspace(1e-4, 1.0, 200)  # n, of the grid
+SLOW = 1e-4 * math.pi  # rad a sample
+HOLDING = 10.0  # |1 + L| there with the gap open, above which a loop holds its speed
 LARGEST = 100.0  # amplitude, in half gaps and mean windups
 AMPLITUDES = 1500  # of the grid
 SETTLING, MEASURED = 60, 10  # periods
@@ -216,8 +217,10 @@ def predicted(softened: Softened, mean_torque: float) -> list[Cycle]:
     return sorted(found, key=lambda one: (one.frequency, one.amplitude))
 
 
-def _on_the_circle(softened: Softened, n: float, near: complex | None = None) -> tuple[complex, Complex, Matrix]:
-    """The pole nearest to the unit circle, or to another one; its vector for a twist of 1 rad; what is read."""
+def _on_the_circle(
+    softened: Softened, n: float, near: complex | None = None
+) -> tuple[complex, Complex, Matrix]:
+    """The pole nearest to the circle, or to another one; its vector for a twist of 1 rad; what is read."""
     poles, vectors, read = softened.poles(n)
     away = np.abs(np.abs(poles) - 1.0) if near is None else np.abs(poles - near)
     vector = vectors[:, int(np.argmin(away))]

@@ -28,21 +28,11 @@ from softstart.arrays import Complex, Matrix, Vector
 from softstart.chain.machines import Machine
 from softstart.linear.law import OperatingPoint, SampledStart, closed
 from softstart.linear.plant import Plant, in_contact, motor_side, sizes_of
-from softstart.linear.systems import (
-    TOLERANCE,
-    Mode,
-    System,
-    frequencies,
-    minimal,
-    modes,
-    observable,
-    zeros_of,
-)
+from softstart.linear.systems import Mode, System, frequencies, modes, moved, zeros_of
 
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
 FRACTIONS = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 49)[:-1])  # of a sample, close near a whole one
 MANY = 20  # samples: a long delay
-COARSEST = 1e-5  # tolerance for what shows in the closed loop
 ROTATION = 1e-3  # of the elastic frequency: slower poles are the rotation as a whole
 ROUNDING = 1e-10  # of the largest pole
 ON_THE_CIRCLE = 1e-9  # poles this near to the unit circle do not count as stable

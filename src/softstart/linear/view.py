@@ -36,7 +36,7 @@ from softstart.linear.law import (
 from softstart.linear.limit_cycles import Cycle, limit_cycles
 from softstart.linear.loop import Loop, Margins
 from softstart.linear.plant import single, sizes_of
-from softstart.linear.systems import Mode, minimal
+from softstart.linear.systems import Mode
 
 if TYPE_CHECKING:
     import control
@@ -146,9 +146,9 @@ class LinearView:
 
     @cached_property
     def variations(self) -> tuple[Loop, ...]:
-        """The same controller on machines of other inertia of the load and stiffness, and with all gaps open.
+        """The same controller with another inertia of the load, another stiffness, and with all gaps open.
 
-        Of a chain the inertia is that of its load mass, and the factor on the stiffness is that of all shafts.
+        Of a chain J2 is its load mass, and the factor on c is that of all shafts.
         """
         if self.own_loop is None:
             return ()
@@ -175,7 +175,7 @@ class LinearView:
 
     @property
     def loop(self) -> control.StateSpace:
-        """L(z), minimal: the negative of the demand in response to a demand fed in; -1 is critical."""
+        """L(z): the negative of the demand in response to a demand fed in; -1 is critical."""
         import control
 
         loop = self._loop()
@@ -183,12 +183,12 @@ class LinearView:
 
     @property
     def controller_system(self) -> control.StateSpace:
-        """The controller's law, minimal: from the measured quantities to the demand in N m."""
+        """The controller's law: from the measured quantities to the demand in N m."""
         import control
 
         loop = self._loop()
         return control.StateSpace(
-            *minimal(loop.point.law), loop.period, inputs=[NAMES[i] for i in loop.start.inputs],
+            *loop.point.law, loop.period, inputs=[NAMES[i] for i in loop.start.inputs],
             outputs=["demand"], name=re.sub(r"\W", "_", self.name) or "controller",
         )  # fmt: skip
 
@@ -222,8 +222,6 @@ class LinearView:
                 "states": list(point.states),
                 "mismatch": point.mismatch,
             },
-            "order_of_loop": own.broken.A.shape[0],
-            "order_of_controller": minimal(point.law).A.shape[0],
             **_margin_figures(own.margins),
             "elastic_frequency": elastic and elastic.frequency,
             "elastic_damping_ratio": elastic and elastic.damping_ratio,
@@ -331,7 +329,7 @@ def _margin_figures(m: Margins) -> dict[str, Any]:
 def _check(*machines: Any) -> None:
     for one in machines:
         if one is not None and not is_machine(one):
-            raise InputError(f"{one!r} is no drive: give a Drive; Drive.load reads one from a file or by name.")
+            raise InputError(f"drive = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
         if one is not None and (one.motor is None or one.target_speed is None):
             raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")
 
