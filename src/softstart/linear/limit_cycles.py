@@ -200,16 +200,16 @@ def predicted(softened: Softened, mean_torque: float) -> list[Cycle]:
     wound = abs(mean_torque) / c
     amplitudes = (wound or half) + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
 
-    def shares(amplitudes: Vector) -> Vector:
-        return np.array([n_at(float(one), half, c, mean_torque) for one in amplitudes])
+    def excess(n: float, amplitudes: Vector) -> Vector:
+        return np.array([n_at(float(one), half, c, mean_torque) for one in amplitudes]) - n
 
     found = []
     for n in softened.crossings():
         pole, vector, read = _on_the_circle(softened, n)
         w = cmath.phase(pole) / softened.period
         lower, upper = (abs(_on_the_circle(softened, n * by, pole)[0]) for by in (1.0 - 1e-5, 1.0 + 1e-5))
-        for amplitude in zeros_of(lambda some, n=n: shares(some) - n, amplitudes):
-            less, more = shares(amplitude * np.array([1.0 - 1e-5, 1.0 + 1e-5]))
+        for amplitude in zeros_of(partial(excess, n), amplitudes):
+            less, more = excess(n, amplitude * np.array([1.0 - 1e-5, 1.0 + 1e-5]))
             demand = amplitude * abs(complex(read[1] @ vector))
             bias = bias_for(mean_torque, amplitude, half, c)
             stable = bool((upper - lower) * (more - less) < 0.0)

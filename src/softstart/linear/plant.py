@@ -108,7 +108,7 @@ def in_contact(
             "a stiffness, or make one mass of the two."
         )
     body = np.concatenate([[0], np.cumsum(~rigid)]).astype(int)  # of each mass
-    inertia = np.bincount(body, mass["J"])
+    inertia = np.bincount(body, mass["J"]).astype(np.float64)
     first = 1 + int((~rigid).sum())  # of the speeds
     unit = np.eye(first + inertia.size)
     w = unit[first + body]  # rows that read the speeds of the masses off the states

@@ -153,9 +153,10 @@ class LinearView:
         if self.own_loop is None:
             return ()
         own, found = self.own_loop, []
+        machine = own.start.machine
         for symbol, key, factors in VARIATIONS:
             for factor in factors:
-                varied = own.machine.with_values({key: factor * own.machine.knob(key).value})
+                varied = machine.with_values({key: factor * machine.knob(key).value})
                 found.append(replace(own, machine=varied, name=f"{symbol} x {factor:g}"))
         return (*found, replace(own, name="all gaps open", open=True))
 

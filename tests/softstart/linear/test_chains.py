@@ -22,7 +22,8 @@ CHAIN = Chain.from_toml(
 @pytest.mark.parametrize(
     ("drive", "controller"),
     [
-        (CRANE, "state-feedback"),
+        (CRANE.replace(damping=0.0, torque_lag=0.0), "current-limit-feedback"),
+        (CRANE, SpeedPI(2.0, 5.0)),
         (CRANE.replace(encoder_lines=1024, computing_delay="0.4 ms"), SpeedPI(1.0, 3.0)),
     ],
 )
