@@ -1,7 +1,6 @@
 """Limit cycles through the gap: predicted by its describing function, and tried on the exact plant.
 
-"Where does the describing function of backlash come from?" From the first harmonic of a dead zone, as here:
-
+"Where does the describing function of backlash come from?" From the first harmonic of a dead zone, as here.
 The describing function treats the shaft as a spring that is softer the less the twist leaves the gap. For a
 twist B + A sin(wt) the dead zone of half width h = gap/2 transmits the torque
 
@@ -20,7 +19,7 @@ The functions are exact for mean and first harmonic; that the others do not matt
 
 So a vibration twist = B + A sin wt sustains itself where the sampled loop (`loop`), with the shaft as
 n (c + jw d), has a pole on the unit circle at e^(jwh): the poles are followed over n from 1 to nearly 0, the
-open gap. This is the harmonic balance 1 + n M(jw) = 0 of the exactly sampled loop. The bias B is that at
+open gap. This is the harmonic balance of the exactly sampled loop. The bias B is that at
 which the mean shaft torque is `mean_torque`, since the load must neither gain nor lose speed against the
 motor in the mean; with zero mean torque the cycle is unbiased and n(A) that of Nordin and Gutman. With a mean
 torque there can be two amplitudes: n falls from 1 as the vibration begins to leave the flank, and rises to 1

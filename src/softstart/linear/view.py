@@ -7,7 +7,7 @@ in `loop`); its modes; and the limit cycles that backlash causes (`limit_cycles`
     plant          the machine in contact at the sample instants
     loop           law and plant joined: margins, delay margin, modes
     limit_cycles   the describing function of backlash; cycles predicted and tried on the exact plant
-    systems        linear sampled systems: response, modes, minimal part
+    systems        linear sampled systems: response, modes, crossings
 """
 
 from __future__ import annotations
@@ -289,6 +289,10 @@ def linear_view(
         If the input is wrong (an unknown controller).
     SimulationError
         If the start cannot be simulated.
+
+    References
+    ----------
+    docs/linear-view.md.
 
     Examples
     --------

@@ -18,6 +18,7 @@ from softstart.errors import SimulationError
 from softstart.parallel import DiedError, Worker
 
 ACCOUNT = Path("/proc/self/status")  # of Linux
+FAILED = "benchmark: a contender failed: "
 # what Worker does for BLAS and numba, for jax; no reports of OpenMDAO
 ENVIRONMENT = {
     "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
@@ -81,7 +82,7 @@ class Apart:
             raise SimulationError(f"benchmark: the process of a contender ended: {death}.") from None
         except Exception as error:  # a contender's package may fail in any way
             text = " ".join(f"{type(error).__name__}: {error}".split())
-            raise SimulationError(f"benchmark: a contender failed: {text}.") from error
+            raise SimulationError(f"{FAILED}{text}.") from error
 
     def close(self) -> None:
         """End the process."""

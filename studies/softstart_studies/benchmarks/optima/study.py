@@ -20,7 +20,7 @@ from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.benchmarks.contest import MISSING, Host, condition_table, rounded, version_of
 from softstart_studies.benchmarks.optima.judge import Judged, judge
 from softstart_studies.benchmarks.optima.task import START_TIMES, Answer, Task, crane_task
-from softstart_studies.benchmarks.process import Apart, prepare, timed
+from softstart_studies.benchmarks.process import FAILED, Apart, prepare, timed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -152,7 +152,7 @@ class BenchmarkOptima(Study):
             while len(found) < passes and sum(one.wall for one in found) < ENOUGH:
                 found.append(host(timed, name))
         except Exception as error:  # a solver's refusal is a result
-            return Outcome(name, task, None, trouble=str(error)[:100])
+            return Outcome(name, task, None, trouble=str(error).removeprefix(FAILED)[:100])
         finally:
             host.close()
         seconds = median(one.cpu for one in found)
