@@ -12,7 +12,7 @@ of each method is replayed on the exact plant.
 from softstart_studies.benchmarks.optima.study import BenchmarkOptima
 
 methods = ("closed-form", "descent", "collocation")
-study = BenchmarkOptima(methods, start_times=[0.2883], repetitions=0, guesses=())
+study = BenchmarkOptima(methods, start_times=[0.2883], repetitions=0)
 result = study.run(None, lambda doing: None)
 figure = result.figures["benchmark-optima-answers"]
 figure.set_label("K_dyn on the exact plant over computing time, by method.")

@@ -29,7 +29,7 @@ MADE: dict[str, tuple[Callable[[], Any], bool]] = {
     "optimum": (optimum, True),
     "front": (lambda: pareto(DAMPED.replace(damping=0.0), [0.45, 0.5], controllers=["direct"]), True),
     "fatigue": (lambda: fatigue([simulate(DAMPED, "direct"), simulate(DAMPED, "ramp")]), True),
-    "linear": (lambda: softstart.linear_view(DAMPED, "current-limit-feedback", limit_cycles=False), True),
+    "linear": (lambda: softstart.linear_view(DAMPED, "current-limit-feedback"), True),
     "plan": (lambda: softstart.plan_experiments(DAMPED, optimise=False), True),
     "tuning": (lambda: softstart.tune(DAMPED, "ramp", ["1x"], ["1x"], free=["time"], **QUICK), True),
 }

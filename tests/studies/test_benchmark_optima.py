@@ -3,19 +3,16 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from softstart import simulate
 from softstart.study import Verdict, find_study
-from softstart_studies.benchmarks.contest import MISSING
-from softstart_studies.benchmarks.optima import entries, worker
-from softstart_studies.benchmarks.optima.entries import ENTRIES, count_lines, lines_of_code
+from softstart_studies.benchmarks.contest import MISSING, version_of
+from softstart_studies.benchmarks.optima import study
 from softstart_studies.benchmarks.optima.judge import Judged, judge
-from softstart_studies.benchmarks.optima.study import BenchmarkOptima, optima_figure
+from softstart_studies.benchmarks.optima.study import ENTRIES, BenchmarkOptima, Outcome, claims, optima_figure
 from softstart_studies.benchmarks.optima.task import START_TIMES, Answer, crane, crane_task, steps
-from softstart_studies.benchmarks.optima.verdicts import Outcome, claims, fastest, least
-from softstart_studies.benchmarks.optima.worker import Cost, Work
+from softstart_studies.benchmarks.process import Here
 
 LONG, SHORT = START_TIMES
 
@@ -107,14 +104,6 @@ def test_speeds_that_differ_at_the_end_swing_on_and_count():
     assert judged.k_dyn == pytest.approx((T0 + v0 * swing) / task.base, rel=1e-9)
 
 
-def test_lines_of_code_are_counted_without_comments_and_docstrings():
-    assert count_lines('"""A\nB."""\n\n# c\ndef f():\n    """D."""\n    return (\n        1\n    )\n') == 4
-    assert count_lines("x = '''\n# in a string\n'''\n") == 3
-    for name in ENTRIES:
-        assert 5 < lines_of_code(name) < 120, name
-    assert lines_of_code("descent") == lines_of_code("collocation")  # one file
-
-
 @pytest.mark.parametrize(
     ("name", "start_time", "k_dyn", "within"),
     [
@@ -125,14 +114,14 @@ def test_lines_of_code_are_counted_without_comments_and_docstrings():
 )
 def test_softstart_answers_with_the_known_optima(name, start_time, k_dyn, within):
     task = crane_task(start_time)
-    judged = judge(task, entries.solve(name, task))
+    judged = judge(task, study.ready(name, task)())
     assert judged.k_dyn == pytest.approx(k_dyn, rel=within)
     assert judged.broken == ()
     assert judged.disagreement == pytest.approx(0.0, abs=within)
 
 
 def peer(name):
-    lacking = entries.installed(name) is None
+    lacking = version_of(ENTRIES[name].package) is None
     return pytest.param(
         name, marks=pytest.mark.skipif(lacking, reason=f"{ENTRIES[name].package}: extra `benchmark`")
     )
@@ -140,94 +129,56 @@ def peer(name):
 
 @pytest.mark.parametrize("name", [peer("rockit"), peer("gekko"), peer("dymos")])
 def test_a_peer_solves_the_long_start(name):
-    task = crane_task(LONG)
-    done = worker.work_apart(name, task, 0, {})
+    done = BenchmarkOptima((name,), (LONG,), repetitions=0)._outcome(name, crane_task(LONG))
     assert done.trouble == ""
-    judged = judge(task, done.answer)
     # no torque of one contact has less than 0.90924724 if it ends at the target speed
-    assert 0.909 < judged.k_dyn < 0.93
-    assert judged.contacts == 1
-    assert abs(judged.load_error) < 0.1
-    assert judged.claimed == pytest.approx(judged.k_dyn, rel=0.05)
+    assert 0.909 < done.judged.k_dyn < 0.93
+    assert done.judged.contacts == 1
+    assert abs(done.judged.load_error) < 0.1
+    assert done.judged.claimed == pytest.approx(done.judged.k_dyn, rel=0.05)
 
 
-def test_a_refusal_is_a_result(monkeypatch):
-    def refuse(name, task, **options):
-        raise RuntimeError("no\n solution")
-
-    monkeypatch.setattr(worker, "solve", refuse)
-    monkeypatch.setitem(ENTRIES, "descent", replace(ENTRIES["descent"], imports=("json",)))
-    done = worker.work("descent", crane_task(LONG), 3, {})
-    assert (done.answer, done.trouble, done.repeated) == (None, "RuntimeError: no solution", ())
-
-
-def test_work_is_repeated_and_options_reach_the_contender(monkeypatch):
-    seen = []
-
-    def solve(name, task, **options):
-        seen.append(options)
-        return pulse_coast_hold(0.9)[0]
-
-    monkeypatch.setattr(worker, "solve", solve)
-    monkeypatch.setitem(ENTRIES, "descent", replace(ENTRIES["descent"], imports=("json",)))
-    done = worker.work("descent", crane_task(LONG), 2, {"guess": 0.25})
-    assert seen == [{"guess": 0.25}] * 3
-    assert len(done.repeated) == 2
-    assert min(cost.wall for cost in (done.first, *done.repeated)) > 0.0
-
-
-def test_a_process_that_fails_is_one_sentence():
-    done = worker.work_apart("nobody", crane_task(LONG), 0, {})
-    assert done.trouble == "it failed: KeyError: 'nobody'"
+def test_a_solver_that_fails_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(ENTRIES, "descent", ENTRIES["descent"]._replace(solver="nowhere:solve"))
+    done = BenchmarkOptima(host=Here)._outcome("descent", crane_task(LONG))
+    assert done.judged is None
+    assert done.trouble.startswith("No module named 'softstart_studies.benchmarks.optima.nowhere'")
 
 
 TASKS = {t: crane_task(t) for t in START_TIMES}
 
 
-def outcome(name, k_dyn, claimed=None, cpu=1.0, task=TASKS[LONG], broken=(), guess=None):
+def outcome(name, k_dyn, task=TASKS[LONG], broken=()):
     if k_dyn is None:
-        return Outcome(name, task, Work(None, "no solution"), None, guess)
-    judged = Judged(claimed or k_dyn, k_dyn, task.start_time, 0.0, 0.0, 1, 0.0, broken)
-    work = Work(Answer(k_dyn, (0.0,), (1.0,), 0.1), first=Cost(9.0, 9.0), repeated=(Cost(cpu, cpu),))
-    return Outcome(name, task, work, judged, guess)
+        return Outcome(name, task, None, trouble="no solution")
+    return Outcome(name, task, Judged(k_dyn, k_dyn, task.start_time, 0.0, 0.0, 1, 0.0, broken), 9.0, 1.0)
 
 
 def test_claims_are_judged_by_the_numbers():
-    ours = [outcome("descent", 0.9093, cpu=0.01), outcome("closed-form", 0.90925, cpu=0.002)]
-    assert least(ours, TASKS[LONG]) == 0.90925
-    assert fastest(ours, TASKS[LONG]) == 0.002
-    assert fastest(ours, TASKS[LONG], "descent") == 0.01
-    assert fastest(ours, TASKS[SHORT]) is None
-    fair, off = outcome("rockit", 0.9095), outcome("dymos", 0.95, claimed=0.91)
-    low, honest_time, honest_claim = claims([*ours, fair, off], [])
-    assert (low.verdict, honest_time.verdict) == (Verdict.CONFIRMED, Verdict.CONFIRMED)
+    ours = [outcome("descent", 0.9093), outcome("closed-form", 0.90925)]
+    fair, off = outcome("rockit", 0.9095), outcome("dymos", 0.95)
+    (low,) = claims([*ours, fair, off])
+    assert low.verdict is Verdict.CONFIRMED
     assert "0.90925 against 0.90950 of rockit" in low.evidence
-    assert "rockit at 0.288304 s 500" in honest_time.evidence
-    assert honest_claim.verdict is Verdict.PARTLY
-    assert "dymos at 0.288304 s -4.2% (of 2 answers)" in honest_claim.evidence
-
-    better = claims([*ours, outcome("rockit", 0.90, cpu=0.001)], [])
-    assert [claim.verdict for claim in better[:2]] == [Verdict.REFUTED] * 2
-    assert "rockit at 0.288304 s 0.5." in better[1].evidence
-    cheat = claims([*ours, fair, outcome("gekko", 0.90, broken=("end speed",))], [])[0]
+    assert claims([*ours, outcome("rockit", 0.90)])[0].verdict is Verdict.REFUTED
+    cheat = claims([*ours, fair, outcome("gekko", 0.90, broken=("end speed",))])[0]
     assert cheat.verdict is Verdict.CONFIRMED
-    assert "breaking a condition: gekko at 0.288304 s (0.9000; end speed)" in cheat.evidence
-    assert claims([], []) == claims([fair], [])[1:] == []
+    assert claims([]) == claims([fair]) == claims(ours) == []
 
 
 def test_the_trap_is_judged_guess_by_guess():
-    ours = [outcome("closed-form", 0.9)]
-    guesses = [
-        outcome("rockit-max", 0.903, guess=0.0),
-        outcome("rockit-max", 1.8, guess=0.5),
-        outcome("rockit-max", None, guess=1.0),
-    ]
-    claim = claims(ours, guesses)[-1]
+    near, far, none = (
+        outcome("rockit-max 0", 0.903),
+        outcome("rockit-max 1", 1.8),
+        outcome("rockit-max 0.5", None),
+    )
+    ours = outcome("closed-form", 0.9)
+    claim = claims([ours, near, far, none])[-1]
     assert claim.verdict is Verdict.PARTLY
-    assert "Of 3 guesses 1 come within 1 %" in claim.evidence
-    assert "1 do not, the worst 2.00 times it, 1 end without a solution" in claim.evidence
-    assert claims(ours, guesses[1:])[-1].verdict is Verdict.CONFIRMED
-    assert claims(ours, guesses[:1])[-1].verdict is Verdict.REFUTED
+    assert "Of 3 guesses 1 come within 1 % of the optimum" in claim.evidence
+    assert "1 end without a solution" in claim.evidence
+    assert claims([ours, far, none])[-1].verdict is Verdict.CONFIRMED
+    assert claims([ours, near])[-1].verdict is Verdict.REFUTED
 
 
 @pytest.fixture(scope="module")
@@ -235,43 +186,40 @@ def result():
     """The whole study with stand-ins for the solvers: one that knows the optimum, one that refuses."""
     said = []
 
-    def stand_in(name, task, repetitions, options):
+    def stand_in(name, task):
         if name == "dymos" or task.start_time == SHORT:
-            return Work(None, "RuntimeError: SLSQP did not converge.")
+            raise RuntimeError("SLSQP did not converge.")
         answer, _ = pulse_coast_hold(0.90924724 if name == "closed-form" else 0.9093)
-        return Work(answer, "", Cost(0.5, 0.5), Cost(2.0, 2.0), (Cost(1.0, 1.0), Cost(3.0, 4.0)))
+        return lambda: answer
 
-    names = ("closed-form", "rockit", "dymos", "gekko", "rockit-max")
+    names = ("closed-form", "rockit", "dymos", "gekko", "rockit-max 0.5")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(entries, "version_of", lambda package: None if package == "gekko" else "1.0")
-        found = BenchmarkOptima(names, guesses=(0.0, 1.0), worker=stand_in).run(None, said.append)
+        patch.setattr(study, "ready", stand_in)
+        patch.setattr(study, "version_of", lambda package: None if package == "gekko" else "1.0")
+        found = BenchmarkOptima(names, host=Here).run(None, said.append)
     return found, said
 
 
 def test_rows_and_progress(result):
     found, said = result
-    answers, times, names, guesses, conditions = found.tables
+    answers, times, _, conditions = found.tables
     assert len(answers.rows) == 8  # four contenders, two tasks
     row = dict(zip(answers.columns, answers.rows[0], strict=True))
     assert (row["contender"], row["claimed"], row["K_dyn"]) == ("closed-form", 0.90925, 0.90925)
     assert (row["contacts"], row["remark"]) == (1, "")
     refused = [row for row in answers.rows if row[1] == "dymos"]
-    assert all(row[-1] == "RuntimeError: SLSQP did not converge." and row[3] is None for row in refused)
-    timed = dict(zip(times.columns, times.rows[1], strict=True))
-    assert (timed["contender"], timed["import + first, s"], timed["first, s"]) == ("rockit", 2.5, 2.0)
-    assert (timed["median, s"], timed["median cpu, s"], timed["of"]) == (2.0, 2.5, 2)
-    assert (timed["to our fastest"], timed["to our collocation"]) == (1.0, None)
-    assert [row[:2] for row in guesses.rows] == [("rockit-max", 0.0), ("rockit-max", 1.0)]
+    assert all(row[-1] == "SLSQP did not converge." and row[3] is None for row in refused)
+    assert [row[1] for row in times.rows] == ["closed-form", "rockit", "rockit-max 0.5"]
+    assert times.rows[0][-1] == 1.0
     assert dict(conditions.rows)["processors and threads used"] == "one, one"
-    assert len(said) == 1 + 8 + 2
-    assert np.all([row[2] > 5 for row in names.rows])
+    assert len(said) == 10
 
 
 def test_a_missing_peer_is_named(result):
     found, said = result
-    assert said[0] == f"gekko: gekko {MISSING}"
+    assert f"gekko: gekko {MISSING}" in said
     row = next(row for row in found.tables[2].rows if row[0] == "gekko")
-    assert (row[1], row[3]) == ("gekko", MISSING)
+    assert row[1:] == ("gekko", MISSING)
     assert "softstart[benchmark]" in MISSING
 
 
@@ -279,13 +227,12 @@ def test_the_picture_shows_the_answers(result):
     found, _ = result
     axes = found.figures["benchmark-optima-answers"].axes
     assert [len(one.lines) for one in axes] == [3, 0]
-    x, y = axes[0].lines[0].get_data()
-    assert (x[0], y[0]) == (2.5, pytest.approx(0.90924724, rel=1e-8))
+    assert axes[0].lines[0].get_ydata()[0] == pytest.approx(0.90924724, rel=1e-8)
     assert not optima_figure([]).axes[0].lines
 
 
 def test_the_study_is_known():
-    study = find_study("benchmark-optima")
-    assert isinstance(study, BenchmarkOptima)
-    assert study.names == tuple(ENTRIES)
-    assert {ENTRIES[name].package for name in study.names} >= {"softstart", "rockit-meco", "dymos", "gekko"}
+    known = find_study("benchmark-optima")
+    assert isinstance(known, BenchmarkOptima)
+    assert known.names == tuple(ENTRIES)
+    assert {ENTRIES[name].package for name in known.names} >= {"softstart", "rockit-meco", "dymos", "gekko"}

@@ -6,9 +6,9 @@ from softstart import SimulationError, simulate
 from softstart.study import Verdict, find_study
 from softstart_studies.benchmarks import contest
 from softstart_studies.benchmarks.chains import DUELS as OF_CHAINS
-from softstart_studies.benchmarks.contest import MISSING, Duel, Outcome, fight, prepare, ratio_figure, timed
+from softstart_studies.benchmarks.contest import MISSING, Duel, Outcome, fight, prepared, ratio_figure
 from softstart_studies.benchmarks.problem import RAMP_TIME, Problem, gaps
-from softstart_studies.benchmarks.process import Apart, Here, memory
+from softstart_studies.benchmarks.process import Apart, Here, memory, prepare, timed
 from softstart_studies.benchmarks.starts import DUELS, BenchmarkStarts
 
 needs_diffrax = pytest.mark.skipif(contest.version_of("diffrax") is None, reason="diffrax: extra `benchmark`")
@@ -62,8 +62,8 @@ def test_diffrax_and_softstart_agree():
 @pytest.mark.parametrize("ours", ["kernel", "batch", "run", "run-traces"])
 def test_every_way_of_using_softstart_gives_the_same(ours):
     problem = Problem("direct")
-    prepare(ours, problem, 3)
-    peaks = timed(ours, 3).peaks[:, 0]
+    prepared(Here(), ours, problem, 3)
+    peaks = timed(f"{ours} 3").found[:, 0]
     assert peaks.tolist() == [simulate(one, "direct").peak_torque for one in problem.machines(3)]
 
 
@@ -92,7 +92,7 @@ def test_the_ramp_of_the_peer_is_that_of_the_controller():
 def test_peers_refuse_what_they_cannot_do():
     for peer in ("control", "lsoda"):
         with pytest.raises(ValueError, match="ramp"):
-            contest.ready(peer, Problem("ramp"), 1)()
+            prepared(Here(), peer, Problem("ramp"), 1)
 
 
 def test_a_process_of_its_own_gives_the_same_and_weighs_itself():
@@ -100,8 +100,8 @@ def test_a_process_of_its_own_gives_the_same_and_weighs_itself():
     child = Apart()
     try:
         for host in (Here(), child):
-            host(prepare, "lsoda", problem, 2)
-        assert child(timed, "lsoda", 2).peaks.tolist() == timed("lsoda", 2).peaks.tolist()
+            prepared(host, "lsoda", problem, 2)
+        assert child(timed, "lsoda 2").found.tolist() == timed("lsoda 2").found.tolist()
         used = child(memory)
         assert used is None or 20 < used < 2000
     finally:
@@ -112,8 +112,8 @@ def test_a_process_of_its_own_gives_the_same_and_weighs_itself():
 def test_a_process_that_fails_is_one_sentence():
     child = Apart()
     try:
-        with pytest.raises(SimulationError, match=r"a contender failed: KeyError: 'nobody'") as caught:
-            child(prepare, "nobody", Problem("direct"), 1)
+        with pytest.raises(SimulationError, match=r"a contender failed: ModuleNotFoundError: ") as caught:
+            child(prepare, "nobody", "nowhere:nobody")
         assert "\n" not in str(caught.value)
     finally:
         child.close()

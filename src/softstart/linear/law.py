@@ -14,9 +14,8 @@ has one before it gets there.
 
 The derivative is taken by differences. Each component is displaced both ways by a step and by half of it,
 with ever smaller steps until both sides agree. Richardson's extrapolation of the central difference is then
-taken (error of fourth order). Where the sides never agree: if only one side is linear, as at a switch that
-lies exactly at the sample, that side is taken; if each is linear but they differ (a corner: the demand on a
-limit), the steeper; if neither is (a jump: the number of a mode), none. All these cases are reported.
+taken (error of fourth order). Where the sides never agree, the steeper side that is linear is taken (a corner
+or a switch: a demand on its limit), or nothing (a jump: the number of a mode); a note reports it.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from enum import Enum
 from itertools import islice
 from typing import Any
 
@@ -55,6 +53,7 @@ STEP = 2.0**-13  # of a component's scale
 STEPS = (STEP, 2.0**-17, 2.0**-21)
 SAME = 1e-4  # of a column's largest entry, in scales: the two sides agree, or the two step sizes do
 NOTHING = 1e-10  # an entry below this, in scales, is rounding
+SMOOTH, KINK, JUMP = range(3)  # of a step in one component: with a slope, one on each side, none
 
 NONE = np.zeros(0)
 
@@ -90,10 +89,15 @@ class Sample:
         """The plant by names, as `softstart.kernel.records` has them; only of a kept sample."""
         return self.work.view(at.WORK)[0]
 
-    def copied(self) -> Sample:
-        """A kept sample whose plant and state may be changed."""
+    def displaced(self, plant: Plant, by: Vector) -> Sample:
+        """A kept sample whose machine is moved by a state of `plant`, and the controller not."""
         copy = replace(self, work=self.work.copy(), state=self.state.copy())
-        copy.plant["zeros"][:] = copy.plant["passed"][:] = 0  # what has just happened no longer applies
+        now = copy.plant
+        now["zeros"][:] = now["passed"][:] = 0  # what has just happened no longer applies
+        for name, rows in plant.masses.items():
+            now[name][: len(rows)] += rows @ by[: rows.shape[1]]
+        for name, row in (("phi", plant.rows["phi2"]), ("u", plant.rows.get("u", NONE))):
+            now[name] += row @ by[: row.size]
         return copy
 
 
@@ -180,6 +184,11 @@ class SampledStart:
                     f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
                 )
             state, count = after, count + 1
+
+    def sampled(self, plant: Plant, period: float, further: float = 0.0) -> SampledPlant:
+        """The plant as this controller sees it, with the dead time of the drive and so much further, s."""
+        delay = float(self.rows.machine.dead_time) + further
+        return sampled(plant, period, delay, self.inputs, self.differencing)
 
     def kept(self, index: int) -> Sample:
         """The sample of this number from the beginning, from which the start can be continued."""
@@ -270,37 +279,14 @@ def _longest_contact(samples: list[Sample]) -> range:
     return best
 
 
-class Smoothness(Enum):
-    """How the step depends on one component."""
-
-    SMOOTH = "smooth"
-    ONE_SIDED = "linear on one side only"
-    CORNER = "a corner: each side has its own slope"
-    JUMP = "a jump: no slope at all"
-
-
-ORDER = list(Smoothness)
-
-
-@dataclass(frozen=True, eq=False)
-class Derivative:
-    """The law x+ = A x + B y, demand = C x + D y: small changes of state x and measured y about a sample.
-
-    `rates` are the rows of the demand's slope and of the instant of the next sample: both must be zero, or
-    the controller is not a sampled loop. `smoothness` is that of the states, then of the inputs.
-    """
-
-    law: System
-    rates: Matrix
-    smoothness: tuple[Smoothness, ...]
-
-
 def derivative(
     step: Step, sample: Sample, inputs: tuple[int, ...], scales: Vector, input_scales: Vector, base: float
-) -> Derivative:
-    """The derivative of the step at a sample, by differences.
+) -> tuple[System, Matrix, tuple[int, ...]]:
+    """The law x+ = A x + B y, demand = C x + D y of a step at a sample, for small changes, by differences.
 
-    `scales` and `input_scales` are the sizes of x and y, `base` that of the demand.
+    `scales` and `input_scales` are the sizes of x and y, `base` that of the demand. With the law come the
+    derivatives of the demand's slope and of the instant of the next sample, which are zero in a sampled loop,
+    and the components of (x, y) in which the step is not smooth.
     """
     size, seen = sample.state.size, list(inputs)
     period = max(sample.ask_again - sample.time, 1e-300)
@@ -316,57 +302,54 @@ def derivative(
         return np.asarray(np.array([*after, demand, slope, ask_again]) / heights)
 
     now = response(0, 0.0)
-    columns, kinds = [], []
+    columns, rough = [], []
     for index, width in enumerate(widths):
         tried = []
         for share in STEPS:
             with np.errstate(invalid="ignore"):  # "never again" is an infinite instant
-                tried.append(_slope([
-                    [(response(index, by * side) - now) / (by * side) for side in (1.0, -1.0)]
+                tried.append(_slope(*(
+                    np.array([(response(index, by * side) - now) / (by * side) for side in (1.0, -1.0)])
                     for by in (share, 0.5 * share)
-                ]))  # fmt: skip
-            if tried[-1][1] is Smoothness.SMOOTH:
+                )))  # fmt: skip
+            if tried[-1][0] == SMOOTH:
                 break
-        column, kind = min(tried, key=lambda one: ORDER.index(one[1]))
+        kind, column = min(tried, key=lambda one: one[0])
         columns.append(np.where(np.abs(column) < NOTHING, 0.0, column) * heights / width)
-        kinds.append(kind)
+        rough += [index] * (kind != SMOOTH)
     whole = np.array(columns).T
     law = System(whole[:size, :size], whole[:size, size:], whole[[size], :size], whole[[size], size:])
-    return Derivative(law, whole[size + 1 :], tuple(kinds))
+    return law, whole[size + 1 :], tuple(rough)
 
 
-def _slope(differences: list[list[Vector]]) -> tuple[Vector, Smoothness]:
-    """The slope from difference quotients over a step and half of it, each forward and backward."""
-    wide, near = differences
+def _slope(wide: Matrix, near: Matrix) -> tuple[int, Vector]:
+    """How smooth, and the slope, from quotients over a step and half of it, each forward and backward."""
     with np.errstate(invalid="ignore", over="ignore"):
-        forward, backward = sides = [2.0 * half - whole for half, whole in zip(near, wide, strict=True)]
+        sides = 2.0 * near - wide
         tolerance = SAME * max(float(np.max(np.abs(near))), NOTHING)
-        straight = [
-            bool(np.all(np.abs(half - whole) <= tolerance)) for half, whole in zip(near, wide, strict=True)
-        ]
-        if all(straight):
-            if np.all(np.abs(forward - backward) <= tolerance):
-                return (2.0 * (near[0] + near[1]) - 0.5 * (wide[0] + wide[1])) / 3.0, Smoothness.SMOOTH
-            return max(sides, key=lambda column: float(np.sum(np.abs(column)))), Smoothness.CORNER
-    for column, linear in zip(sides, straight, strict=True):
-        if linear:
-            return column, Smoothness.ONE_SIDED
-    return np.zeros_like(forward), Smoothness.JUMP
+        straight = sides[np.all(np.abs(near - wide) <= tolerance, axis=1)]
+        if len(straight) == 2 and np.all(np.abs(sides[0] - sides[1]) <= tolerance):
+            return SMOOTH, (2.0 * near.sum(axis=0) - 0.5 * wide.sum(axis=0)) / 3.0
+    if len(straight):
+        return KINK, max(straight, key=lambda column: float(np.sum(np.abs(column))))
+    return JUMP, np.zeros_like(near[0])
 
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoint:
-    """An instant, the derivative of the step there, and the controller's part in the loop.
+    """An instant, and the controller's part in the loop there.
 
     `law` has the states `states` of the controller: those that a measured quantity moves and that show in the
-    demand. `mismatch` is the largest difference between linear and exact response, relative to the exact.
+    demand; in `rough` ones the step is not smooth. `is_sampled`: nothing measured changes the slope of the
+    demand or the instant of the next sample. `mismatch` is the largest difference between linear and exact
+    response, relative to the exact.
     """
 
     sample: Sample
     period: float
-    derivative: Derivative
-    states: tuple[int, ...]
     law: System
+    states: tuple[int, ...]
+    rough: tuple[int, ...]
+    is_sampled: bool
     mismatch: float
     steady: bool
 
@@ -375,28 +358,15 @@ class OperatingPoint:
         """Whether anything measured changes the demand."""
         return bool(self.states) or bool(np.any(self.law.D))
 
-    @property
-    def is_sampled(self) -> bool:
-        """Whether nothing measured changes the slope of the demand or the instant of the next sample."""
-        rates = self.derivative.rates
-        return not (np.any(rates[:, list(self.states)]) or np.any(rates[:, self.derivative.law.A.shape[0] :]))
-
-    @property
-    def rough(self) -> tuple[tuple[int, Smoothness], ...]:
-        """The states in the loop in which the step is not smooth, by their numbers."""
-        kinds = self.derivative.smoothness
-        return tuple((i, kinds[i]) for i in self.states if kinds[i] is not Smoothness.SMOOTH)
-
 
 def operating_point(start: SampledStart, run: SampledRun) -> OperatingPoint | None:
     """The steady one if its law is good and feeds back; else the best that feeds back; else the best."""
-    points = operating_points(start, run)
-    good = [one for one in points if one.mismatch < GOOD]
-    feeding = [one for one in good if one.feeds_back]
-    steady = [one for one in feeding if one.steady]
-    fair = [one for one in points if one.feeds_back and one.mismatch < FAIR]
-    ranked = steady or feeding or fair or good or [one for one in points if one.feeds_back] or points
-    return ranked[0] if ranked else None
+
+    def rank(one: OperatingPoint) -> tuple[bool, ...]:
+        feeds, good = one.feeds_back, one.mismatch < GOOD
+        return feeds and good and one.steady, feeds and good, feeds and one.mismatch < FAIR, good, feeds
+
+    return max(operating_points(start, run), key=rank, default=None)
 
 
 def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoint]:
@@ -421,16 +391,15 @@ def _linearised_at(start: SampledStart, run: SampledRun, index: int, sample: Sam
         exchange.M_SHAFT_TORQUE: sizes.base,
     }
     input_scales = np.array([of_inputs.get(index, sizes.speed) for index in inputs])
-    found = derivative(start.step, sample, inputs, scales, input_scales, sizes.base)
-    reached = moved(found.law)
-    kept = [reached[i] for i in moved(found.law.part(reached).dual())]
-    law = found.law.part(kept)
-    plant = in_contact(start.machine, sample.plant["incline"])
-    delay = float(start.rows.machine.dead_time)
-    held = sampled(plant, run.period, delay, inputs, start.differencing)
-    mismatch = _mismatch(start, sample, run.period, plant, held, law)
+    whole, rates, rough = derivative(start.step, sample, inputs, scales, input_scales, sizes.base)
+    reached = moved(whole)
+    states = [reached[i] for i in moved(whole.part(reached).dual())]
+    law = whole.part(states)
+    is_sampled = not np.any(rates[:, [*states, *range(scales.size, rates.shape[1])]])
     steady = run.steady and index == run.contact[-1]
-    return OperatingPoint(sample, run.period, found, tuple(kept), law, mismatch, steady)
+    difference = mismatch(start, sample, run.period, law)
+    unsmooth = tuple(state for state in states if state in rough)
+    return OperatingPoint(sample, run.period, law, tuple(states), unsmooth, is_sampled, difference, steady)
 
 
 def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
@@ -444,57 +413,33 @@ def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
     return np.where(scale > 0.0, scale, 1.0)
 
 
-def _mismatch(
-    start: SampledStart, sample: Sample, period: float, plant: Plant, held: SampledPlant, law: System
-) -> float:
-    """The linear loop against the exact plant under the controller, after small displacements both ways."""
-    base = sizes_of(start.machine).base
-    loop, _, read = closed(held, law)
+def mismatch(start: SampledStart, sample: Sample, period: float, law: System) -> float:
+    """The linear loop against the exact plant under the controller, after small displacements both ways.
+
+    Displaced are the whole machine, each twist and the speed of each body.
+    """
+    sizes, plant = sizes_of(start.machine), in_contact(start.machine, sample.plant["incline"])
+    loop, _, read = closed(start.sampled(plant, period), law)
     until = sample.time + (WINDOW - 0.5) * period
+    angles = plant.masses["w"].shape[1] - plant.inertias.size
+    widths = [sizes.windup] * angles + [sizes.speed] * plant.inertias.size
     worst = 0.0
-    for first, changes in _displacements(start, plant, loop.shape[0]):
-        predicted, state = np.zeros((WINDOW, 2)), first
+    for index, width in enumerate(widths):
+        if index >= angles and math.isinf(plant.inertias[index - angles]):
+            continue  # the ground
+        state = first = width * np.eye(1, loop.shape[0], index)[0]
+        predicted, responses = np.zeros((WINDOW, 2)), []
         for k in range(WINDOW):
             predicted[k], state = read @ state, loop @ state
-        responses = []
         for by in (STEP, -STEP):
-            displaced = sample.copied()
-            for name, change in changes.items():
-                displaced.plant[name] += by * change
-            played = list(start.samples(until, begin=displaced))
+            played = list(start.samples(until, begin=sample.displaced(plant, by * first)))
             if len(played) != WINDOW or not all(one.pressing for one in played):
                 return math.inf
             responses.append([(one.shaft_torque, one.demand) for one in played])
         response = (np.array(responses[0]) - responses[1]) / (2.0 * STEP)
-        size = max(float(np.max(np.abs(response))), 1e-3 * base)
+        size = max(float(np.max(np.abs(response))), 1e-3 * sizes.base)
         worst = max(worst, float(np.max(np.abs(response - predicted))) / size)
     return worst
-
-
-def _displacements(start: SampledStart, plant: Plant, order: int) -> Iterator[tuple[Vector, dict[str, Any]]]:
-    """Of the whole machine, each body's speed, each twist: the loop's state, and the changes of the start."""
-    sizes, load, motor = sizes_of(start.machine), int(start.rows.machine.load), int(start.rows.machine.motor)
-    speeds, masses = np.array(plant.speeds), np.arange(start.rows.count)
-
-    def filled(values: Any, size: float) -> Vector:
-        return np.asarray(size * np.pad(1.0 * values, (0, at.MOST_MASSES - len(values))))
-
-    angle = sizes.windup
-    yield angle * np.eye(1, order)[0], {"phi": angle, "angle": filled(np.ones(masses.size), angle)}
-    for index in np.unique(speeds):
-        if np.isfinite(start.rows.masses.view(at.MASS)[0, speeds == index, 0]["J"]).all():  # not the ground
-            yield sizes.speed * np.eye(1, order, index)[0], {"w": filled(speeds == index, sizes.speed)}
-    for spring, shaft in enumerate(np.flatnonzero(np.diff(speeds)), start=1):
-        # the motor stays, and what lies on the other side of the shaft turns; `phi` is the angle of the load
-        turned = -1.0 * (masses > shaft) if motor <= shaft else 1.0 * (masses <= shaft)
-        yield (
-            angle * np.eye(1, order, spring)[0],
-            {
-                "theta": filled(masses == shaft, angle),
-                "phi": angle * turned[load],
-                "angle": filled(turned, angle),
-            },
-        )
 
 
 def closed(plant: SampledPlant, law: System) -> tuple[Matrix, Vector, Matrix]:

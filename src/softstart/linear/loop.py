@@ -27,24 +27,13 @@ import numpy as np
 from softstart.arrays import Complex, Matrix, Vector
 from softstart.chain.machines import Machine
 from softstart.linear.law import OperatingPoint, SampledStart, closed
-from softstart.linear.plant import Plant, in_contact, motor_side, sampled, sizes_of
-from softstart.linear.systems import (
-    TOLERANCE,
-    Mode,
-    System,
-    frequencies,
-    minimal,
-    modes,
-    observable,
-    zeros_of,
-)
+from softstart.linear.plant import Plant, in_contact, motor_side, sizes_of
+from softstart.linear.systems import Mode, System, frequencies, modes, moved, zeros_of
 
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
 FRACTIONS = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 49)[:-1])  # of a sample, close near a whole one
 MANY = 20  # samples: a long delay
-COARSEST = 1e-5  # tolerance for what shows in the closed loop
-SLOW = 1e-4  # of the elastic frequency: slower poles are the rotation as a whole, but for rounding
-ROTATION = 1e-3  # the same, of poles of a loop that has not been reduced to what shows
+ROTATION = 1e-3  # of the elastic frequency: slower poles are the rotation as a whole
 ROUNDING = 1e-10  # of the largest pole
 ON_THE_CIRCLE = 1e-9  # poles this near to the unit circle do not count as stable
 
@@ -144,14 +133,15 @@ class Loop:
 
     @cached_property
     def broken(self) -> System:
-        """L(z), minimal: from a demand fed into the plant to the negative of the controller's demand."""
-        return minimal(self.broken_delayed(0.0))
+        """L(z): from a demand fed into the plant to the negative of the controller's demand."""
+        return self.broken_delayed(0.0)
 
     def broken_delayed(self, delay: float) -> System:
-        """L(z) with this much further dead time, s, between demand and torque; not minimal."""
+        """L(z) with this much further dead time, s, between demand and torque."""
         loop, into, read = self._closed(delay)
         feedback = np.outer(into, read[1])
-        return System(loop - feedback, into[:, None], -read[[1]], np.zeros((1, 1)))
+        whole = System(loop - feedback, into[:, None], -read[[1]], np.zeros((1, 1)))
+        return whole.part(moved(whole.dual()))
 
     @cached_property
     def margins(self) -> Margins:
@@ -173,7 +163,7 @@ class Loop:
 
         whole = math.inf
         for fraction in FRACTIONS[::6] * self.period:
-            for one in _gain_crossovers(minimal(self.broken_delayed(fraction)), self.period):
+            for one in _gain_crossovers(self.broken_delayed(fraction), self.period):
                 whole = min(whole, one.margin % (2.0 * math.pi) / (one.frequency * self.period))
         if not self.stable or self._excess(0.0) > 0.0:
             return 0.0, self._largest_pole(0.0)[1]
@@ -197,7 +187,7 @@ class Loop:
     def _largest_pole(self, delay: float) -> tuple[float, float]:
         """Size and frequency in rad/s of the largest pole, but for the rotation, with a further dead time."""
         poles = np.linalg.eigvals(self._closed(delay)[0])
-        poles = poles[np.abs(poles - 1.0) > ROTATION * self._Omega * self.period]
+        poles = poles[np.abs(poles - 1.0) > self.rotation]
         pole = complex(poles[np.argmax(np.abs(poles))])
         return abs(pole), abs(cmath.phase(pole)) / self.period
 
@@ -207,12 +197,8 @@ class Loop:
 
         The rotation of the whole drive, which a torque controller leaves free (poles at 1), is excluded.
         """
-        whole, _, read = self._closed(0.0)
-        tolerance = min(max(TOLERANCE, 100.0 * self.point.mismatch), COARSEST)
-        n = whole.shape[0]
-        shown = observable(System(whole, np.zeros((n, 0)), read, np.zeros((2, 0))), tolerance)
-        found = modes(shown, self.period)
-        return tuple(mode for mode in found if mode.frequency > SLOW * self._Omega)
+        found = modes(self._closed(0.0)[0], self.period)
+        return tuple(mode for mode in found if abs(mode.value - 1.0) > self.rotation)
 
     @property
     def stable(self) -> bool:
@@ -225,14 +211,12 @@ class Loop:
         return min((mode.damping_ratio for mode in self.modes), default=math.nan)
 
     @cached_property
-    def _Omega(self) -> float:
-        return sizes_of(self.machine).Omega
+    def rotation(self) -> float:
+        """Distance from 1 within which poles are the rotation as a whole."""
+        return ROTATION * sizes_of(self.machine).Omega * self.period
 
     def _closed(self, further: float) -> tuple[Matrix, Vector, Matrix]:
-        start = self.start
-        delay = float(start.rows.machine.dead_time) + further
-        plant = sampled(self._plant, self.period, delay, start.inputs, start.differencing)
-        return closed(plant, self.point.law)
+        return closed(self.start.sampled(self._plant, self.period, further), self.point.law)
 
     @cached_property
     def _plant(self) -> Plant:

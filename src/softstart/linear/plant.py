@@ -30,16 +30,18 @@ from softstart.start.rows import rows_of
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """dx/dt = A x + B u; `rows` reads phi1, w1, the torque T beside the motor, w2, and u behind a lag, off x.
+    """dx/dt = A x + B u; `rows` reads phi1, w1, phi2, w2, the torque T beside the motor, and u behind a lag.
 
-    States: the angle of the motor, the twists of the springs, the speeds of the bodies, and with a torque lag
-    the motor torque, whose demand is then the input. The speed of mass i is state `speeds[i]`.
+    States: the angle of the motor, the twists of the springs, the speeds of the bodies (finite `inertias`),
+    and with a torque lag the motor torque, whose demand is then the input. `masses` reads `angle`, `w` of
+    each mass and `theta` of each shaft off x.
     """
 
     A: Matrix
     B: Matrix
     rows: dict[str, Matrix]
-    speeds: tuple[int, ...]
+    masses: dict[str, Matrix]
+    inertias: Vector
 
 
 class Sizes(NamedTuple):
@@ -84,12 +86,14 @@ def motor_side(machine: Machine) -> range:
     return range(first, last + 1)
 
 
-def in_contact(machine: Machine, inclines: Vector | None = None, masses: range | None = None) -> Plant:
+def in_contact(
+    machine: Machine, inclines: Vector | None = None, masses: range | None = None, share: float = 1.0
+) -> Plant:
     """The machine while all flanks press, or some neighbouring `masses` of it as if there were no others.
 
     Masses that are joined rigidly are one body; gears with losses pass power on from the motor to the load.
     `inclines` are those of the load curves of its masses at an instant: there a curve is a spring or a damper
-    to the ground.
+    to the ground. `share` multiplies stiffness and damping of the shafts, as the describing function does.
     """
     given = rows_of(single(machine))
     masses = masses or range(given.count)
@@ -104,13 +108,13 @@ def in_contact(machine: Machine, inclines: Vector | None = None, masses: range |
             "a stiffness, or make one mass of the two."
         )
     body = np.concatenate([[0], np.cumsum(~rigid)]).astype(int)  # of each mass
-    inertia = np.bincount(body, mass["J"])
+    inertia = np.bincount(body, mass["J"]).astype(np.float64)
     first = 1 + int((~rigid).sum())  # of the speeds
     unit = np.eye(first + inertia.size)
     w = unit[first + body]  # rows that read the speeds of the masses off the states
     twist = np.zeros((rigid.size, unit.shape[0]))
     twist[~rigid] = unit[1:first]
-    c, d = (np.where(rigid, 0.0, shaft[key])[:, None] for key in ("c", "d"))
+    c, d = (np.where(rigid, 0.0, share * shaft[key])[:, None] for key in ("c", "d"))
     T = c * twist + d * (w[:-1] - w[1:])
     # the gear of a shaft takes its share behind the spring, or before it
     driven = motor <= np.arange(rigid.size)
@@ -132,8 +136,9 @@ def in_contact(machine: Machine, inclines: Vector | None = None, masses: range |
     B[first + body[motor]] = 1.0 / inertia[body[motor]]
     beside = given.motor_shaft - kept.start
     none = np.zeros(unit.shape[0])
+    phi2, w2 = (angle[load], w[load]) if 0 <= load < body.size else (none, none)
     rows = {
-        "phi1": unit[0], "w1": w[motor], "w2": w[load] if 0 <= load < body.size else none,
+        "phi1": unit[0], "w1": w[motor], "phi2": phi2, "w2": w2,
         "T": (1.0 if driven[beside] else -1.0) * T[beside] if 0 <= beside < rigid.size else none,
     }  # fmt: skip
     lag = float(given.machine.lag)
@@ -142,7 +147,7 @@ def in_contact(machine: Machine, inclines: Vector | None = None, masses: range |
         A = np.block([[A, B], [np.zeros((1, n)), np.full((1, 1), -1.0 / lag)]])
         B = np.vstack([np.zeros((n, 1)), [[1.0 / lag]]])
         rows = {name: np.append(row, 0.0) for name, row in rows.items()} | {"u": np.eye(n + 1)[n]}
-    return Plant(A, B, rows, tuple((first + body).tolist()))
+    return Plant(A, B, rows, {"angle": angle, "w": w, "theta": twist}, inertia)
 
 
 class SampledPlant(NamedTuple):

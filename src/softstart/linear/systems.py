@@ -1,14 +1,8 @@
-"""Linear sampled systems: their response over frequency, their modes, their minimal part.
+"""Linear sampled systems: their response over frequency, their modes, their crossings.
 
-python-control holds and plots such systems, but needs Slycot to reduce one to its minimal part, and takes the
-margins of a sampled one from polynomials in z, which lose their digits near z = 1. So those two stand here.
-
-States that no input reaches, or no output shows, are left out in two steps. First by structure (`moved`): a
-sample counter, the number of a mode, a schedule depend on nothing measured, so they are no feedback whatever
-their effect; exact zeros decide. Then by numbers (`minimal`): an orthonormal basis of the controllable
-subspace is grown direction by direction (the staircase algorithm in its Arnoldi form: P. Van Dooren 1981,
-doi:10.1109/TAC.1981.1102559), and a direction shorter than TOLERANCE of the vector it was computed from adds
-nothing.
+python-control holds and plots such systems, but takes the margins of a sampled one from polynomials in z,
+which lose their digits near z = 1. A sample counter, the number of a mode, a schedule depend on nothing
+measured, so they are no feedback whatever their effect: `moved` leaves them out by exact zeros.
 """
 
 from __future__ import annotations
@@ -22,7 +16,6 @@ import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
 
-TOLERANCE = 1e-8
 LOWEST = 1e-5  # of the highest frequency
 PER_DECADE = 200
 NEAR_A_POLE = 30  # frequencies on either side of it
@@ -73,53 +66,6 @@ def moved(system: System) -> list[int]:
     for _ in range(reached.size):
         reached = reached | np.any(system.A[:, reached] != 0.0, axis=1)
     return [int(index) for index in np.flatnonzero(reached)]
-
-
-def minimal(system: System, tolerance: float = TOLERANCE) -> System:
-    """The part that the inputs reach and the outputs show: the same response with the fewest states.
-
-    >>> A, B, C = np.diag([0.5, 0.5, 0.9]), np.ones((3, 1)), np.array([[1.0, 1.0, 0.0]])
-    >>> minimal(System(A, B, C, np.zeros((1, 1)))).A.round(12).tolist()
-    [[0.5]]
-    """
-    balanced, inputs, outputs = _balanced(system)
-    shown = _controllable(balanced.dual(), tolerance).dual()
-    least = _controllable(shown, tolerance)
-    return System(least.A, least.B / inputs, least.C * outputs[:, None], system.D)
-
-
-def observable(system: System, tolerance: float = TOLERANCE) -> Matrix:
-    """The transition matrix of the part that the outputs show."""
-    return _controllable(_balanced(system)[0].dual(), tolerance).A.T
-
-
-def _balanced(system: System) -> tuple[System, Vector, Vector]:
-    """States, inputs and outputs in units in which their effects are of one size; those of the last two."""
-    from scipy import linalg
-
-    n, (p, m) = system.A.shape[0], system.D.shape
-    whole = np.zeros((n + max(m, p),) * 2)
-    whole[:n, :n], whole[:n, n : n + m], whole[n : n + p, :n] = system.A, system.B, system.C
-    whole, (units, _) = linalg.matrix_balance(whole, permute=False, separate=True)
-    return (
-        System(whole[:n, :n], whole[:n, n : n + m], whole[n : n + p, :n], system.D),
-        units[n : n + m], units[n : n + p],
-    )  # fmt: skip
-
-
-def _controllable(system: System, tolerance: float) -> System:
-    """The controllable part, in an orthonormal basis of the span of B, A B, A^2 B, ..."""
-    A, fresh = system.A, system.B
-    basis = np.zeros((A.shape[0], 0))
-    scale = float(np.linalg.norm(fresh)) or 1.0
-    while fresh.shape[1] and basis.shape[1] < A.shape[0]:
-        for _ in range(2):  # twice is enough for orthogonality
-            fresh = fresh - basis @ (basis.T @ fresh)
-        directions, lengths, _ = np.linalg.svd(fresh, full_matrices=False)
-        new = directions[:, lengths > tolerance * scale]
-        basis, fresh = np.hstack([basis, new]), A @ new
-        scale = float(np.linalg.norm(A, 2)) or 1.0
-    return System(basis.T @ A @ basis, basis.T @ system.B, system.C @ basis, system.D)
 
 
 def frequencies(period: float, system: System) -> Vector:

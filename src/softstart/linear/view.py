@@ -7,15 +7,16 @@ in `loop`); its modes; and the limit cycles that backlash causes (`limit_cycles`
     plant          the machine in contact at the sample instants
     loop           law and plant joined: margins, delay margin, modes
     limit_cycles   the describing function of backlash; cycles predicted and tried on the exact plant
-    systems        linear sampled systems: response, modes, minimal part
+    systems        linear sampled systems: response, modes, crossings
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import Machine
@@ -32,17 +33,15 @@ from softstart.linear.law import (
     operating_point,
     run_until_steady,
 )
-from softstart.linear.limit_cycles import Cycle, Outside
-from softstart.linear.limit_cycles import limit_cycles as cycles_of
+from softstart.linear.limit_cycles import Cycle, limit_cycles
 from softstart.linear.loop import Loop, Margins
 from softstart.linear.plant import single, sizes_of
-from softstart.linear.systems import Mode, minimal
+from softstart.linear.systems import Mode
 
 if TYPE_CHECKING:
     import control
 
-INERTIAS = (0.4, 1.0, 2.5)
-STIFFNESSES = (0.9, 1.1)
+VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1)))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
 NAMES = {
     exchange.M_MOTOR_ANGLE: "motor_angle",
@@ -72,16 +71,12 @@ class LinearView:
         The instant at which the controller is linearised, and its linear law.
     own_loop : Loop, optional
         The loop on this drive.
-    outside : Outside, optional
-        Everything but the shaft, for limit cycles; None of a chain.
-    variations : tuple of Loop
-        The same controller on other machines; of a chain also with all gaps open.
-    cycles : tuple of Cycle
-        Limit cycles through the gap, predicted and checked; none of a chain, which has several gaps.
+    run : SampledRun, optional
+        The samples of the start.
 
     Examples
     --------
-    >>> view = linear_view("crane-4amtkf", "current-limit-feedback", limit_cycles=False)
+    >>> view = linear_view("crane-4amtkf", "current-limit-feedback")
     >>> view
     <LinearView: current-limit-feedback on ...: gain margin ..., phase margin ..., delay margin ...>
 
@@ -98,9 +93,7 @@ class LinearView:
     notes: tuple[str, ...]
     point: OperatingPoint | None = None
     own_loop: Loop | None = None
-    outside: Outside | None = None
-    variations: tuple[Loop, ...] = ()
-    cycles: tuple[Cycle, ...] = ()
+    run: SampledRun | None = None
 
     def __repr__(self) -> str:
         """One line with the conclusion."""
@@ -151,6 +144,29 @@ class LinearView:
         """Least distance of L from -1."""
         return None if self.margins is None else self.margins.modulus_margin
 
+    @cached_property
+    def variations(self) -> tuple[Loop, ...]:
+        """The same controller with another inertia of the load, another stiffness, and with all gaps open.
+
+        Of a chain J2 is its load mass, and the factor on c is that of all shafts.
+        """
+        if self.own_loop is None:
+            return ()
+        own, found = self.own_loop, []
+        machine = own.start.machine
+        for symbol, key, factors in VARIATIONS:
+            for factor in factors:
+                varied = machine.with_values({key: factor * machine.knob(key).value})
+                found.append(replace(own, machine=varied, name=f"{symbol} x {factor:g}"))
+        return (*found, replace(own, name="all gaps open", open=True))
+
+    @cached_property
+    def cycles(self) -> tuple[Cycle, ...]:
+        """Limit cycles through the gap, predicted and checked; none of a chain, which has several gaps."""
+        if self.own_loop is None or self.run is None or len(self.drive.shaft_names) > 1:
+            return ()
+        return limit_cycles(self.own_loop, self.run)
+
     @property
     def elastic_mode(self) -> Mode | None:
         """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
@@ -160,7 +176,7 @@ class LinearView:
 
     @property
     def loop(self) -> control.StateSpace:
-        """L(z), minimal: the negative of the demand in response to a demand fed in; -1 is critical."""
+        """L(z): the negative of the demand in response to a demand fed in; -1 is critical."""
         import control
 
         loop = self._loop()
@@ -168,12 +184,12 @@ class LinearView:
 
     @property
     def controller_system(self) -> control.StateSpace:
-        """The controller's law, minimal: from the measured quantities to the demand in N m."""
+        """The controller's law: from the measured quantities to the demand in N m."""
         import control
 
         loop = self._loop()
         return control.StateSpace(
-            *minimal(loop.point.law), loop.period, inputs=[NAMES[i] for i in loop.start.inputs],
+            *loop.point.law, loop.period, inputs=[NAMES[i] for i in loop.start.inputs],
             outputs=["demand"], name=re.sub(r"\W", "_", self.name) or "controller",
         )  # fmt: skip
 
@@ -207,8 +223,6 @@ class LinearView:
                 "states": list(point.states),
                 "mismatch": point.mismatch,
             },
-            "order_of_loop": own.broken.A.shape[0],
-            "order_of_controller": minimal(point.law).A.shape[0],
             **_margin_figures(own.margins),
             "elastic_frequency": elastic and elastic.frequency,
             "elastic_damping_ratio": elastic and elastic.damping_ratio,
@@ -247,9 +261,6 @@ def linear_view(
     parameters: Mapping[str, object] | None = None,
     *,
     fitted_to: Machine | None = None,
-    inertias: Sequence[float] = INERTIAS,
-    stiffnesses: Sequence[float] = STIFFNESSES,
-    limit_cycles: bool = True,
 ) -> LinearView:
     """Linearise a controller as it runs, in contact, and analyse its loop: margins, modes, limit cycles.
 
@@ -266,11 +277,6 @@ def linear_view(
         Parameters of a controller given by name; numbers in SI, or text with units.
     fitted_to : Drive or Chain, optional
         The drive for which the controller is set up, if not `drive`.
-    inertias, stiffnesses : sequence of float, optional
-        Factors on J2 and c with which the margins of the same controller are computed too; of a chain on the
-        inertia of its load mass and on all stiffnesses.
-    limit_cycles : bool, optional
-        Whether limit cycles through the gap of a single shaft are predicted and tried on the exact plant.
 
     Returns
     -------
@@ -286,12 +292,11 @@ def linear_view(
 
     References
     ----------
-    M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
-    1633-1649, doi:10.1016/S0005-1098(02)00047-X.
+    docs/linear-view.md.
 
     Examples
     --------
-    >>> view = linear_view("crane-4amtkf", "current-limit-feedback", limit_cycles=False)
+    >>> view = linear_view("crane-4amtkf", "current-limit-feedback")
     >>> view.kind, view.stable, round(view.elastic_mode.damping_ratio, 1)
     ('loop', True, 0.7)
     >>> linear_view("crane-4amtkf", "ramp").kind
@@ -300,49 +305,25 @@ def linear_view(
     if isinstance(drive, str):
         drive = load_machine(drive)
     made = make_controller(controller, parameters)
-    _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
+    _check(drive, fitted_to)
     start = SampledStart.of(single(drive), made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
     point = operating_point(start, run)
-    if point is None:
-        return LinearView(drive, start.controller, "events", (_no_samples(name, run),))
+    if point is None or (point.feeds_back and not point.is_sampled):
+        sentence = (
+            f"{name} has no sampled loop: in contact it does not make a new demand, held until the next, at "
+            "each of equal periods; margins do not apply."
+        )
+        return LinearView(drive, start.controller, "events", (sentence,), point)
     if not point.feeds_back:
         sentence = (
             f"{name} acts open loop: in contact nothing it measures changes its torque demand; "
             "margins do not apply."
         )
         return LinearView(drive, start.controller, "open loop", (sentence,), point)
-    if not point.is_sampled:
-        sentence = (
-            f"{name} has no linear loop of this kind: what it measures changes the slope of its demand or "
-            "the instant of its next sample; margins do not apply."
-        )
-        return LinearView(drive, start.controller, "events", (sentence,), point)
     own = Loop(start, point, drive)
-    machine, variations = start.machine, []
-    for symbol, key, factors in (("J2", "load_inertia", inertias), ("c", "stiffness", stiffnesses)):
-        for factor in factors:
-            varied = machine.with_values({key: factor * machine.knob(key).value})
-            variations.append(Loop(start, point, varied, f"{symbol} x {factor:g}"))
-    outside: Outside | None = None
-    cycles: tuple[Cycle, ...] = ()
-    if len(drive.shaft_names) > 1:
-        variations.append(Loop(start, point, machine, "all gaps open", open=True))
-    else:
-        outside = Outside(start, point)
-        cycles = cycles_of(outside, run) if limit_cycles else ()
-    return LinearView(
-        drive,
-        start.controller,
-        "loop",
-        _notes(name, run, own),
-        point,
-        own,
-        outside,
-        tuple(variations),
-        cycles,
-    )
+    return LinearView(drive, start.controller, "loop", _notes(name, run, own), point, own, run)
 
 
 def _margin_figures(m: Margins) -> dict[str, Any]:
@@ -350,35 +331,12 @@ def _margin_figures(m: Margins) -> dict[str, Any]:
     return {**asdict(m), "sensitivity_peak": m.sensitivity_peak}
 
 
-def _check(drive: Any, fitted_to: Any, factors: Mapping[str, Sequence[float]]) -> None:
-    wrong = []
-    for name, one in (("drive", drive), ("fitted_to", fitted_to)):
-        if one is None:
-            continue
-        if not is_machine(one):
-            wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
-        elif one.motor is None or one.target_speed is None:
-            wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
-    for name, values in factors.items():
-        wrong += [
-            f"{name}: {value!r} is no factor; give numbers above 0."
-            for value in values
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf
-        ]
-    if wrong:
-        raise InputError(wrong)
-
-
-def _no_samples(name: str, run: SampledRun) -> str:
-    if any(one.pressing for one in run.samples) and any(one.ask_again < math.inf for one in run.samples):
-        return (
-            f"{name} does not keep one sample period throughout a contact of its start: it has no sampled "
-            "loop there, and margins do not apply."
-        )
-    return (
-        f"{name} acts at events, not at samples: in contact its torque demand is fixed beforehand, and "
-        "margins do not apply."
-    )
+def _check(*machines: Any) -> None:
+    for one in machines:
+        if one is not None and not is_machine(one):
+            raise InputError(f"drive = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
+        if one is not None and (one.motor is None or one.target_speed is None):
+            raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")
 
 
 def _notes(name: str, run: SampledRun, own: Loop) -> tuple[str, ...]:
@@ -394,9 +352,9 @@ def _notes(name: str, run: SampledRun, own: Loop) -> tuple[str, ...]:
             f"and the linear loop differ by up to {100.0 * point.mismatch:.2g} %; take the margins with "
             "caution."
         )
-    notes += [
-        f"State {index} of the controller is {kind.value} at this instant." for index, kind in point.rough
-    ]
+    if point.rough:
+        states = ", ".join(map(str, point.rough))
+        notes.append(f"The controller is not smooth at this instant in its states {states}.")
     if not own.stable:
         notes.append("The closed loop is unstable in contact: the margins are crossings, not reserves.")
     return tuple(notes)

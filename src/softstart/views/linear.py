@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.linear.limit_cycles import Outside
+from softstart.linear.limit_cycles import SHARES, Softened
 from softstart.linear.plant import sizes_of
 from softstart.linear.systems import frequencies
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
@@ -118,7 +118,7 @@ def tables(view: LinearView) -> list[Table]:
 def notes(view: LinearView) -> list[str]:
     """The mean torque of the limit cycles, then the notes of the view."""
     found = "No limit cycle through the gap is predicted by the describing function."
-    if view.outside is None:
+    if len(view.drive.shaft_names) > 1:
         found = (
             "The loop is that of the whole chain with all gaps closed; limit cycles through several gaps are "
             "not predicted: simulate shows them."
@@ -183,8 +183,8 @@ def linear_figure(view: LinearView) -> Any:
             axes.set(xlim=(w[0], w[-1]), xlabel="frequency, rad/s")
         size.legend(loc="upper left")
         _nyquist(plane, L, view.margins)
-        if view.outside is not None:
-            _harmonic_balance(gap, view, view.outside)
+        if view.own_loop is not None and len(view.drive.shaft_names) == 1:
+            _harmonic_balance(gap, view, Softened(view.own_loop))
         else:
             gap.set_axis_off()  # several gaps have no one describing function
         entitle(figure, f"{view.drive.name}: loop of {view.name} in contact")
@@ -234,21 +234,18 @@ def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
     head(axes, f"Nyquist diagram; sensitivity at most {m.sensitivity_peak:.3g}", "Im L", "Re L")
 
 
-def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
-    M = outside.contact(outside.grid())
-    # -1/n where the harmonic balance holds
-    found = [float(outside.contact(np.array([one.frequency]))[0].real) for one in view.cycles]
-    reach = max([WIDEST, *(-1.5 * at for at in found)])
-    shown = np.where(np.abs(M) < 3.0 * reach, M, math.nan)
-    axes.plot(shown.real, shown.imag, color=COLOURS[0], label="M = (c + jwd) G")
-    axes.plot([-3.0 * reach, -1.0], [0.0, 0.0], color=COLOURS[3], lw=1.6, label="-1/n of the gap")
-    axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])
-    for at, one in zip(found, view.cycles, strict=True):
+def _harmonic_balance(axes: Axes, view: LinearView, softened: Softened) -> None:
+    """Damping of the least damped mode over n; a limit cycle is where it passes through zero."""
+    outermost = [softened.poles(float(n))[0][:1] for n in SHARES]
+    s = np.array([np.log(one[0]) if one.size else math.nan for one in outermost])
+    axes.semilogx(SHARES, -s.real / np.abs(s), color=COLOURS[0])
+    axes.axhline(0.0, color=GREY, lw=0.8)
+    for one in view.cycles:
         face = COLOURS[1] if one.stable else "none"
-        axes.plot([at], [0.0], "o", ms=6, mfc=face, color=COLOURS[1])
-        axes.annotate(f"{one.frequency:.3g} rad/s", (at, 0.0), xytext=(0, 8),
+        axes.plot([one.share], [0.0], "o", ms=6, mfc=face, color=COLOURS[1])
+        axes.annotate(f"{one.frequency:.3g} rad/s", (one.share, 0.0), xytext=(0, 8),
                       textcoords="offset points", ha="center")  # fmt: skip
-    axes.set(xlim=(-reach, 0.4 * reach), ylim=(-0.7 * reach, 0.7 * reach))
-    axes.legend(loc="lower left")
+    axes.set(xlim=(SHARES[0], 1.0))
     count = len(view.cycles) or "none"
-    head(axes, f"Gap as describing function n; limit cycles predicted: {count}", "Im M", "Re M")
+    title = f"Gap as describing function n; limit cycles predicted: {count}"
+    head(axes, title, "least damping ratio", "n, share of the stiffness")

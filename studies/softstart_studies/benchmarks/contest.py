@@ -9,22 +9,20 @@ from __future__ import annotations
 
 import os
 import platform
-import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, cast
 
 import numpy as np
 
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, drawing, new_figure
-from softstart_studies.benchmarks.problem import Problem, Solve
-from softstart_studies.benchmarks.process import Apart, Here, memory
+from softstart_studies.benchmarks.problem import Problem
+from softstart_studies.benchmarks.process import Apart, Here, forget, memory, prepare, timed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +42,7 @@ class Entry(NamedTuple):
     """A contender: its package, the function that makes it ready, how it is used, and that in two words."""
 
     package: str
-    function: str
+    maker: str
     how: str
     short: str
 
@@ -99,42 +97,12 @@ def version_of(package: str) -> str | None:
         return None
 
 
-def ready(name: str, problem: Problem, starts: int) -> Solve:
-    """A contender for so many starts; this imports its package."""
-    module, function = ENTRIES[name].function.split(":")
-    found: Solve = getattr(import_module(f"{__package__}.{module}"), function)(problem, starts)
-    return found
-
-
-class Timed(NamedTuple):
-    """One pass: seconds of the process's processor time, of the clock, and the peaks, N m."""
-
-    cpu: float
-    wall: float
-    peaks: Any
-
-
-READY: dict[tuple[str, int], Solve] = {}  # of the process
-
-
-def prepare(name: str, problem: Problem, starts: int) -> float:
-    """Make ready for so many starts; seconds of the first pass, imports and compiling included."""
-    begin = time.perf_counter()
-    READY[name, starts] = ready(name, problem, starts)
-    READY[name, starts]()
-    return time.perf_counter() - begin
-
-
-def timed(name: str, starts: int) -> Timed:
-    """One pass over the starts."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    peaks = READY[name, starts]()
-    return Timed(time.process_time() - cpu, time.perf_counter() - wall, peaks.copy())
-
-
-def forget() -> None:
-    """Let go of all that was made ready, so that one duel's memory is not counted in the next."""
-    READY.clear()
+def prepared(host: Host, name: str, problem: Problem, starts: int) -> float:
+    """Make a contender ready for so many starts; this imports its package. Seconds of the first pass."""
+    seconds: float = host(
+        prepare, f"{name} {starts}", f"{__package__}.{ENTRIES[name].maker}", problem, starts
+    )
+    return seconds
 
 
 @dataclass(frozen=True)
@@ -181,23 +149,22 @@ class Outcome(NamedTuple):
 
 def fight(duel: Duel, peer: Host, ours: Host, passes: int) -> Outcome:
     """The two in turns, so that a machine that slows down slows both; the ratio is a median, too."""
-    mine = (duel.ours, duel.problem, duel.our_starts)
-    prepared = peer(prepare, duel.peer, duel.problem, duel.peer_starts) if duel.peer else np.nan
-    ours(prepare, *mine)
+    first = prepared(peer, duel.peer, duel.problem, duel.peer_starts) if duel.peer else np.nan
+    prepared(ours, duel.ours, duel.problem, duel.our_starts)
     theirs, own = [], []
     for _ in range(1 if duel.once else passes):
         if duel.peer:
-            theirs.append(peer(timed, duel.peer, duel.peer_starts))
-        own.append(ours(timed, duel.ours, duel.our_starts))
+            theirs.append(peer(timed, f"{duel.peer} {duel.peer_starts}"))
+        own.append(ours(timed, f"{duel.ours} {duel.our_starts}"))
     rate = median(duel.our_starts / one.cpu for one in own)
     if not duel.peer:
         return Outcome(duel, np.nan, rate, np.nan, np.nan, np.nan, np.nan)
     share = duel.our_starts / duel.peer_starts
-    ours(prepare, duel.ours, duel.problem, duel.peer_starts)
-    same = ours(timed, duel.ours, duel.peer_starts)
+    prepared(ours, duel.ours, duel.problem, duel.peer_starts)
+    same = ours(timed, f"{duel.ours} {duel.peer_starts}")
     for host in (peer, ours):
         host(forget)
-    apart = np.abs(theirs[0].peaks - same.peaks) / duel.problem.machines()[0].mean_torque
+    apart = np.abs(theirs[0].found - same.found) / duel.problem.machines()[0].mean_torque
     return Outcome(
         duel,
         median(duel.peer_starts / one.cpu for one in theirs),
@@ -205,7 +172,7 @@ def fight(duel: Duel, peer: Host, ours: Host, passes: int) -> Outcome:
         median(share * a.cpu / b.cpu for a, b in zip(theirs, own, strict=True)),
         median(share * a.wall / b.wall for a, b in zip(theirs, own, strict=True)),
         float(apart.max()),
-        prepared,
+        first,
     )
 
 

@@ -5,17 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from softstart import Command, Controller, Drive, Measured, PlainController, linear_view
-from softstart.linear.view import LinearView
+from softstart import Command, Drive, Measured, PlainController
 
 CRANE = Drive.load("crane-4amtkf")
 # no torque limit is in the way of a linear loop
 FREE = CRANE.replace(maximum_torque=1e5, minimum_torque=-1e5, encoder_lines=0)
-
-
-def loop_of(drive: Drive, controller: str | Controller) -> LinearView:
-    """The view without other drives and limit cycles."""
-    return linear_view(drive, controller, inertias=(), stiffnesses=(), limit_cycles=False)
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI, loop_of
+from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI
 
 from softstart import Command, Drive, InputError, PlainController, Sensor, SimulationError, linear_view
-from softstart.linear.law import Sample, SampledStart, Smoothness, closed, derivative, run_until_steady
+from softstart.linear.law import Sample, SampledStart, closed, derivative, run_until_steady
 from softstart.linear.plant import in_contact, sampled
 
 
@@ -17,8 +17,7 @@ def responses(view, drive, angle, count):
     """Torques at the samples from the operating point on, over the angle by which the motor was turned."""
     start, sample, ends = SampledStart.of(drive, view.controller), view.point.sample, []
     for side in (angle, -angle):
-        turned = sample.copied()
-        turned.plant["theta"][0] += side
+        turned = sample.displaced(in_contact(drive), side * np.repeat([1.0, 0.0], [2, 3]))
         rows = start.samples(sample.time + (count - 0.5) * view.period, begin=turned)
         ends.append(np.array([one.shaft_torque for one in rows]))
     assert ends[0].size == count
@@ -26,7 +25,7 @@ def responses(view, drive, angle, count):
 
 
 def test_the_law_of_a_linear_controller_is_found():
-    view = loop_of(FREE, Filtered())
+    view = linear_view(FREE, Filtered())
     law, known = view.point.law, Filtered
     assert view.point.states == (2, 3)  # not the counter, not the mode
     for found, said in (
@@ -43,7 +42,7 @@ def test_the_law_of_a_linear_controller_is_found():
 def test_a_proportional_speed_loop_has_its_closed_form():
     # w1/u = 1/((J1 + J2) s) + J2/(J1 (J1 + J2)) s/(s^2 + Omega^2), each part held over a sample
     kp, h = 0.8, 0.001
-    view = loop_of(FREE, SpeedPI(kp))
+    view = linear_view(FREE, SpeedPI(kp))
     J1, J2, Omega = FREE.J1, FREE.J2, FREE.Omega
     z = np.exp(1j * np.linspace(0.002, 3.1, 200)) * 1.001
     rigid = h / ((J1 + J2) * (z - 1.0))
@@ -51,7 +50,6 @@ def test_a_proportional_speed_loop_has_its_closed_form():
     known = kp * (rigid + J2 / (J1 * (J1 + J2)) * elastic)
     found = view.own_loop.broken.response(z)[:, 0, 0]
     assert np.max(np.abs(found / known - 1.0)) < 1e-9
-    assert view.own_loop.broken.A.shape[0] == 3
     assert view.loop(z[0]) == pytest.approx(known[0], rel=1e-9)
 
 
@@ -59,14 +57,14 @@ def test_a_proportional_speed_loop_has_its_closed_form():
     ("drive", "controller"),
     [
         (CRANE, "current-limit-feedback"),
-        (CRANE.replace(torque_lag=0.002), "current-limit-feedback"),
+        (CRANE, "state-feedback"),
         (FREE.replace(torque_lag=0.02, computing_delay=0.0134, damping=2.0), SpeedPI(2.0, 5.0)),
         (FREE.replace(damping=1.0, encoder_lines=4096), SpeedPI(1.0, 8.0)),
     ],
 )
 def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controller):
     """A displacement in contact, under the controller itself, against the closed loop's modes alone."""
-    view = loop_of(drive, controller)
+    view = linear_view(drive, controller)
     assert view.point.mismatch < 1e-6
     count, h = 12, view.period
     response = responses(view, drive, 1e-4 * view.point.sample.plant["theta"][0], count)
@@ -88,7 +86,7 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
 def test_the_least_damped_mode_is_what_rings_on():
     """Long after a displacement only the slowest swinging mode is left: its decay and frequency, measured."""
     drive = FREE.replace(damping=0.6)
-    view = loop_of(drive, SpeedPI(0.05))
+    view = linear_view(drive, SpeedPI(0.05))
     mode = view.elastic_mode
     ring = responses(view, drive, 1e-4 * view.point.sample.plant["theta"][0], 400)
     # a sampled ring obeys y[k+2] = 2 Re z y[k+1] - |z|^2 y[k]; the slow turning is differenced away
@@ -103,7 +101,7 @@ def test_the_least_damped_mode_is_what_rings_on():
 
 def test_current_limit_feedback_damps_as_its_page_says():
     """Without lag: damping near the 0.7 asked for; the loop gain is 1 at Omega (zeta + sqrt(zeta^2 + 1))."""
-    view = loop_of(CRANE, "current-limit-feedback")
+    view = linear_view(CRANE, "current-limit-feedback")
     zeta, Omega = view.controller.damping_ratio, CRANE.Omega
     assert zeta == pytest.approx(0.7)
     assert view.elastic_mode.damping_ratio == pytest.approx(zeta, rel=0.05)
@@ -115,28 +113,23 @@ def test_current_limit_feedback_damps_as_its_page_says():
 @pytest.mark.parametrize("lag", [0.002, 0.004, 0.006])
 def test_current_limit_feedback_keeps_thirty_degrees_behind_a_lag(lag):
     """The phase margin promised is kept, with room; behind a long lag the damping is not that asked for."""
-    view = loop_of(CRANE.replace(torque_lag=lag), "current-limit-feedback")
+    view = linear_view(CRANE.replace(torque_lag=lag), "current-limit-feedback")
     assert view.stable
     assert math.degrees(view.phase_margin) > 30.0
-    if lag > 0.003:
+    if lag > 0.005:
         assert view.elastic_mode.damping_ratio < 0.75 * view.controller.damping_ratio
 
 
 def test_other_drives_under_the_same_controller():
-    view = linear_view(CRANE, "current-limit-feedback", limit_cycles=False)
+    view = linear_view(FREE, SpeedPI(1.0, 3.0))
     names = [one.name for one in view.variations]
-    assert names == ["J2 x 0.4", "J2 x 1", "J2 x 2.5", "c x 0.9", "c x 1.1"]
-    same = view.variations[1].margins
-    assert same.phase_margin == pytest.approx(view.phase_margin, rel=1e-9)
-    assert same.gain_margin == pytest.approx(view.gain_margin, rel=1e-9)
-    alone = linear_view(
-        CRANE.replace(load_inertia=2.5 * CRANE.J2), view.controller, fitted_to=CRANE, limit_cycles=False
-    )
-    assert alone.phase_margin == pytest.approx(view.variations[2].margins.phase_margin, rel=1e-5)
+    assert names == ["J2 x 0.4", "J2 x 2.5", "c x 0.9", "c x 1.1", "all gaps open"]
+    other = linear_view(FREE.replace(load_inertia=2.5 * FREE.J2), view.controller, fitted_to=FREE)
+    assert other.phase_margin == pytest.approx(view.variations[1].margins.phase_margin, rel=1e-5)
 
 
 def test_the_same_view_twice():
-    first, second = (loop_of(CRANE, "current-limit-feedback").summary() for _ in range(2))
+    first, second = (linear_view(CRANE, "current-limit-feedback").summary() for _ in range(2))
     assert first == second
 
 
@@ -186,7 +179,7 @@ class Hasty(PlainController):
 def test_feedback_that_is_no_sampled_loop_is_said(controller):
     view = linear_view(FREE, controller)
     assert view.kind == "events"
-    assert "slope of its demand" in view.conclusion
+    assert "no sampled loop" in view.conclusion
 
 
 class LoadSpeed(PlainController):
@@ -201,7 +194,7 @@ class LoadSpeed(PlainController):
 
 
 def test_declared_sensors_are_inputs():
-    view = loop_of(FREE, LoadSpeed())
+    view = linear_view(FREE, LoadSpeed())
     assert view.controller_system.input_labels[3:] == ["shaft_torque", "load_speed"]
     D = view.controller_system.D[0]
     assert pytest.approx([0.0, 0.0, 0.0, -0.2, -0.3], abs=1e-10) == D
@@ -217,9 +210,6 @@ def test_bad_input():
         linear_view(CRANE, "rampp")
     with pytest.raises(InputError, match="give a Drive"):
         linear_view(5, "ramp")  # type: ignore[arg-type]
-    with pytest.raises(InputError) as caught:
-        linear_view(CRANE, "ramp", inertias=[0.0, 2.0], stiffnesses=[-1.0, math.nan])
-    assert len(caught.value.sentences) == 3
     with pytest.raises(SimulationError, match="failed at t = 0 s"):
         linear_view(CRANE, Broken())
 
@@ -237,13 +227,11 @@ def test_what_is_not_smooth_is_named():
         kept = np.array([a**3, abs(b), 1.0 if c == 0.0 else -1.0, max(d, 0.0) ** 0.5])
         return a + b + c + d, 0.001, 0.0, kept
 
-    found = derivative(step, sample([2.0, 0.0, 0.0, 0.0]), (), np.ones(4), np.zeros(0), 1.0)
-    assert found.smoothness == (
-        Smoothness.SMOOTH, Smoothness.CORNER, Smoothness.JUMP, Smoothness.ONE_SIDED,
-    )  # fmt: skip
-    assert found.law.A[0, 0] == pytest.approx(12.0, rel=1e-10)
-    assert abs(found.law.A[1, 1]) == pytest.approx(1.0)
-    assert found.law.A[3, 3] == 0.0
+    law, _, rough = derivative(step, sample([2.0, 0.0, 0.0, 0.0]), (), np.ones(4), np.zeros(0), 1.0)
+    assert rough == (1, 2, 3)
+    assert law.A[0, 0] == pytest.approx(12.0, rel=1e-10)
+    assert abs(law.A[1, 1]) == pytest.approx(1.0)  # a corner: one of its sides
+    assert law.A[2, 2] == law.A[3, 3] == 0.0  # a jump, and linear on one side only
 
 
 def test_derivatives_of_a_smooth_step_are_accurate():
@@ -251,11 +239,12 @@ def test_derivatives_of_a_smooth_step_are_accurate():
         x, y = state[0], measured[1]
         return math.sin(x) * math.exp(y), 0.001, 0.0, np.array([x * y + x * x])
 
-    found = derivative(step, sample([0.7], [0.4]), (1,), np.ones(1), np.ones(1), 1.0)
-    assert found.law.C[0, 0] == pytest.approx(math.cos(0.7) * math.exp(0.4), rel=1e-10)
-    assert found.law.D[0, 0] == pytest.approx(math.sin(0.7) * math.exp(0.4), rel=1e-10)
-    assert found.law.A[0, 0] == pytest.approx(0.4 + 1.4, rel=1e-10)
-    assert found.law.B[0, 0] == pytest.approx(0.7, rel=1e-10)
+    law, _, rough = derivative(step, sample([0.7], [0.4]), (1,), np.ones(1), np.ones(1), 1.0)
+    assert rough == ()
+    assert law.C[0, 0] == pytest.approx(math.cos(0.7) * math.exp(0.4), rel=1e-10)
+    assert law.D[0, 0] == pytest.approx(math.sin(0.7) * math.exp(0.4), rel=1e-10)
+    assert law.A[0, 0] == pytest.approx(0.4 + 1.4, rel=1e-10)
+    assert law.B[0, 0] == pytest.approx(0.7, rel=1e-10)
 
 
 def test_the_start_is_the_one_of_simulate():

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI, loop_of
+from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI
 
-from softstart import Command, PlainController
+from softstart import Command, PlainController, linear_view
 from softstart.linear.loop import margins
 from softstart.linear.systems import System
 
@@ -65,10 +65,13 @@ LAGGING = FREE.replace(torque_lag=0.02, computing_delay=0.01, damping=2.0)
 def views():
     """Loops with a lag, a delay, an observer, encoder differences."""
     return [
-        loop_of(LAGGING, SpeedPI(4.0, 20.0)),
-        loop_of(LAGGING.replace(encoder_lines=1024), SpeedPI(2.0, 5.0)),
-        loop_of(CRANE, "current-limit-feedback"),
-        *(loop_of(CRANE.replace(torque_lag=lag), "current-limit-feedback") for lag in (0.0005, 0.001, 0.002)),
+        linear_view(LAGGING, SpeedPI(4.0, 20.0)),
+        linear_view(LAGGING.replace(encoder_lines=1024), SpeedPI(2.0, 5.0)),
+        linear_view(CRANE, "state-feedback"),
+        *(
+            linear_view(CRANE.replace(torque_lag=lag), "current-limit-feedback")
+            for lag in (0.0005, 0.001, 0.002)
+        ),
     ]
 
 
@@ -114,7 +117,7 @@ class TorqueOfBefore(PlainController):
 
 
 def test_no_delay_below_the_margin_does_harm_where_the_loop_jumps():
-    view = loop_of(FREE.replace(damping=1.0), TorqueOfBefore())
+    view = linear_view(FREE.replace(damping=1.0), TorqueOfBefore())
     margin = view.delay_margin
     inside = [share * margin for share in np.linspace(0.0, 0.999, 60)]
     inside += [k * view.period for k in range(60) if k * view.period < margin]
