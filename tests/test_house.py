@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 52621, "tests": 38349}  # lines; lower a number when it has fallen, never raise it
-LONGEST = 896  # lines of the longest file
+MOST = {"src, controllers": 47719, "tests": 37647}  # lines; lower a number when it has fallen, never raise it
+LONGEST = 794  # lines of the longest file
 
 
 def files(*folders: str) -> dict[Path, int]:
