@@ -176,7 +176,7 @@ class Report:
 
         >>> from softstart import report
         >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-49:]
-        ' below 0.976; the gentlest start known has 0.977.'
+        ' below 0.977; the gentlest start known has 0.978.'
         """
         from softstart.reporting.document import answer  # which renders a Report
 
@@ -277,7 +277,7 @@ def report(
     --------
     >>> found = report("crane-4amtkf", controllers=["ramp", "shaped"], budget=0.0)
     >>> found
-    <Report: shaped, K_dyn 1.004, gentlest unbeaten, for Crane travel drive 4AMTKF(H)112L6>
+    <Report: shaped, K_dyn 1.003, gentlest unbeaten, for Crane travel drive 4AMTKF(H)112L6>
     >>> found.choice.ordinary.name
     'ramp'
 

@@ -102,7 +102,7 @@ def test_two_at_once_and_an_end_with_the_last_tab_and_the_server(works: Any, tmp
 def test_cancel_ends_even_a_deaf_process_within_a_second(jobs: Jobs, works: Any, tmp_path: Path) -> None:
     endless = jobs.begin("A", "endless", works.endless, str(tmp_path / "started"))
     started = tmp_path / "started"
-    until(lambda: started.exists() and len(started.read_text().split()) == 2)
+    until(lambda: started.exists() and len(started.read_text().split()) == 2 and endless.message != "")
     assert (endless.state, endless.share, endless.message) == (State.RUNNING, None, "without an end")
     own, other = map(int, started.read_text().split())
     assert endless.pid == own
