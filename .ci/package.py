@@ -135,7 +135,7 @@ def works_alone(python: Path, folder: Path) -> None:
     for word, known in (("drives", "crane-4amtkf"), ("controllers", "take-up")):
         told = run([python.parent / "softstart", word], where=empty, kept=True)
         check(known in told, f"softstart {word} does not list {known}.")
-    names = "from softstart.study import study_names; print(*study_names())"
+    names = "from softstart.plugins import STUDIES, registered; print(*registered(STUDIES))"
     studies = run([python, "-c", names], where=empty, kept=True)
     check("paper-g" in studies, "softstart study does not find its studies.")
     check("benchmark" not in studies, f"softstart study lists what is not installed: {studies}")
