@@ -18,6 +18,7 @@ import sqlite3
 import stat
 import sys
 import tempfile
+import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -32,6 +33,7 @@ SMALLEST = 512  # bytes of an SQLite file
 # the first two remove what a killed process left; a power failure may cost the file, but no number is wrong
 MODES = "journal_mode = PERSIST", "journal_mode = DELETE", "locking_mode = EXCLUSIVE", "synchronous = OFF"
 NAMED = 3  # damaged parts that are named
+REMOVING = threading.RLock()
 
 
 def warn_of_damage(path: Path, parts: Sequence[str]) -> None:
@@ -250,7 +252,8 @@ def _runs(number: str) -> bool:
 
 
 def _remove(path: Path) -> None:
-    """Remove a folder into which another thread may still be writing."""
-    with suppress(OSError):  # it has been put in place
-        path = path.rename(path.with_suffix(".gone.part"))
-    shutil.rmtree(path, ignore_errors=True)
+    """Remove a folder into which another thread may still be writing; who comes second waits for the first."""
+    with REMOVING:
+        with suppress(OSError):  # it has been put in place
+            path = path.rename(path.with_suffix(".gone.part"))
+        shutil.rmtree(path, ignore_errors=True)
