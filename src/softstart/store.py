@@ -252,7 +252,7 @@ def _runs(number: str) -> bool:
 
 
 def _remove(path: Path) -> None:
-    """Remove a folder into which another thread may still be writing; who comes second waits for the first."""
+    """Remove a folder into which another thread may still write; who comes second waits for the first."""
     with REMOVING:
         with suppress(OSError):  # it has been put in place
             path = path.rename(path.with_suffix(".gone.part"))
