@@ -299,22 +299,8 @@ class PulseCoastHold(CompiledController):
     inertia_ratio: float | None = parameter(
         "1", "J2/J1 as first guessed at contact", "3", value=3.0, rule="above 0", multiples=(0.3, 4.0)
     )
-    certainty: float | None = parameter(
-        "1",
-        "standard deviations of the motor's angle that mean contact",
-        "7",
-        value=7.0,
-        rule="above 0",
-        between=(4.0, 12.0),
-    )
-    uncertainty: float | None = parameter(
-        "1",
-        "unknown part of the twist in each sample",
-        "0.15",
-        value=0.15,
-        rule="0 or more",
-        between=(0.01, 0.5),
-    )
+    certainty: float | None = contact.certainty_parameter()
+    uncertainty: float | None = contact.uncertainty_parameter()
     patience: float | None = patience_parameter()
     period: float | None = period_parameter()
 
