@@ -234,8 +234,7 @@ def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
     assert chain.position == "unknown"
     assert reduce_chain(chain).to_drive().start_position == "unknown"
     view, mid = (linear_view(one, "state-feedback") for one in (plain, named.replace(start_position=0.0)))
-    assert view.margins == mid.margins
-    assert view.margins is not None
+    assert view.loop.margins == mid.loop.margins
 
 
 def test_a_question_for_one_position_says_so() -> None:

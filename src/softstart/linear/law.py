@@ -1,8 +1,8 @@
 """The linear law of a controller: the derivative of its step at an instant of its own start.
 
 The start runs on the exact plant (`SampledStart`), with an infinitely fine encoder and without noise, until
-the shaft torque is steady. Several samples along the contact are tried. At each, the step, a function
-(measured, state) -> (demand, new state), is differentiated:
+the shaft torque is steady. At several samples along the contact the step, a function (measured, state) ->
+(demand, new state), is differentiated:
 
     x+ = A x + B y,   demand = C x + D y        small changes of its state x and of what is measured, y
 
@@ -11,19 +11,13 @@ slightly, both ways, and the responses of shaft torque and demand over a few sam
 of the linear loop. The steady instant is taken if the prediction is good there, otherwise the instant with
 the best prediction: a controller whose demand lies exactly on a limit has no linear law at that point, but it
 has one before it gets there.
-
-The derivative is taken by differences. Each component is displaced both ways by a step and by half of it,
-with ever smaller steps until both sides agree. Richardson's extrapolation of the central difference is then
-taken (error of fourth order). Where the sides never agree, the steeper side that is linear is taken (a corner
-or a switch: a demand on its limit), or nothing (a jump: the number of a mode); a note reports it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -35,25 +29,24 @@ from softstart.errors import InputError, SimulationError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
 from softstart.linear.plant import Plant, SampledPlant, in_contact, sampled, sizes_of
-from softstart.linear.systems import System, moved
+from softstart.linear.systems import System
 from softstart.start.engine import plain_answer
 from softstart.start.recorded import Recorder
 from softstart.start.rows import Rows, rows_of
 
 FAR = 1e9  # in target speeds: never reached
 CLOSED = (at.CONTACT, at.JOINED, at.PRESSED, at.WELDED)
-LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
+LONGEST, STIFF = 58.0, 0.02  # elastic periods and time limits after which a start counts as never steady
 MOST_SAMPLES = 20_000
 STEADY = 1e-6  # of M12avg_base: spread of shaft torque and demand over two elastic periods
+TRIED = {round(1.5**k) for k in range(30)}  # samples of a contact, from its beginning
 WINDOW = 16  # samples over which the linear loop is compared with the exact plant
 LEAST = 0.01  # of a state: its smallest scale, for rounding's sake
 GOOD = 1e-3  # relative mismatch up to which a linear law counts as good
 FAIR = 0.1  # the same for a law that feeds back, where the good ones do not: a demand beyond its limit
-STEP = 2.0**-13  # of a component's scale
-STEPS = (STEP, 2.0**-17, 2.0**-21)
+STEPS = (2.0**-13, 2.0**-17, 2.0**-21)  # of a component's scale
 SAME = 1e-4  # of a column's largest entry, in scales: the two sides agree, or the two step sizes do
 NOTHING = 1e-10  # an entry below this, in scales, is rounding
-SMOOTH, KINK, JUMP = range(3)  # of a step in one component: with a slope, one on each side, none
 
 NONE = np.zeros(0)
 
@@ -71,8 +64,7 @@ class Sample:
     state: Vector
     demand: float
     ask_again: float
-    slope: float
-    work: Vector  # of the kernel just before; empty if it was not to be kept
+    work: Vector  # of the kernel just before; empty where it is not kept
 
     @property
     def time(self) -> float:
@@ -86,11 +78,11 @@ class Sample:
 
     @property
     def plant(self) -> Any:
-        """The plant by names, as `softstart.kernel.records` has them; only of a kept sample."""
+        """The plant by names, as `softstart.kernel.records` has them."""
         return self.work.view(at.WORK)[0]
 
     def displaced(self, plant: Plant, by: Vector) -> Sample:
-        """A kept sample whose machine is moved by a state of `plant`, and the controller not."""
+        """The sample with the machine moved by a state of `plant`, and the controller not."""
         copy = replace(self, work=self.work.copy(), state=self.state.copy())
         now = copy.plant
         now["zeros"][:] = now["passed"][:] = 0  # what has just happened no longer applies
@@ -147,17 +139,15 @@ class SampledStart:
         found += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
         return tuple(found)
 
+    def recorder(self, room: int = 0) -> Recorder:
+        """The kernel for a start of which so many spans are recorded at first, or none."""
+        return Recorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, room)
+
     def samples(
-        self,
-        until: float,
-        *,
-        begin: Sample | None = None,
-        keep: Collection[int] = (),
-        recorder: Recorder | None = None,
+        self, until: float, begin: Sample | None = None, recorder: Recorder | None = None
     ) -> Iterator[Sample]:
         """The start from its beginning or from a kept sample."""
-        seen = self.sees | exchange.SEES_SHAFT_TORQUE
-        recorder = recorder or Recorder(self.rows, seen, 0)
+        recorder = recorder or self.recorder()
         recorder.begin(until, bool(self.controller.sensors & Sensor.STAGE))
         now, state = recorder.state, self.first_state
         if begin is not None:
@@ -165,34 +155,29 @@ class SampledStart:
             now.n_spans = now.n_events = 0.0
             now.changed, now.t_end = 1.0, until
         name = f"{self.machine.name}, controller {label_of(self.controller)}"
-        count = 0
         while (reason := recorder.advance()) != at.ENDED:
             if reason == at.BUFFER_FULL:
                 recorder.grow()
                 continue
             if reason != at.ASK:
                 raise SimulationError(f"{name}: the start was given up at t = {now.time:.6g} s.")
-            work = recorder.work.copy() if count in keep else NONE
+            work = recorder.work.copy()
             measured, torque = self._measured(recorder)
             demand, ask_again, slope, after = self.step(measured, state)
             moves = (now.rubs == 0.0) | (now.direction != 0.0)
             pressing = np.isin(now.mode[: self.rows.count - 1], CLOSED).all() and moves.all()
-            yield Sample(bool(pressing), torque, measured, state, demand, ask_again, slope, work)
+            yield Sample(bool(pressing), torque, measured, state, demand, ask_again, work)
             if recorder.answer(demand, ask_again, slope) != at.ASK:
                 raise SimulationError(
                     f"{name}: at t = {now.time:.6g} s the controller's answer was no "
                     f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
                 )
-            state, count = after, count + 1
+            state = after
 
     def sampled(self, plant: Plant, period: float, further: float = 0.0) -> SampledPlant:
         """The plant as this controller sees it, with the dead time of the drive and so much further, s."""
         delay = float(self.rows.machine.dead_time) + further
         return sampled(plant, period, delay, self.inputs, self.differencing)
-
-    def kept(self, index: int) -> Sample:
-        """The sample of this number from the beginning, from which the start can be continued."""
-        return next(islice(self.samples(math.inf, keep={index}), index, None))
 
     def _measured(self, recorder: Recorder) -> tuple[Vector, float]:
         """What the controller sees, and the shaft torque, which it may not see."""
@@ -230,10 +215,14 @@ def _plain(controller: PlainController) -> Step:
 
 @dataclass(frozen=True, eq=False)
 class SampledRun:
-    """The samples of a start, and the longest stretch of them in one contact at one sample period."""
+    """The samples of a start, the longest stretch of them in one contact at one sample period (the last of
+    equals), and with the work of the kernel those to be linearised at, by index, and the last of all.
+    """
 
-    samples: tuple[Sample, ...]
+    samples: list[Sample]
     contact: range  # indices; empty if there is none
+    kept: dict[int, Sample]
+    last: Sample
     steady: bool
 
     @property
@@ -246,47 +235,41 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     """Run the start until it is steady, at most for LONGEST and STIFF."""
     sizes = sizes_of(start.machine)
     samples: list[Sample] = []
+    contact, kept = range(0), {}
+    first, period, here = 0, math.nan, dict[int, Sample]()
     pressing, steady = 0, False  # samples since it was last open
-    for sample in start.samples(LONGEST * sizes.period + STIFF * _stiff(start)):
-        samples.append(sample)
+    for index, sample in enumerate(
+        start.samples(LONGEST * sizes.period + STIFF * float(start.rows.machine.time_limit))
+    ):
+        samples.append(replace(sample, work=NONE))
+        if not abs(sample.period - period) <= 1e-6 * sample.period:
+            first, period, here = index, sample.period, {}
+        elif index - 1 - first not in TRIED:
+            del here[index - 1]
+        here[index] = sample
+        if period > 0.0 and index + 1 - first >= len(contact):
+            contact, kept = range(first, index + 1), here
         pressing = pressing + 1 if sample.pressing else 0
-        if len(samples) % 8 == 0 and sample.period > 0.0:
+        if index % 8 == 7 and sample.period > 0.0:
             back = max(WINDOW, math.ceil(2.0 * sizes.period / sample.period))
             if pressing >= back:
                 recent = np.array([(one.shaft_torque, one.demand) for one in samples[-back:]])
                 steady = bool(np.ptp(recent, axis=0).max() <= STEADY * sizes.base)
         if steady or len(samples) >= MOST_SAMPLES:
             break
-    return SampledRun(tuple(samples), _longest_contact(samples), steady)
-
-
-def _stiff(start: SampledStart) -> float:
-    """The time of a stiff start under the starting torque, s."""
-    mass = start.rows.masses.view(at.MASS)[0, :, 0]
-    target, Ms = float(start.machine.target_speed or 0.0), float(start.machine.motor.starting_torque)
-    against = float((mass["Mc"] + mass["active"] + mass["friction"] + mass["ground"] * target).sum())
-    return float(mass["J"][np.isfinite(mass["J"])].sum()) * target / max(Ms - against, 0.01 * Ms)
-
-
-def _longest_contact(samples: list[Sample]) -> range:
-    """The longest stretch of samples in one contact at one period; the last of equals."""
-    best, first, period = range(0), 0, math.nan
-    for index, sample in enumerate(samples):
-        if not abs(sample.period - period) <= 1e-6 * sample.period:
-            first, period = index, sample.period
-        if index + 1 - first >= len(best) and period > 0.0:
-            best = range(first, index + 1)
-    return best
+    return SampledRun(samples, contact, kept, sample, steady)
 
 
 def derivative(
     step: Step, sample: Sample, inputs: tuple[int, ...], scales: Vector, input_scales: Vector, base: float
-) -> tuple[System, Matrix, tuple[int, ...]]:
-    """The law x+ = A x + B y, demand = C x + D y of a step at a sample, for small changes, by differences.
+) -> System:
+    """A step at a sample for small changes: x+ = A x + B y, and C x + D y of demand, slope, next instant.
 
-    `scales` and `input_scales` are the sizes of x and y, `base` that of the demand. With the law come the
-    derivatives of the demand's slope and of the instant of the next sample, which are zero in a sampled loop,
-    and the components of (x, y) in which the step is not smooth.
+    `scales` and `input_scales` are the sizes of x and y, `base` that of the demand. Each component is
+    displaced both ways by a step and by half of it, with ever smaller steps until both sides agree;
+    Richardson's extrapolation of the central difference has an error of fourth order. Where the sides never
+    agree, the steeper side that is linear is taken (a corner or a switch: a demand on its limit), or nothing
+    (a jump: the number of a mode).
     """
     size, seen = sample.state.size, list(inputs)
     period = max(sample.ask_again - sample.time, 1e-300)
@@ -302,36 +285,26 @@ def derivative(
         return np.asarray(np.array([*after, demand, slope, ask_again]) / heights)
 
     now = response(0, 0.0)
-    columns, rough = [], []
-    for index, width in enumerate(widths):
-        tried = []
-        for share in STEPS:
-            with np.errstate(invalid="ignore"):  # "never again" is an infinite instant
-                tried.append(_slope(*(
-                    np.array([(response(index, by * side) - now) / (by * side) for side in (1.0, -1.0)])
-                    for by in (share, 0.5 * share)
-                )))  # fmt: skip
-            if tried[-1][0] == SMOOTH:
-                break
-        kind, column = min(tried, key=lambda one: one[0])
-        columns.append(np.where(np.abs(column) < NOTHING, 0.0, column) * heights / width)
-        rough += [index] * (kind != SMOOTH)
-    whole = np.array(columns).T
-    law = System(whole[:size, :size], whole[:size, size:], whole[[size], :size], whole[[size], size:])
-    return law, whole[size + 1 :], tuple(rough)
 
+    def quotients(index: int, by: float) -> Matrix:
+        return np.array([(response(index, side) - now) / side for side in (by, -by)])
 
-def _slope(wide: Matrix, near: Matrix) -> tuple[int, Vector]:
-    """How smooth, and the slope, from quotients over a step and half of it, each forward and backward."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        sides = 2.0 * near - wide
-        tolerance = SAME * max(float(np.max(np.abs(near))), NOTHING)
-        straight = sides[np.all(np.abs(near - wide) <= tolerance, axis=1)]
-        if len(straight) == 2 and np.all(np.abs(sides[0] - sides[1]) <= tolerance):
-            return SMOOTH, (2.0 * near.sum(axis=0) - 0.5 * wide.sum(axis=0)) / 3.0
-    if len(straight):
-        return KINK, max(straight, key=lambda column: float(np.sum(np.abs(column))))
-    return JUMP, np.zeros_like(near[0])
+    def slope(index: int) -> Vector:
+        one_sided = []
+        for by in STEPS:
+            wide, near = quotients(index, by), quotients(index, 0.5 * by)
+            sides = 2.0 * near - wide
+            tolerance = SAME * max(float(np.max(np.abs(near))), NOTHING)
+            straight = sides[np.all(np.abs(near - wide) <= tolerance, axis=1)]
+            if len(straight) == 2 and np.all(np.abs(sides[0] - sides[1]) <= tolerance):
+                return np.asarray((2.0 * near.sum(axis=0) - 0.5 * wide.sum(axis=0)) / 3.0)
+            one_sided += [straight] if len(straight) else []
+        return max(one_sided[0], key=lambda side: float(np.abs(side).sum())) if one_sided else 0.0 * heights
+
+    with np.errstate(invalid="ignore", over="ignore"):  # "never again" is an infinite instant
+        columns = np.array([slope(index) for index in range(widths.size)]).reshape(-1, heights.size)
+    whole = (np.where(np.abs(columns) < NOTHING, 0.0, columns) * heights / widths[:, None]).T
+    return System(whole[:size, :size], whole[:size, size:], whole[size:, :size], whole[size:, size:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,16 +312,14 @@ class OperatingPoint:
     """An instant, and the controller's part in the loop there.
 
     `law` has the states `states` of the controller: those that a measured quantity moves and that show in the
-    demand; in `rough` ones the step is not smooth. `is_sampled`: nothing measured changes the slope of the
-    demand or the instant of the next sample. `mismatch` is the largest difference between linear and exact
-    response, relative to the exact.
+    demand. `is_sampled`: nothing measured changes the slope of the demand or the instant of the next sample.
+    `mismatch` is the largest difference between linear and exact response, relative to the exact.
     """
 
     sample: Sample
     period: float
     law: System
-    states: tuple[int, ...]
-    rough: tuple[int, ...]
+    states: list[int]
     is_sampled: bool
     mismatch: float
     steady: bool
@@ -373,33 +344,27 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
     """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
     if len(run.contact) < 3:
         return []
-    offsets = {round(1.5**k) for k in range(1, 30)}
-    places = {1, len(run.contact) - 1} | {k for k in offsets if k < len(run.contact) - 1}
-    indices = sorted(run.contact[place] for place in places)
-    again = start.samples(math.inf, keep=set(indices))
-    kept = [sample for sample in islice(again, indices[-1] + 1) if sample.work.size]
-    found = [_linearised_at(start, run, index, one) for index, one in zip(indices, kept, strict=True)]
+    found = [_linearised_at(start, run, index, one) for index, one in run.kept.items()]
     return sorted(found, key=lambda one: one.mismatch)
 
 
 def _linearised_at(start: SampledStart, run: SampledRun, index: int, sample: Sample) -> OperatingPoint:
     sizes, inputs = sizes_of(start.machine), start.inputs
-    scales = _scales(run, index, sizes.period)
     of_inputs = {
         exchange.M_MOTOR_ANGLE: sizes.windup,
         exchange.M_MOTOR_TORQUE: sizes.base,
         exchange.M_SHAFT_TORQUE: sizes.base,
     }
-    input_scales = np.array([of_inputs.get(index, sizes.speed) for index in inputs])
-    whole, rates, rough = derivative(start.step, sample, inputs, scales, input_scales, sizes.base)
-    reached = moved(whole)
-    states = [reached[i] for i in moved(whole.part(reached).dual())]
-    law = whole.part(states)
-    is_sampled = not np.any(rates[:, [*states, *range(scales.size, rates.shape[1])]])
+    input_scales = np.array([of_inputs.get(one, sizes.speed) for one in inputs])
+    scales = _scales(run, index, sizes.period)
+    whole = derivative(start.step, sample, inputs, scales, input_scales, sizes.base)
+    demand = whole._replace(C=whole.C[:1], D=whole.D[:1])
+    states = demand.connected()
+    law = demand.part(states)
+    is_sampled = not (np.any(whole.C[1:, states]) or np.any(whole.D[1:]))
     steady = run.steady and index == run.contact[-1]
     difference = mismatch(start, sample, run.period, law)
-    unsmooth = tuple(state for state in states if state in rough)
-    return OperatingPoint(sample, run.period, law, tuple(states), unsmooth, is_sampled, difference, steady)
+    return OperatingPoint(sample, run.period, law, states, is_sampled, difference, steady)
 
 
 def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
@@ -408,7 +373,7 @@ def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
     states = np.array([one.state for one in run.samples[max(run.contact[0], index - back) : index + 1]])
     with np.errstate(invalid="ignore"):
         reach = np.nan_to_num(np.ptp(states, axis=0), nan=0.0, posinf=0.0)
-    size = np.nan_to_num(np.abs(run.samples[index].state), nan=0.0, posinf=0.0)
+    size = np.nan_to_num(np.abs(states[-1]), nan=0.0, posinf=0.0)
     scale = np.maximum(reach, LEAST * size)
     return np.where(scale > 0.0, scale, 1.0)
 
@@ -431,12 +396,12 @@ def mismatch(start: SampledStart, sample: Sample, period: float, law: System) ->
         predicted, responses = np.zeros((WINDOW, 2)), []
         for k in range(WINDOW):
             predicted[k], state = read @ state, loop @ state
-        for by in (STEP, -STEP):
+        for by in (STEPS[0], -STEPS[0]):
             played = list(start.samples(until, begin=sample.displaced(plant, by * first)))
             if len(played) != WINDOW or not all(one.pressing for one in played):
                 return math.inf
             responses.append([(one.shaft_torque, one.demand) for one in played])
-        response = (np.array(responses[0]) - responses[1]) / (2.0 * STEP)
+        response = (np.array(responses[0]) - responses[1]) / (2.0 * STEPS[0])
         size = max(float(np.max(np.abs(response))), 1e-3 * sizes.base)
         worst = max(worst, float(np.max(np.abs(response - predicted))) / size)
     return worst

@@ -40,18 +40,16 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
-from softstart.drive import Drive
-from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
-from softstart.linear.law import Sample, SampledRun, closed
+from softstart.linear.law import Sample, SampledRun
 from softstart.linear.loop import ROUNDING, Loop
 from softstart.linear.plant import in_contact
-from softstart.linear.systems import zeros_of
-from softstart.start.recorded import Recorder
+from softstart.linear.systems import SMALL, zeros_of
 
 SHARES = np.geomspace(1e-4, 1.0, 200)  # n, of the grid
 SLOW = 1e-4 * math.pi  # rad a sample
@@ -106,6 +104,11 @@ def bias_for(mean_torque: float, amplitude: float, half_gap: float, stiffness: f
     return float(found)
 
 
+def n_at(amplitude: float, half: float, c: float, mean_torque: float) -> float:
+    """The share n of a vibration of this amplitude about the bias that the mean torque asks for."""
+    return share(amplitude, half, bias_for(mean_torque, amplitude, half, c))
+
+
 def _f(x: float) -> float:
     if abs(x) >= 1.0:
         return math.copysign(1.0, x)
@@ -141,61 +144,64 @@ class Cycle:
     verdict: str = ""
 
 
-class Softened:
-    """The loop of a single shaft whose stiffness and damping are the share n of the true ones."""
-
-    def __init__(self, loop: Loop) -> None:
-        self.loop, self.period = loop, loop.period
-        self.drive: Drive = loop.machine.design_drive
-
-    def poles(self, n: float) -> tuple[Complex, Complex, Matrix]:
-        """The poles that oscillate, the outermost first, their vectors, and what is read of a state."""
-        plant = in_contact(self.loop.machine, share=n)
-        whole, _, read = closed(self.loop.start.sampled(plant, self.period), self.loop.point.law)
-        poles, vectors = np.linalg.eig(whole)
-        order = np.argsort(-np.abs(poles))
-        order = order[(poles[order].imag > 0.0) & (np.abs(poles[order] - 1.0) > self.loop.rotation)]
-        return poles[order], vectors[:, order], read
-
-    def excess(self, rank: int, shares: Vector) -> Vector:
-        """By how much the pole of this rank is outside of the unit circle; -1 without one."""
-        sizes = [np.abs(self.poles(float(n))[0]) for n in shares]
-        return np.array([one[rank] if rank < one.size else 0.0 for one in sizes]) - 1.0 - ROUNDING
-
-    def crossings(self) -> list[float]:
-        """All n at which a pole crosses the unit circle."""
-        outside = [int(np.sum(np.abs(self.poles(float(n))[0]) > 1.0 + ROUNDING)) for n in SHARES]
-        return [n for rank in range(max(outside)) for n in zeros_of(partial(self.excess, rank), SHARES)]
-
-
 def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
     """All limit cycles, predicted about the mean torque of the start, and checked on the exact plant.
 
     A loop that holds its speed carries the load torque in the mean, another one the torque of its start.
     """
-    softened, start = Softened(loop), loop.start
-    drive = softened.drive
+    drive = loop.machine.design_drive
     if not drive.gap:
         return ()
-    alone = Loop(start, loop.point, loop.machine, open=True).broken
+    alone = replace(loop, open=True).broken
     holds = bool(abs(1.0 + alone.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING)
-    base = start.kept(len(run.samples) - 1 if holds else run.contact[-1])
-    back = max(1, round(float(drive.elastic_period) / run.period))
-    recent = [run.samples[index] for index in run.contact[-1 - back :]]
-    w1, w2 = base.plant["w"][:2].tolist()
+    base = run.last if holds else run.kept[run.contact[-1]]
     if holds:
+        w1, w2 = base.plant["w"][:2].tolist()
         mean = float(drive.Mc + drive.load_viscous_friction * w2)
         demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w1)
     else:
+        back = max(1, round(float(drive.elastic_period) / run.period))
+        recent = [run.samples[index] for index in run.contact[-1 - back :]]
         mean, demand = np.mean([(one.shaft_torque, one.demand) for one in recent], axis=0).tolist()
     room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
-    found = [checked(softened, base, cycle) for cycle in predicted(softened, mean)]
+    found = [checked(loop, base, cycle) for cycle in predicted(loop, mean)]
     return tuple(replace(one, beyond_limits=one.demand_amplitude > room) for one in found)
 
 
-def predicted(softened: Softened, mean_torque: float) -> list[Cycle]:
+def oscillating(loop: Loop, n: float) -> tuple[Complex, Complex, Matrix]:
+    """Of the loop with the share n of the shaft: the poles that oscillate, the outermost first, their
+    vectors, and what is read of a state.
+    """
+    whole, _, read = replace(loop, share=n).closed()
+    poles, vectors = np.linalg.eig(whole)
+    order = np.argsort(-np.abs(poles))
+    order = order[(poles[order].imag > 0.0) & (np.abs(poles[order] - 1.0) > loop.rotation)]
+    return poles[order], vectors[:, order], read
+
+
+def crossings(loop: Loop) -> list[float]:
+    """All n at which a pole crosses the unit circle."""
+    from scipy import optimize
+
+    def outside(n: float) -> Vector:
+        return np.asarray(np.abs(oscillating(loop, n)[0]) - 1.0 - ROUNDING)
+
+    def excess(n: float, rank: int) -> float:
+        return float([*outside(n), *[-1.0] * rank, -1.0][rank])
+
+    counts = [int(np.sum(outside(float(n)) > 0.0)) for n in SHARES]
+    found = [
+        float(optimize.brentq(excess, SHARES[i], SHARES[i + 1], (rank,), 1e-13 * SHARES[i + 1], 1e-14))
+        for i, (one, other) in enumerate(pairwise(counts))
+        for rank in range(min(one, other), max(one, other))
+    ]
+    return [n for n in found if np.min(np.abs(outside(n))) < SMALL]
+
+
+def predicted(loop: Loop, mean_torque: float) -> list[Cycle]:
     """All limit cycles of the harmonic balance in order of frequency and amplitude."""
-    half, c = 0.5 * float(softened.drive.gap), float(softened.drive.c)
+    drive = loop.machine.design_drive
+    half, c = 0.5 * float(drive.gap), float(drive.c)
     wound = abs(mean_torque) / c
     amplitudes = (wound or half) + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
 
@@ -203,10 +209,10 @@ def predicted(softened: Softened, mean_torque: float) -> list[Cycle]:
         return np.array([n_at(float(one), half, c, mean_torque) for one in amplitudes]) - n
 
     found = []
-    for n in softened.crossings():
-        pole, vector, read = _on_the_circle(softened, n)
-        w = cmath.phase(pole) / softened.period
-        lower, upper = (abs(_on_the_circle(softened, n * by, pole)[0]) for by in (1.0 - 1e-5, 1.0 + 1e-5))
+    for n in crossings(loop):
+        pole, vector, read = _on_the_circle(loop, n)
+        w = cmath.phase(pole) / loop.period
+        lower, upper = (abs(_on_the_circle(loop, n * by, pole)[0]) for by in (1.0 - 1e-5, 1.0 + 1e-5))
         for amplitude in zeros_of(partial(excess, n), amplitudes):
             less, more = excess(n, amplitude * np.array([1.0 - 1e-5, 1.0 + 1e-5]))
             demand = amplitude * abs(complex(read[1] @ vector))
@@ -216,25 +222,17 @@ def predicted(softened: Softened, mean_torque: float) -> list[Cycle]:
     return sorted(found, key=lambda one: (one.frequency, one.amplitude))
 
 
-def _on_the_circle(
-    softened: Softened, n: float, near: complex | None = None
-) -> tuple[complex, Complex, Matrix]:
+def _on_the_circle(loop: Loop, n: float, near: complex | None = None) -> tuple[complex, Complex, Matrix]:
     """The pole nearest to the circle, or to another one; its vector for a twist of 1 rad; what is read."""
-    poles, vectors, read = softened.poles(n)
-    away = np.abs(np.abs(poles) - 1.0) if near is None else np.abs(poles - near)
-    vector = vectors[:, int(np.argmin(away))]
-    return complex(poles[np.argmin(away)]), vector / vector[1], read
+    poles, vectors, read = oscillating(loop, n)
+    nearest = int(np.argmin(np.abs(np.abs(poles) - 1.0) if near is None else np.abs(poles - near)))
+    return complex(poles[nearest]), vectors[:, nearest] / vectors[1, nearest], read
 
 
-def n_at(amplitude: float, half: float, c: float, mean_torque: float) -> float:
-    """The share n of a vibration of this amplitude about the bias that the mean torque asks for."""
-    return share(amplitude, half, bias_for(mean_torque, amplitude, half, c))
-
-
-def checked(softened: Softened, base: Sample, cycle: Cycle) -> Cycle:
+def checked(loop: Loop, base: Sample, cycle: Cycle) -> Cycle:
     """The cycle with what the exact plant does, started on it from the sample `base`."""
     if cycle.stable:
-        frequency, amplitude = _after(softened, base, cycle, 1.0)
+        frequency, amplitude = _after(loop, base, cycle, 1.0)
         if math.isnan(frequency) or amplitude < STILL * cycle.amplitude:
             return replace(cycle, measured_amplitude=amplitude, verdict="not confirmed: the vibration decays")
         off_w, off_a = frequency / cycle.frequency - 1.0, amplitude / cycle.amplitude - 1.0
@@ -245,7 +243,7 @@ def checked(softened: Softened, base: Sample, cycle: Cycle) -> Cycle:
             verdict=f"{verdict}: frequency {100.0 * off_w:+.1f} %, amplitude {100.0 * off_a:+.1f} % from "
             "predicted",
         )  # fmt: skip
-    ends = [_after(softened, base, cycle, factor) for factor in (BELOW, ABOVE)]
+    ends = [_after(loop, base, cycle, factor) for factor in (BELOW, ABOVE)]
     lower, upper = (0.0 if math.isnan(w) or a < GONE * cycle.amplitude else a for w, a in ends)
     confirmed = lower < BELOW * cycle.amplitude and upper > cycle.amplitude
     verdict = "confirmed as a boundary" if confirmed else "not confirmed as a boundary"
@@ -256,16 +254,15 @@ def checked(softened: Softened, base: Sample, cycle: Cycle) -> Cycle:
     )  # fmt: skip
 
 
-def _after(softened: Softened, base: Sample, cycle: Cycle, factor: float) -> tuple[float, float]:
+def _after(loop: Loop, base: Sample, cycle: Cycle, factor: float) -> tuple[float, float]:
     """Frequency and amplitude after many periods; NaN and the amplitude if it no longer oscillates.
 
     The frequency is the mean between upward crossings of the mid value, the amplitude half the range.
     """
-    start, period = softened.loop.start, 2.0 * math.pi / cycle.frequency
+    period = 2.0 * math.pi / cycle.frequency
     end = base.time + (SETTLING + MEASURED) * period
-    recorder = Recorder(start.rows, start.sees | exchange.SEES_SHAFT_TORQUE)
-    begin = _on_the_cycle(softened, base, cycle, factor * cycle.amplitude)
-    for _ in start.samples(end, begin=begin, recorder=recorder):
+    recorder = loop.start.recorder(256)
+    for _ in loop.start.samples(end, _on_the_cycle(loop, base, cycle, factor * cycle.amplitude), recorder):
         pass
     times = np.linspace(end - MEASURED * period, end * (1.0 - 1e-12), MEASURED * POINTS)
     twist = recorder.finished().at(times)["twist"][:, 0]
@@ -278,24 +275,23 @@ def _after(softened: Softened, base: Sample, cycle: Cycle, factor: float) -> tup
     return 2.0 * math.pi * (up.size - 1) / float(crossed[-1] - crossed[0]), amplitude
 
 
-def _on_the_cycle(softened: Softened, base: Sample, cycle: Cycle, amplitude: float) -> Sample:
+def _on_the_cycle(loop: Loop, base: Sample, cycle: Cycle, amplitude: float) -> Sample:
     """A sample with the gap open, in the middle of the part of it that the twist crosses, going up."""
-    half, bias = 0.5 * float(softened.drive.gap), cycle.bias
+    half, bias, states = 0.5 * float(loop.machine.design_drive.gap), cycle.bias, loop.point.states
     low, high = max(-half, bias - amplitude), min(half, bias + amplitude)
     if low >= high:  # this vibration does not leave the flank: start just off it
         low, high = half * (1.0 - 1e-3), half
     sine = min(max((0.5 * (low + high) - bias) / amplitude, -1.0), 1.0)
     turn = amplitude * complex(math.sqrt(1.0 - sine * sine), sine)  # twist = bias + Im(turn e^jwt)
-    state = np.imag(turn * _on_the_circle(softened, cycle.share)[1])
+    state = np.imag(turn * _on_the_circle(loop, cycle.share)[1])
     now = base.plant
     # twist and its rate as such, all else about the sample
     state[1] = 0.5 * (low + high) - float(now["theta"][0])
     state[2] = state[3] + cycle.frequency * turn.real - float(now["w"][0] - now["w"][1])
-    begin = base.displaced(in_contact(softened.loop.machine), state)
-    if softened.loop.start.differencing:
-        begin.plant["sample_angle"] += state[-1 - len(softened.loop.point.states)]
+    begin = base.displaced(in_contact(loop.machine), state)
+    if loop.start.differencing:
+        begin.plant["sample_angle"] += state[-1 - len(states)]
     begin.plant["mode"][0] = at.OPEN
     begin.plant["stage"] += 1.0 - begin.plant["stage"] % 2.0  # the gap is open: an odd stage
-    states = list(softened.loop.point.states)
     begin.state[states] += state[state.size - len(states) :]
     return begin

@@ -21,20 +21,31 @@ import cmath
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
 from softstart.chain.machines import Machine
+from softstart.kernel import motor as exchange
 from softstart.linear.law import OperatingPoint, SampledStart, closed
-from softstart.linear.plant import Plant, in_contact, motor_side, sizes_of
-from softstart.linear.systems import Mode, System, frequencies, modes, moved, zeros_of
+from softstart.linear.plant import Plant, in_contact, sizes_of
+from softstart.linear.systems import Mode, System, frequencies, modes, zeros_of
+
+if TYPE_CHECKING:
+    import control
 
 LARGEST_LOOP = 1e6  # |L| above which a change of sign is a pole on the circle; below its inverse L is 0
 FRACTIONS = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 49)[:-1])  # of a sample, close near a whole one
-MANY = 20  # samples: a long delay
 ROTATION = 1e-3  # of the elastic frequency: slower poles are the rotation as a whole
 ROUNDING = 1e-10  # of the largest pole
+MEASURED = {
+    exchange.M_MOTOR_ANGLE: "motor_angle",
+    exchange.M_MOTOR_SPEED: "motor_speed",
+    exchange.M_MOTOR_TORQUE: "motor_torque",
+    exchange.M_SHAFT_TORQUE: "shaft_torque",
+    exchange.M_LOAD_SPEED: "load_speed",
+}
 ON_THE_CIRCLE = 1e-9  # poles this near to the unit circle do not count as stable
 
 
@@ -51,7 +62,7 @@ class Margins:
     """Stability margins of a loop. Angles in rad, delay in s; infinite where no such change is harmful.
 
     `gain_margin` is the least factor above 1, `gain_reduction` the largest below 1 (0: none) that puts a
-    closed-loop pole on the unit circle.
+    closed-loop pole on the unit circle; `sensitivity_peak` is the largest |1/(1 + L)|.
     """
 
     gain_margin: float
@@ -63,11 +74,7 @@ class Margins:
     modulus_frequency: float
     gain_crossovers: tuple[Crossing, ...]
     phase_crossovers: tuple[Crossing, ...]
-
-    @property
-    def sensitivity_peak(self) -> float:
-        """The largest |1/(1 + L)|."""
-        return 1.0 / self.modulus_margin if self.modulus_margin > 0.0 else math.inf
+    sensitivity_peak: float
 
 
 def margins(loop: System, period: float, delay_margin: tuple[float, float] | None = None) -> Margins:
@@ -96,13 +103,14 @@ def margins(loop: System, period: float, delay_margin: tuple[float, float] | Non
         lambda w: float(abs(1.0 + L(np.array([w]))[0])), bounds=near, method="bounded",
         options={"xatol": 1e-9 * near[1]},
     )  # fmt: skip
+    least = float(nearest.fun)
     turning = [(one.margin % (2.0 * math.pi) / one.frequency, one.frequency) for one in gain_crossovers]
     return Margins(
         min((k for k in factors if k > 1.0), default=math.inf),
         max((k for k in factors if k <= 1.0), default=0.0),
         min((abs(one.margin) for one in gain_crossovers), default=math.inf),
         *(delay_margin or min(turning, default=(math.inf, math.nan))),
-        float(nearest.fun), float(nearest.x), gain_crossovers, phase_crossovers,
+        least, float(nearest.x), gain_crossovers, phase_crossovers, 1.0 / least if least else math.inf,
     )  # fmt: skip
 
 
@@ -117,7 +125,8 @@ def _gain_crossovers(loop: System, period: float) -> tuple[Crossing, ...]:
 class Loop:
     """A controller linearised at `point`, on a machine that need not be that of the start; `name` says which.
 
-    `open` is the loop of the motor with what turns with it while all gaps are open.
+    With `open` it is the loop of the motor with what turns with it while all gaps are open; the shafts have
+    the `share` of their stiffness and damping.
     """
 
     start: SampledStart
@@ -125,6 +134,7 @@ class Loop:
     machine: Machine
     name: str = ""
     open: bool = False
+    share: float = 1.0
 
     @property
     def period(self) -> float:
@@ -138,10 +148,24 @@ class Loop:
 
     def broken_delayed(self, delay: float) -> System:
         """L(z) with this much further dead time, s, between demand and torque."""
-        loop, into, read = self._closed(delay)
-        feedback = np.outer(into, read[1])
-        whole = System(loop - feedback, into[:, None], -read[[1]], np.zeros((1, 1)))
-        return whole.part(moved(whole.dual()))
+        loop, into, read = self.closed(delay)
+        whole = System(loop - np.outer(into, read[1]), into[:, None], -read[[1]], np.zeros((1, 1)))
+        return whole.part(whole.connected())
+
+    @property
+    def system(self) -> control.StateSpace:
+        """L(z) for python-control."""
+        import control
+
+        return control.StateSpace(*self.broken, self.period, inputs=["demand"], outputs=["minus_answer"])
+
+    @property
+    def controller_system(self) -> control.StateSpace:
+        """The controller's law: from the measured quantities to the demand in N m."""
+        import control
+
+        inputs = [MEASURED[i] for i in self.start.inputs]
+        return control.StateSpace(*self.point.law, self.period, inputs=inputs, outputs=["demand"])
 
     @cached_property
     def margins(self) -> Margins:
@@ -161,23 +185,24 @@ class Loop:
         """
         from scipy import optimize
 
-        whole = math.inf
-        for fraction in FRACTIONS[::6] * self.period:
-            for one in _gain_crossovers(self.broken_delayed(fraction), self.period):
-                whole = min(whole, one.margin % (2.0 * math.pi) / (one.frequency * self.period))
+        whole = min(
+            (one.margin % (2.0 * math.pi) / (one.frequency * self.period)
+             for fraction in FRACTIONS[::6] * self.period
+             for one in _gain_crossovers(self.broken_delayed(fraction), self.period)),
+            default=math.inf,
+        )  # fmt: skip
         if not self.stable or self._excess(0.0) > 0.0:
             return 0.0, self._largest_pole(0.0)[1]
         if math.isinf(whole):
             return math.inf, math.nan
-        last, first = 0.0, max(int(whole) - 1, 0)
-        fractions = FRACTIONS if first < MANY else FRACTIONS[::6]  # of a long delay a fraction is little
-        for delay in (np.arange(first, first + 4)[:, None] + fractions).ravel()[1:] * self.period:
-            if self._excess(delay) > 0.0:
-                break
-            last = delay
-        else:
+        first = max(int(whole) - 1, 0)
+        delays = ((np.arange(first, first + 4)[:, None] + FRACTIONS) * self.period).ravel()
+        delays[0] = 0.0  # there it is stable for certain
+        harmful = next((k for k in range(1, delays.size) if self._excess(delays[k]) > 0.0), None)
+        if harmful is None:
             return math.inf, math.nan
-        found = float(optimize.brentq(self._excess, last, delay, xtol=1e-13 * delay, rtol=1e-14))
+        last, least = delays[harmful - 1 : harmful + 1]
+        found = float(optimize.brentq(self._excess, last, least, xtol=1e-13 * least, rtol=1e-14))
         return found, self._largest_pole(found)[1]
 
     def _excess(self, delay: float) -> float:
@@ -186,18 +211,15 @@ class Loop:
 
     def _largest_pole(self, delay: float) -> tuple[float, float]:
         """Size and frequency in rad/s of the largest pole, but for the rotation, with a further dead time."""
-        poles = np.linalg.eigvals(self._closed(delay)[0])
+        poles = np.linalg.eigvals(self.closed(delay)[0])
         poles = poles[np.abs(poles - 1.0) > self.rotation]
         pole = complex(poles[np.argmax(np.abs(poles))])
         return abs(pole), abs(cmath.phase(pole)) / self.period
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """The closed loop's poles that show in the shaft torque or in the demand.
-
-        The rotation of the whole drive, which a torque controller leaves free (poles at 1), is excluded.
-        """
-        found = modes(self._closed(0.0)[0], self.period)
+        """The poles of the closed loop but for the rotation as a whole, which no torque holds (at 1)."""
+        found = modes(self.closed()[0], self.period)
         return tuple(mode for mode in found if abs(mode.value - 1.0) > self.rotation)
 
     @property
@@ -215,10 +237,11 @@ class Loop:
         """Distance from 1 within which poles are the rotation as a whole."""
         return ROTATION * sizes_of(self.machine).Omega * self.period
 
-    def _closed(self, further: float) -> tuple[Matrix, Vector, Matrix]:
-        return closed(self.start.sampled(self._plant, self.period, further), self.point.law)
+    def closed(self, delay: float = 0.0) -> tuple[Matrix, Vector, Matrix]:
+        """The closed loop with a further dead time, as `law.closed` has it."""
+        return closed(self.start.sampled(self._plant, self.period, delay), self.point.law)
 
     @cached_property
     def _plant(self) -> Plant:
-        masses = motor_side(self.machine) if self.open else None
-        return in_contact(self.machine, self.point.sample.plant["incline"], masses)
+        inclines = self.point.sample.plant["incline"]
+        return in_contact(self.machine, inclines, share=self.share, gaps_open=self.open)

@@ -7,8 +7,8 @@ exact:
     x+ = e^(A h) x + e^(A (h-f)) G(f) d[k-n-1] + G(h-f) d[k-n],   delay = n h + f, 0 <= f < h,
     G(t) = int_0^t e^(A s) B ds
 
-The torque limits and a limited torque rate do not enter: they do not act on small changes. A constant load
-torque does not enter either. All angles in rad, torques in N m, at the motor shaft.
+Torque limits, a limited torque rate and a constant load torque do not act on small changes. All angles in
+rad, torques in N m, at the motor shaft.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from softstart.errors import InputError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
 from softstart.linear.systems import System
-from softstart.start.rows import rows_of
+from softstart.start.rows import Rows, rows_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,17 +45,16 @@ class Plant:
 
 
 class Sizes(NamedTuple):
-    """Sizes of torques and angles of a machine, N m and rad; of its first vibration rad/s and s."""
+    """Sizes of torques, N m, and twists, rad; frequency, rad/s, and period, s, of the first vibration.
+
+    `speed`, rad/s, is that of a vibration with the windup as amplitude.
+    """
 
     base: float
     windup: float
     Omega: float
     period: float
-
-    @property
-    def speed(self) -> float:
-        """Of an elastic vibration with the windup as amplitude, rad/s."""
-        return self.Omega * self.windup
+    speed: float
 
 
 def single(machine: Machine) -> Any:
@@ -71,33 +70,29 @@ def sizes_of(machine: Machine) -> Sizes:
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
     c = rows.shafts.view(at.SHAFT)[0, :, 0]["c"]
-    return Sizes(base, base * float((1.0 / c[c > 0.0]).sum()), 2.0 * math.pi / period, period)
+    windup, Omega = base * float((1.0 / c[c > 0.0]).sum()), 2.0 * math.pi / period
+    return Sizes(base, windup, Omega, period, Omega * windup)
 
 
-def motor_side(machine: Machine) -> range:
+def _motor_side(rows: Rows) -> slice:
     """The masses that turn with the motor while all gaps are open."""
-    rows = rows_of(single(machine))
     half = rows.shafts.view(at.SHAFT)[0, :, 0]["half"]
-    first = last = int(rows.machine.motor)
-    while first > 0 and half[first - 1] == 0.0:
-        first -= 1
-    while last < half.size and half[last] == 0.0:
-        last += 1
-    return range(first, last + 1)
+    motor, open_ = int(rows.machine.motor), np.flatnonzero(half)
+    first = max((int(k) + 1 for k in open_ if k < motor), default=0)
+    return slice(first, min((int(k) + 1 for k in open_ if k >= motor), default=rows.count))
 
 
 def in_contact(
-    machine: Machine, inclines: Vector | None = None, masses: range | None = None, share: float = 1.0
+    machine: Machine, inclines: Vector | None = None, *, share: float = 1.0, gaps_open: bool = False
 ) -> Plant:
-    """The machine while all flanks press, or some neighbouring `masses` of it as if there were no others.
+    """The machine while all flanks press, or the motor with what turns with it while all gaps are open.
 
     Masses that are joined rigidly are one body; gears with losses pass power on from the motor to the load.
     `inclines` are those of the load curves of its masses at an instant: there a curve is a spring or a damper
     to the ground. `share` multiplies stiffness and damping of the shafts, as the describing function does.
     """
     given = rows_of(single(machine))
-    masses = masses or range(given.count)
-    kept = slice(masses.start, masses.stop)
+    kept = _motor_side(given) if gaps_open else slice(0, given.count)
     motor, load = int(given.machine.motor) - kept.start, int(given.machine.load) - kept.start
     mass = given.masses.view(at.MASS)[0, kept, 0]
     shaft = given.shafts.view(at.SHAFT)[0, kept.start : kept.stop - 1, 0]
@@ -114,17 +109,17 @@ def in_contact(
     w = unit[first + body]  # rows that read the speeds of the masses off the states
     twist = np.zeros((rigid.size, unit.shape[0]))
     twist[~rigid] = unit[1:first]
+    angle = np.vstack([np.zeros((1, unit.shape[0])), -np.cumsum(twist, axis=0)])
+    angle += unit[0] - angle[motor]
     c, d = (np.where(rigid, 0.0, share * shaft[key])[:, None] for key in ("c", "d"))
     T = c * twist + d * (w[:-1] - w[1:])
     # the gear of a shaft takes its share behind the spring, or before it
     driven = motor <= np.arange(rigid.size)
-    behind = shaft["gear"] != 0.0
-    share = np.where(behind == driven, shaft["eta"], 1.0 / shaft["eta"])[:, None]
+    behind = shaft["gear"][:, None] != 0.0
+    passed_on = np.where(behind[:, 0] == driven, shaft["eta"], 1.0 / shaft["eta"])[:, None]
     torque = -mass["ground"][:, None] * w  # on each mass
-    torque[:-1] -= np.where(behind[:, None], 1.0, share) * T
-    torque[1:] += np.where(behind[:, None], share, 1.0) * T
-    turned = np.vstack([np.zeros((1, unit.shape[0])), np.cumsum(twist, axis=0)])
-    angle = unit[0] + turned[motor] - turned
+    torque[:-1] -= np.where(behind, 1.0, passed_on) * T
+    torque[1:] += np.where(behind, passed_on, 1.0) * T
     for curve in given.curves[0].view(at.CURVE)[:, 0]:
         i = int(curve.mass) - kept.start
         if inclines is not None and 0 <= i < body.size:
@@ -134,8 +129,7 @@ def in_contact(
     np.add.at(A, first + body, torque)
     A[first:] /= inertia[:, None]
     B[first + body[motor]] = 1.0 / inertia[body[motor]]
-    beside = given.motor_shaft - kept.start
-    none = np.zeros(unit.shape[0])
+    beside, none = given.motor_shaft - kept.start, np.zeros(unit.shape[0])
     phi2, w2 = (angle[load], w[load]) if 0 <= load < body.size else (none, none)
     rows = {
         "phi1": unit[0], "w1": w[motor], "phi2": phi2, "w2": w2,

@@ -1,8 +1,7 @@
 """Linear sampled systems: their response over frequency, their modes, their crossings.
 
 python-control holds and plots such systems, but takes the margins of a sampled one from polynomials in z,
-which lose their digits near z = 1. A sample counter, the number of a mode, a schedule depend on nothing
-measured, so they are no feedback whatever their effect: `moved` leaves them out by exact zeros.
+which lose their digits near z = 1.
 """
 
 from __future__ import annotations
@@ -46,35 +45,33 @@ class System(NamedTuple):
         """The response of one output to one input at frequencies in rad/s, sampled with this period."""
         return np.asarray(self.response(np.exp(1j * w * period))[:, 0, 0])
 
-    def dual(self) -> System:
-        """Inputs and outputs exchanged."""
-        return System(self.A.T, self.C.T, self.B.T, self.D.T)
+    def connected(self) -> list[int]:
+        """The states that the inputs reach and the outputs show, by the zeros of A, B and C.
+
+        A sample counter, the number of a mode, a schedule depend on nothing measured: they are no feedback.
+
+        >>> A, B = np.array([[0.5, 0.0], [0.0, 1.0]]), np.array([[1.0], [0.0]])
+        >>> System(A, B, np.ones((1, 2)), np.zeros((1, 1))).connected()
+        [0]
+        """
+        reached, shown = np.any(self.B != 0.0, axis=1), np.any(self.C != 0.0, axis=0)
+        for _ in reached:
+            reached = reached | np.any(self.A[:, reached] != 0.0, axis=1)
+            shown = shown | np.any(self.A[shown] != 0.0, axis=0)
+        return [int(index) for index in np.flatnonzero(reached & shown)]
 
     def part(self, kept: list[int]) -> System:
         """The system with these states only."""
         return System(self.A[np.ix_(kept, kept)], self.B[kept], self.C[:, kept], self.D)
 
 
-def moved(system: System) -> list[int]:
-    """The states that the inputs reach, by the pattern of A and B; of the dual, those that the outputs show.
-
-    >>> A, B = np.array([[0.5, 0.0], [0.0, 1.0]]), np.array([[1.0], [0.0]])
-    >>> moved(System(A, B, np.ones((1, 2)), np.zeros((1, 1))))
-    [0]
-    """
-    reached = np.any(system.B != 0.0, axis=1)
-    for _ in range(reached.size):
-        reached = reached | np.any(system.A[:, reached] != 0.0, axis=1)
-    return [int(index) for index in np.flatnonzero(reached)]
-
-
 def frequencies(period: float, system: System) -> Vector:
     """Frequencies in rad/s up to half the sample rate, close together near the system's poles."""
-    near = np.linalg.eigvals(system.A)
     highest = math.pi / period
     lowest = LOWEST * highest
     grid = [np.geomspace(lowest, highest * (1.0 - 1e-9), int(PER_DECADE * -math.log10(LOWEST)))]
-    for pole in near[near != 0.0]:
+    poles = np.linalg.eigvals(system.A)
+    for pole in poles[poles != 0.0]:
         angle = abs(float(np.angle(pole))) / period
         width = 0.1 * max(abs(math.log(abs(pole))) / period, 1e-7 * angle)
         if lowest < angle < highest and width < 0.5 * angle:
@@ -96,10 +93,10 @@ def zeros_of(function: Callable[[Vector], Vector], grid: Vector) -> list[float]:
 
     negative = np.signbit(function(grid))
     roots = [
-        optimize.brentq(single, grid[i], grid[i + 1], xtol=1e-13 * grid[i + 1], rtol=1e-14)
+        float(optimize.brentq(single, grid[i], grid[i + 1], xtol=1e-13 * grid[i + 1], rtol=1e-14))
         for i in np.flatnonzero(negative[:-1] != negative[1:])
     ]
-    return [float(root) for root in roots if abs(single(root)) < SMALL]
+    return [root for root in roots if abs(single(root)) < SMALL]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.linear.limit_cycles import SHARES, Softened
+from softstart.linear.limit_cycles import SHARES, oscillating
 from softstart.linear.plant import sizes_of
 from softstart.linear.systems import frequencies
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
@@ -19,7 +19,7 @@ from softstart.views.starts import machine_lines
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.linear.loop import Crossing, Margins
+    from softstart.linear.loop import Crossing, Loop, Margins
     from softstart.linear.systems import Mode
     from softstart.linear.view import LinearView
 
@@ -32,10 +32,11 @@ MARKED = 100.0  # gain margins up to which a crossing is marked
 
 def conclusion(view: LinearView) -> str:
     """One sentence: the margins and the elastic mode, or why there are none."""
-    m = view.margins
-    if m is None or not view.stable:
-        return view.notes[0] if m is None else "the closed loop is unstable in contact"
-    sentence = ", ".join(f"{name} {text}" for name, text in _margins(m).items())
+    if view.loop is None:
+        return view.notes[0]
+    if not view.loop.stable:
+        return "the closed loop is unstable in contact"
+    sentence = ", ".join(f"{name} {text}" for name, text in _margins(view.loop.margins).items())
     mode = view.elastic_mode
     return sentence if mode is None else f"{sentence}; elastic mode damped by {mode.damping_ratio:.3g}"
 
@@ -55,26 +56,25 @@ def _frequencies(found: Sequence[Crossing | Mode]) -> str:
     return ", ".join([*shown, *(["..."] if len(found) > SHOWN_CROSSINGS else [])]) or NOTHING
 
 
-def margin_rows(view: LinearView, m: Margins) -> list[tuple[str, str]]:
+def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
     """The figures of the loop, as words and numbers."""
-    least, mode, point = m.gain_reduction, view.elastic_mode, view.point
+    m, mode = loop.margins, view.elastic_mode
     return [
-        ("closed loop in contact", "stable" if view.stable else "unstable"),
+        ("closed loop in contact", "stable" if loop.stable else "unstable"),
         *_margins(m).items(),
-        *([("least gain", f"{least:.3g} of the present one")] if least > 0.0 else []),
+        *([("least gain", f"{m.gain_reduction:.3g} of the present one")] if m.gain_reduction > 0.0 else []),
         ("modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"),
         ("loop gain is 1 at", _frequencies(m.gain_crossovers)),
         ("loop is at -180 degrees at", _frequencies(m.phase_crossovers)),
         *([("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}")]
           if mode is not None else []),
-        *([("linear against exact", f"{float(f'{100.0 * point.mismatch:.2g}'):g} % at most")]
-          if point is not None else []),
+        ("linear against exact", f"{float(f'{100.0 * loop.point.mismatch:.2g}'):g} % at most"),
     ]  # fmt: skip
 
 
-def tables(view: LinearView) -> list[Table]:
+def tables(view: LinearView, loop: Loop) -> list[Table]:
     """Modes of the closed loop, where a pair counts once, other drives, and limit cycles."""
-    modes = [mode for mode in view.modes if mode.value.imag >= 0.0][:SHOWN_MODES]
+    modes = [mode for mode in loop.modes if mode.imag >= 0.0][:SHOWN_MODES]
     found, others = view.cycles, view.variations
 
     def each(read: str, scale: float, decimals: int) -> list[str]:
@@ -131,60 +131,51 @@ def notes(view: LinearView) -> list[str]:
 
 def linear_sheet(view: LinearView) -> Sheet:
     """What is shown of a linear view; its conclusion alone where there is no loop."""
-    m = view.margins
+    loop = view.loop
     title = f"{view.drive.name}: loop of {view.name}"
     lines = [*machine_lines(view.drive), f"  under  {view.name}"]
-    if m is None:
+    if loop is None:
         return Sheet(title, lines, view.notes[0], machine=view.drive)
     return Sheet(
         title,
         lines,
-        facts=margin_rows(view, m),
-        tables=tables(view),
+        facts=margin_rows(view, loop),
+        tables=tables(view, loop),
         notes=notes(view),
         figures={"linear": view.plot},
-        files={"response.csv": rows_file(*response(view, m))},
+        files={"response.csv": rows_file(*response(loop))},
         machine=view.drive,
     )
 
 
-def _loop(view: LinearView, w: Any) -> Any:
-    """L at these frequencies."""
-    assert view.own_loop is not None
-    return view.own_loop.broken.at(w, view.period)
-
-
-def _frequencies_of(view: LinearView) -> Any:
-    assert view.own_loop is not None
-    return frequencies(view.period, view.own_loop.broken)
-
-
-def response(view: LinearView, m: Margins) -> tuple[tuple[str, ...], list[list[float]]]:
+def response(loop: Loop) -> tuple[tuple[str, ...], list[list[float]]]:
     """The loop over frequency, with all crossings among the frequencies: headings and rows."""
+    m = loop.margins
     marked = [one.frequency for one in (*m.gain_crossovers, *m.phase_crossovers)]
-    w = np.unique(np.concatenate([_frequencies_of(view), marked]))
-    L = _loop(view, w)
+    w = np.unique(np.concatenate([frequencies(loop.period, loop.broken), marked]))
+    L = loop.broken.at(w, loop.period)
     headings = ("frequency [rad/s]", "|L|", "phase of L [rad]", "|1/(1 + L)|")
     return headings, np.column_stack([w, np.abs(L), np.angle(L), 1.0 / np.abs(1.0 + L)]).tolist()
 
 
 def linear_figure(view: LinearView) -> Any:
     """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
-    assert view.margins is not None
-    Omega, w = sizes_of(view.drive).Omega, _frequencies_of(view)
+    loop, Omega = view.loop, sizes_of(view.drive).Omega
+    assert loop is not None
+    w = frequencies(loop.period, loop.broken)
     w = w[w >= Omega * 10.0**-DECADES]
-    L = _loop(view, w)
+    L = loop.broken.at(w, loop.period)
     with drawing():
         figure, ((size, plane), (phase, gap)) = new_figure(2, 2, (10.5, 7.4))
-        _magnitude(size, w, L, view.margins)
-        _phase(phase, w, L, view.margins)
+        _magnitude(size, w, L, loop.margins)
+        _phase(phase, w, L, loop.margins)
         for axes in (size, phase):
             axes.axvline(Omega, color=GREY, lw=0.9, ls=":", label="elastic frequency")
             axes.set(xlim=(w[0], w[-1]), xlabel="frequency, rad/s")
         size.legend(loc="upper left")
-        _nyquist(plane, L, view.margins)
-        if view.own_loop is not None and len(view.drive.shaft_names) == 1:
-            _harmonic_balance(gap, view, Softened(view.own_loop))
+        _nyquist(plane, L, loop.margins)
+        if len(view.drive.shaft_names) == 1:
+            _harmonic_balance(gap, view, loop)
         else:
             gap.set_axis_off()  # several gaps have no one describing function
         entitle(figure, f"{view.drive.name}: loop of {view.name} in contact")
@@ -234,9 +225,9 @@ def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
     head(axes, f"Nyquist diagram; sensitivity at most {m.sensitivity_peak:.3g}", "Im L", "Re L")
 
 
-def _harmonic_balance(axes: Axes, view: LinearView, softened: Softened) -> None:
+def _harmonic_balance(axes: Axes, view: LinearView, loop: Loop) -> None:
     """Damping of the least damped mode over n; a limit cycle is where it passes through zero."""
-    outermost = [softened.poles(float(n))[0][:1] for n in SHARES]
+    outermost = [oscillating(loop, float(n))[0][:1] for n in SHARES]
     s = np.array([np.log(one[0]) if one.size else math.nan for one in outermost])
     axes.semilogx(SHARES, -s.real / np.abs(s), color=COLOURS[0])
     axes.axhline(0.0, color=GREY, lw=0.8)

@@ -15,8 +15,8 @@ LOOP = ("linear", "--controller", "current-limit-feedback")
 def test_json_is_the_summary(as_json):
     told = as_json(*LOOP)
     view = linear_view(Drive.load("crane-4amtkf"), "current-limit-feedback")
-    assert told["phase_margin"] == view.phase_margin
-    assert told["delay_margin"] == view.delay_margin
+    assert told["phase_margin"] == view.loop.margins.phase_margin
+    assert told["delay_margin"] == view.loop.margins.delay_margin
     assert told["elastic_damping_ratio"] == view.elastic_mode.damping_ratio
     assert [one["name"] for one in told["variations"]] == [one.name for one in view.variations]
     assert told["kind"] == "loop"

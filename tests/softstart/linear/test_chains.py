@@ -11,7 +11,7 @@ from tests.twin import chain_of
 from softstart import Drive, InputError, linear_view
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
 from softstart.linear.law import SampledStart, operating_points, run_until_steady
-from softstart.linear.plant import in_contact, motor_side
+from softstart.linear.plant import in_contact
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=0.5, torque_lag="2 ms")
 CHAIN = Chain.from_toml(
@@ -32,10 +32,11 @@ def test_two_masses_have_the_loop_of_their_drive(drive, controller):
     one = linear_view(drive, controller)
     two = linear_view(chain, controller, fitted_to=drive)
     assert two.kind == one.kind == "loop"
-    assert two.stable == one.stable
-    assert two.point.mismatch < 1e-6
+    assert two.loop.stable == one.loop.stable
+    assert two.loop.point.mismatch < 1e-6
     for name in ("gain_margin", "phase_margin", "delay_margin", "modulus_margin"):
-        assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-6), name
+        expected = getattr(one.loop.margins, name)
+        assert getattr(two.loop.margins, name) == pytest.approx(expected, rel=1e-6), name
     for a, b in zip(two.variations, one.variations, strict=True):
         assert (a.name, a.stable) == (b.name, b.stable)
         assert a.margins.phase_margin == pytest.approx(b.margins.phase_margin, rel=1e-5)
@@ -95,15 +96,15 @@ def test_the_plant_in_contact_swings_at_its_natural_frequencies(seed):
 
 
 def test_with_all_gaps_open_the_motor_turns_alone_or_with_what_is_joined_to_it():
-    assert in_contact(CHAIN, masses=motor_side(CHAIN)).A.shape == (2, 2)
+    assert in_contact(CHAIN, gaps_open=True).A.shape == (2, 2)
     joined = Chain(CHAIN.masses, [CHAIN.shafts[0].replace(gap=0.0), *CHAIN.shafts[1:]], CHAIN.motor)
-    assert in_contact(joined, masses=motor_side(joined)).A.shape == (4, 4)
+    assert in_contact(joined, gaps_open=True).A.shape == (4, 4)
     view = linear_view(CHAIN, "take-up")
-    assert view.stable
-    assert view.point.mismatch < 1e-6
+    assert view.loop.stable
+    assert view.loop.point.mismatch < 1e-6
     alone = view.variations[-1]
     assert (alone.name, alone.stable) == ("all gaps open", True)
-    assert alone.margins.phase_margin > view.phase_margin
+    assert alone.margins.phase_margin > view.loop.margins.phase_margin
     assert "limit_cycles" in view.summary()
 
 
@@ -111,8 +112,8 @@ def test_modes_of_the_closed_loop_hold_those_of_the_chain():
     """A weak controller leaves the chain its own modes."""
     view = linear_view(CHAIN, SpeedPI(1e-4))
     own = natural_vibration(CHAIN).Omega[1:]
-    swinging = [mode.frequency for mode in view.modes if mode.value.imag > 0.0]
-    for Omega in own[own < math.pi / view.period]:
+    swinging = [mode.frequency for mode in view.loop.modes if mode.value.imag > 0.0]
+    for Omega in own[own < math.pi / view.loop.period]:
         assert min(abs(one / Omega - 1.0) for one in swinging) < 1e-2
 
 
@@ -154,8 +155,8 @@ def test_a_straight_curve_has_the_loop_of_a_damped_mass():
     masses[-2] = masses[-2].replace(curve_speed=None, curve_torque=None, damping=own + 0.002)
     by_curve = linear_view(curved, SpeedPI(0.1, 0.5, 10.0), fitted_to=CRANE)
     damped = linear_view(replace(curved, masses=tuple(masses)), SpeedPI(0.1, 0.5, 10.0), fitted_to=CRANE)
-    assert by_curve.phase_margin == pytest.approx(damped.phase_margin, rel=1e-6)
-    assert by_curve.delay_margin == pytest.approx(damped.delay_margin, rel=1e-6)
+    assert by_curve.loop.margins.phase_margin == pytest.approx(damped.loop.margins.phase_margin, rel=1e-6)
+    assert by_curve.loop.margins.delay_margin == pytest.approx(damped.loop.margins.delay_margin, rel=1e-6)
     assert by_curve.variations[-1].margins.phase_margin == pytest.approx(
         damped.variations[-1].margins.phase_margin, rel=1e-6
     )

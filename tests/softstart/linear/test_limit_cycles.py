@@ -25,7 +25,7 @@ def unbiased():
 
 def test_a_known_cycle_without_load_torque(unbiased):
     """Measured on the exact plant, from the predicted cycle on, after 60 periods."""
-    assert unbiased.stable
+    assert unbiased.loop.stable
     (found,) = unbiased.cycles
     assert found.stable
     assert (found.bias, found.mean_torque) == (0.0, 0.0)
@@ -49,8 +49,8 @@ def test_at_the_cycle_the_softened_loop_has_a_pole_on_the_circle(unbiased):
 def on_the_circle(view, n, cycle, within):
     softened = SLOW.replace(stiffness=n * SLOW.c, damping=n * SLOW.d, gap=0.0)
     found = linear_view(softened, view.controller, fitted_to=SLOW)
-    z = cmath.exp(1j * cycle.frequency * view.period)
-    assert min(abs(mode.value - z) for mode in found.modes) < within
+    z = cmath.exp(1j * cycle.frequency * view.loop.period)
+    assert min(abs(mode.value - z) for mode in found.loop.modes) < within
 
 
 @pytest.mark.parametrize(("kp", "ki"), [(4.0, 20.0), (8.0, 5.0)])

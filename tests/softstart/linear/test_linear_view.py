@@ -15,10 +15,10 @@ from softstart.linear.plant import in_contact, sampled
 
 def responses(view, drive, angle, count):
     """Torques at the samples from the operating point on, over the angle by which the motor was turned."""
-    start, sample, ends = SampledStart.of(drive, view.controller), view.point.sample, []
+    start, sample, ends = SampledStart.of(drive, view.controller), view.loop.point.sample, []
     for side in (angle, -angle):
         turned = sample.displaced(in_contact(drive), side * np.repeat([1.0, 0.0], [2, 3]))
-        rows = start.samples(sample.time + (count - 0.5) * view.period, begin=turned)
+        rows = start.samples(sample.time + (count - 0.5) * view.loop.period, begin=turned)
         ends.append(np.array([one.shaft_torque for one in rows]))
     assert ends[0].size == count
     return (ends[0] - ends[1]) / (2.0 * angle)
@@ -26,8 +26,8 @@ def responses(view, drive, angle, count):
 
 def test_the_law_of_a_linear_controller_is_found():
     view = linear_view(FREE, Filtered())
-    law, known = view.point.law, Filtered
-    assert view.point.states == (2, 3)  # not the counter, not the mode
+    law, known = view.loop.point.law, Filtered
+    assert view.loop.point.states == [2, 3]  # not the counter, not the mode
     for found, said in (
         (law.A, np.reshape(known.A, (2, 2))),
         (law.B, np.reshape(known.B, (2, 3))),
@@ -35,8 +35,8 @@ def test_the_law_of_a_linear_controller_is_found():
         (law.D, np.reshape(known.D, (1, 3))),
     ):
         assert np.max(np.abs(found - said)) < 1e-9
-    assert view.controller_system.ninputs == 3
-    assert view.controller_system.dt == pytest.approx(0.001)
+    assert view.loop.controller_system.ninputs == 3
+    assert view.loop.controller_system.dt == pytest.approx(0.001)
 
 
 def test_a_proportional_speed_loop_has_its_closed_form():
@@ -48,9 +48,9 @@ def test_a_proportional_speed_loop_has_its_closed_form():
     rigid = h / ((J1 + J2) * (z - 1.0))
     elastic = math.sin(Omega * h) / Omega * (z - 1.0) / (z * z - 2.0 * math.cos(Omega * h) * z + 1.0)
     known = kp * (rigid + J2 / (J1 * (J1 + J2)) * elastic)
-    found = view.own_loop.broken.response(z)[:, 0, 0]
+    found = view.loop.broken.response(z)[:, 0, 0]
     assert np.max(np.abs(found / known - 1.0)) < 1e-9
-    assert view.loop(z[0]) == pytest.approx(known[0], rel=1e-9)
+    assert view.loop.system(z[0]) == pytest.approx(known[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -65,21 +65,21 @@ def test_a_proportional_speed_loop_has_its_closed_form():
 def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controller):
     """A displacement in contact, under the controller itself, against the closed loop's modes alone."""
     view = linear_view(drive, controller)
-    assert view.point.mismatch < 1e-6
-    count, h = 12, view.period
-    response = responses(view, drive, 1e-4 * view.point.sample.plant["theta"][0], count)
+    assert view.loop.point.mismatch < 1e-6
+    count, h = 12, view.loop.period
+    response = responses(view, drive, 1e-4 * view.loop.point.sample.plant["theta"][0], count)
     # the modes with their delays span all responses: the exact one must lie among them
     plant = sampled(
         in_contact(drive), h, float(drive.computing_delay), (1, 2, 3), float(drive.encoder_lines) > 0.0
     )
-    whole, _, (read, _) = closed(plant, view.point.law)
+    whole, _, (read, _) = closed(plant, view.loop.point.law)
     first = np.zeros(read.size)
     first[:2] = 1.0  # motor angle and twist
     predicted = np.array([read @ np.linalg.matrix_power(whole, k) @ first for k in range(count)])
     assert np.max(np.abs(response - predicted)) < 1e-5 * np.max(np.abs(response))
     # and every mode shown is an eigenvalue of that closed loop
     poles = np.linalg.eigvals(whole)
-    for mode in view.modes:
+    for mode in view.loop.modes:
         assert np.min(np.abs(poles - mode.value)) < 1e-6
 
 
@@ -88,9 +88,9 @@ def test_the_least_damped_mode_is_what_rings_on():
     drive = FREE.replace(damping=0.6)
     view = linear_view(drive, SpeedPI(0.05))
     mode = view.elastic_mode
-    ring = responses(view, drive, 1e-4 * view.point.sample.plant["theta"][0], 400)
+    ring = responses(view, drive, 1e-4 * view.loop.point.sample.plant["theta"][0], 400)
     # a sampled ring obeys y[k+2] = 2 Re z y[k+1] - |z|^2 y[k]; the slow turning is differenced away
-    slow = [one.value.real for one in view.modes if one.value.imag == 0.0]
+    slow = [one.value.real for one in view.loop.modes if one.value.imag == 0.0]
     for pole in slow:
         ring = ring[1:] - pole * ring[:-1]
     left = np.column_stack([ring[1:-1], ring[:-2]])[20:]
@@ -105,17 +105,17 @@ def test_current_limit_feedback_damps_as_its_page_says():
     zeta, Omega = view.controller.damping_ratio, CRANE.Omega
     assert zeta == pytest.approx(0.7)
     assert view.elastic_mode.damping_ratio == pytest.approx(zeta, rel=0.05)
-    upper = max(one.frequency for one in view.margins.gain_crossovers)
+    upper = max(one.frequency for one in view.loop.margins.gain_crossovers)
     assert upper == pytest.approx(Omega * (zeta + math.sqrt(zeta**2 + 1.0)), rel=0.01)
-    assert math.degrees(view.phase_margin) > 80.0
+    assert math.degrees(view.loop.margins.phase_margin) > 80.0
 
 
 @pytest.mark.parametrize("lag", [0.002, 0.004, 0.006])
 def test_current_limit_feedback_keeps_thirty_degrees_behind_a_lag(lag):
     """The phase margin promised is kept, with room; behind a long lag the damping is not that asked for."""
     view = linear_view(CRANE.replace(torque_lag=lag), "current-limit-feedback")
-    assert view.stable
-    assert math.degrees(view.phase_margin) > 30.0
+    assert view.loop.stable
+    assert math.degrees(view.loop.margins.phase_margin) > 30.0
     if lag > 0.005:
         assert view.elastic_mode.damping_ratio < 0.75 * view.controller.damping_ratio
 
@@ -125,7 +125,7 @@ def test_other_drives_under_the_same_controller():
     names = [one.name for one in view.variations]
     assert names == ["J2 x 0.4", "J2 x 2.5", "c x 0.9", "c x 1.1", "all gaps open"]
     other = linear_view(FREE.replace(load_inertia=2.5 * FREE.J2), view.controller, fitted_to=FREE)
-    assert other.phase_margin == pytest.approx(view.variations[1].margins.phase_margin, rel=1e-5)
+    assert other.loop.margins.phase_margin == pytest.approx(view.variations[1].margins.phase_margin, rel=1e-5)
 
 
 def test_the_same_view_twice():
@@ -137,13 +137,11 @@ def test_the_same_view_twice():
 def test_open_loop_is_said(name):
     view = linear_view(CRANE, name)
     assert view.kind == "open loop"
-    assert view.margins is None
+    assert view.loop is None
     assert "acts open loop" in view.conclusion
     assert "margins do not apply" in view.conclusion
     with pytest.raises(InputError, match="acts open loop"):
         view.plot()
-    with pytest.raises(InputError, match="acts open loop"):
-        _ = view.loop
 
 
 @pytest.mark.parametrize("name", ["direct", "reduced-first-stage", "reduced-two-stage"])
@@ -195,8 +193,8 @@ class LoadSpeed(PlainController):
 
 def test_declared_sensors_are_inputs():
     view = linear_view(FREE, LoadSpeed())
-    assert view.controller_system.input_labels[3:] == ["shaft_torque", "load_speed"]
-    D = view.controller_system.D[0]
+    assert view.loop.controller_system.input_labels[3:] == ["shaft_torque", "load_speed"]
+    D = view.loop.controller_system.D[0]
     assert pytest.approx([0.0, 0.0, 0.0, -0.2, -0.3], abs=1e-10) == D
 
 
@@ -218,17 +216,16 @@ def sample(state, measured=()):
     full = np.full(7, np.nan)
     full[0] = 0.0
     full[1 : 1 + len(measured)] = measured
-    return Sample(True, 0.0, full, np.array(state, dtype=float), 0.0, 0.001, 0.0, np.zeros(0))
+    return Sample(True, 0.0, full, np.array(state, dtype=float), 0.0, 0.001, np.zeros(0))
 
 
-def test_what_is_not_smooth_is_named():
+def test_what_is_not_smooth_has_the_slope_of_a_side_or_none():
     def step(measured, state):
         a, b, c, d = state
         kept = np.array([a**3, abs(b), 1.0 if c == 0.0 else -1.0, max(d, 0.0) ** 0.5])
         return a + b + c + d, 0.001, 0.0, kept
 
-    law, _, rough = derivative(step, sample([2.0, 0.0, 0.0, 0.0]), (), np.ones(4), np.zeros(0), 1.0)
-    assert rough == (1, 2, 3)
+    law = derivative(step, sample([2.0, 0.0, 0.0, 0.0]), (), np.ones(4), np.zeros(0), 1.0)
     assert law.A[0, 0] == pytest.approx(12.0, rel=1e-10)
     assert abs(law.A[1, 1]) == pytest.approx(1.0)  # a corner: one of its sides
     assert law.A[2, 2] == law.A[3, 3] == 0.0  # a jump, and linear on one side only
@@ -239,8 +236,7 @@ def test_derivatives_of_a_smooth_step_are_accurate():
         x, y = state[0], measured[1]
         return math.sin(x) * math.exp(y), 0.001, 0.0, np.array([x * y + x * x])
 
-    law, _, rough = derivative(step, sample([0.7], [0.4]), (1,), np.ones(1), np.ones(1), 1.0)
-    assert rough == ()
+    law = derivative(step, sample([0.7], [0.4]), (1,), np.ones(1), np.ones(1), 1.0)
     assert law.C[0, 0] == pytest.approx(math.cos(0.7) * math.exp(0.4), rel=1e-10)
     assert law.D[0, 0] == pytest.approx(math.sin(0.7) * math.exp(0.4), rel=1e-10)
     assert law.A[0, 0] == pytest.approx(0.4 + 1.4, rel=1e-10)

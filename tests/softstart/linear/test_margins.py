@@ -77,20 +77,20 @@ def views():
 
 def test_the_gain_margin_puts_a_pole_on_the_circle(views):
     for view in views:
-        own = view.own_loop
-        crossings = [one for one in view.margins.phase_crossovers if one.margin == view.gain_margin]
+        own, m = view.loop, view.loop.margins
+        crossings = [one for one in m.phase_crossovers if one.margin == m.gain_margin]
         L = own.broken
-        loop = L._replace(B=view.gain_margin * L.B)
-        assert off_the_circle(loop, crossings[0].frequency, view.period) < 1e-8
+        loop = L._replace(B=m.gain_margin * L.B)
+        assert off_the_circle(loop, crossings[0].frequency, view.loop.period) < 1e-8
         below, above = (closed_poles(loop._replace(B=factor * loop.B)) for factor in (0.98, 1.02))
         assert np.max(np.abs(below)) < 1.0 < np.max(np.abs(above))
 
 
 def test_the_delay_margin_puts_a_pole_on_the_circle(views):
     for view in views:
-        own, m = view.own_loop, view.margins
-        assert off_the_circle(own.broken_delayed(m.delay_margin), m.delay_frequency, view.period) < 1e-8
-        L = own.broken_delayed(m.delay_margin).at(np.array([m.delay_frequency]), view.period)
+        own, m = view.loop, view.loop.margins
+        assert off_the_circle(own.broken_delayed(m.delay_margin), m.delay_frequency, view.loop.period) < 1e-8
+        L = own.broken_delayed(m.delay_margin).at(np.array([m.delay_frequency]), view.loop.period)
         assert abs(L[0] + 1.0) < 1e-7
         for share in (*np.linspace(0.0, 0.98, 40 if m.delay_margin < 0.02 else 6), 0.999):
             assert np.max(np.abs(closed_poles(own.broken_delayed(share * m.delay_margin)))) < 1.0
@@ -99,12 +99,12 @@ def test_the_delay_margin_puts_a_pole_on_the_circle(views):
 
 def test_the_modulus_margin_is_the_least_distance(views):
     for view in views:
-        w = np.geomspace(0.01 * view.drive.Omega, math.pi / view.period, 5_000)
-        L = view.own_loop.broken.at(w, view.period)
+        w = np.geomspace(0.01 * view.drive.Omega, math.pi / view.loop.period, 5_000)
+        L = view.loop.broken.at(w, view.loop.period)
         nearest = float(np.min(np.abs(1.0 + L)))
-        assert view.modulus_margin <= nearest * (1.0 + 1e-9)
-        assert view.modulus_margin == pytest.approx(nearest, rel=1e-3)
-        assert view.margins.sensitivity_peak == pytest.approx(1.0 / view.modulus_margin)
+        assert view.loop.margins.modulus_margin <= nearest * (1.0 + 1e-9)
+        assert view.loop.margins.modulus_margin == pytest.approx(nearest, rel=1e-3)
+        assert view.loop.margins.sensitivity_peak == pytest.approx(1.0 / view.loop.margins.modulus_margin)
 
 
 class TorqueOfBefore(PlainController):
@@ -118,9 +118,9 @@ class TorqueOfBefore(PlainController):
 
 def test_no_delay_below_the_margin_does_harm_where_the_loop_jumps():
     view = linear_view(FREE.replace(damping=1.0), TorqueOfBefore())
-    margin = view.delay_margin
+    margin = view.loop.margins.delay_margin
     inside = [share * margin for share in np.linspace(0.0, 0.999, 60)]
-    inside += [k * view.period for k in range(60) if k * view.period < margin]
+    inside += [k * view.loop.period for k in range(60) if k * view.loop.period < margin]
     for delay in inside:
-        assert np.max(np.abs(closed_poles(view.own_loop.broken_delayed(delay)))) < 1.0
-    assert np.max(np.abs(closed_poles(view.own_loop.broken_delayed(margin * (1 + 1e-6))))) > 1.0 - 1e-9
+        assert np.max(np.abs(closed_poles(view.loop.broken_delayed(delay)))) < 1.0
+    assert np.max(np.abs(closed_poles(view.loop.broken_delayed(margin * (1 + 1e-6))))) > 1.0 - 1e-9
