@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from softstart.balancing.design import Balance, Residual, balance
 from softstart.balancing.engine import Engine
-from softstart.balancing.gas import MeasuredCycle, SimpleCycle
+from softstart.balancing.gas import SimpleCycle
 from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Masses, Operation
 
 __all__ = [
@@ -22,7 +22,6 @@ __all__ = [
     "Cylinders",
     "Engine",
     "Masses",
-    "MeasuredCycle",
     "Operation",
     "Residual",
     "SimpleCycle",

@@ -225,7 +225,7 @@ class Balance:
         return {
             "engine": engine.name,
             "source": engine.source,
-            "assumed": list(engine.assumed),
+            "assumed": engine.assumed,
             "displacement": engine.displacement,
             "cylinders": engine.cylinders.count,
             "firing_angles": list(engine.cylinders.firing_angles),
@@ -358,12 +358,9 @@ def _round_speeds(low: float, high: float) -> Vector:
     >>> (_round_speeds(850 / RPM, 3600 / RPM) * RPM).round(6).tolist()
     [850.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 3600.0]
     """
-    ends = np.array([low, high]) * RPM
-    steps = (100.0, 250.0, 500.0, 1000.0, 2500.0, 5000.0)
-    step = next((one for one in steps if (ends[1] - ends[0]) / one < 10.0), 1e4)
-    inside = step * np.arange(np.ceil(ends[0] / step), ends[1] / step + 1.0)
-    inside = inside[(inside > ends[0] * 1.02) & (inside < ends[1] * 0.98)]
-    return np.concatenate([[low], inside / RPM, [high]])
+    step = 250.0 * math.ceil((high - low) * RPM / 2500.0) / RPM
+    inside = step * np.arange(math.ceil(1.02 * low / step), 0.98 * high / step)
+    return np.concatenate([[low], inside, [high]])
 
 
 def _residual(

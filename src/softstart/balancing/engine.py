@@ -16,16 +16,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.gas import Gas, MeasuredCycle, SimpleCycle, torque_harmonics
+from softstart.balancing.gas import SimpleCycle, torque_harmonics
 from softstart.balancing.parts import (
     CYCLE_ANGLE,
     HIGHEST,
@@ -42,12 +40,10 @@ from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import Library
 from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Parameter
-from softstart.quantities import nearest, show
 
 TURNS = np.roll(np.arange(-HIGHEST, HIGHEST + 1.0), -HIGHEST)  # of F: 0, 1 .. 24, -24 .. -1
 ORDERS = 0.5 * np.arange(2 * HIGHEST + 1)  # of torques: multiples 0, 0.5, 1 .. of the crank speed
 ROUNDING = 1e-13  # of the sum of the sizes
-INDICATOR_FILE = "indicator.csv"
 LIBRARY = Library("softstart.balancing", "an engine", "engines")
 
 TOP = Table(
@@ -55,23 +51,9 @@ TOP = Table(
     (
         Parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine"),
         Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
-        Parameter(
-            "assumed", "", "keys whose values are assumed, with commas between",
-            '"cylinders.rod_length, masses.*"', default="",
-        ),
+        Parameter("assumed", "", "which values are assumed", '"rod_length, all masses"', default=""),
     ),
-)  # fmt: skip
-
-INDICATOR = Table(
-    "indicator",
-    (
-        Parameter("file", "", "CSV file of crank angle and pressure", '"indicator.csv"'),
-        Parameter(
-            "crankcase_pressure", "Pa", "pressure below the pistons", '"1 bar"', "above 0", default=1e5,
-        ),
-    ),
-    required=False,
-)  # fmt: skip
+)
 
 # the parts of an engine that are tables of their own, by the name of their field
 PARTS: dict[str, type[ParameterSet]] = {
@@ -79,41 +61,13 @@ PARTS: dict[str, type[ParameterSet]] = {
     "operation": Operation,
 }  # fmt: skip
 OPTIONAL = "cycle", "balancer"  # tables
-SHAFT = replace(BalancerShaft.TABLES[0], many=True)
 PART_TABLES = {
     name: [replace(table, required=table.name not in OPTIONAL) for table in part.TABLES]
     for name, part in PARTS.items()
 }
-TABLES = (TOP, *(table for tables in PART_TABLES.values() for table in tables), INDICATOR, SHAFT)
+SHAFT = replace(BalancerShaft.TABLES[0], many=True)
+TABLES = (TOP, *(table for tables in PART_TABLES.values() for table in tables), SHAFT)
 USUAL = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed", "speeds"), "rpm")
-
-
-def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, Any]) -> tuple[str, ...]:
-    """The keys named in a text as "masses.*, cycle.speeds", but those `changed`; of a star those in `found`.
-
-    >>> assumed_keys("masses.*", {"masses.rotating": 1}, {"masses": {"reciprocating": 1, "rotating": 2}})
-    ('masses.reciprocating',)
-    >>> assumed_keys("mases.*", {}, {})
-    Traceback (most recent call last):
-    softstart.errors.InputError: assumed = "mases.*": an engine file has no such key; did you mean masses.*?
-    """
-    tables = [table for table in TABLES if table.name and not table.many]
-    known = [p.path for table in tables for p in table.parameters]
-    given = {
-        p.path for table in tables for p in table.parameters
-        if (found.get(table.name) or {}).get(p.key) is not None
-    }  # fmt: skip
-    wrong, keys = [], dict[str, None]()
-    for name in (name.strip() for name in text.split(",") if name.strip()):
-        named = [key for key in known if fnmatchcase(key, name)]
-        keys |= dict.fromkeys(key for key in named if key not in changed and key in (name, *given))
-        if not named:
-            meant = nearest(name, [*known, *(f"{table.name}.*" for table in tables)])
-            hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
-            wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
-    if wrong:
-        raise InputError(wrong)
-    return tuple(keys)
 
 
 def force_at(force: Complex, phi: ArrayLike) -> Complex:
@@ -189,7 +143,7 @@ class Engine:
         Bore, stroke, rod, spacing (m) and firing angles (rad).
     masses : Masses
         Masses of one cylinder, kg, and inertia of the crank, kg m^2.
-    gas : SimpleCycle, MeasuredCycle or None
+    gas : SimpleCycle or None
         Pressure in a cylinder over the cycle, Pa; forces and couples do not need it.
     operation : Operation
         Speed range, rad/s, and load, 0 to 1.
@@ -197,10 +151,8 @@ class Engine:
         Shares of the masses that are balanced on the crank.
     shafts : tuple of BalancerShaft, optional
         Balancer shafts that the engine has.
-    name, source : str, optional
-        Name of the engine, and source of its numbers.
-    assumed : tuple of str, optional
-        Keys, as in a file, whose values are assumed and not from the source.
+    name, source, assumed : str, optional
+        Name of the engine, source of its numbers, and which of them are assumed.
 
     Raises
     ------
@@ -220,40 +172,28 @@ class Engine:
 
     cylinders: Cylinders
     masses: Masses
-    gas: Gas | None
+    gas: SimpleCycle | None
     operation: Operation
     counterweights: Counterweights = field(default_factory=Counterweights)
     shafts: tuple[BalancerShaft, ...] = ()
     name: str = "unnamed engine"
     source: str = ""
-    assumed: tuple[str, ...] = ()
+    assumed: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shafts", tuple(self.shafts))
-        object.__setattr__(self, "assumed", tuple(self.assumed))
-        speeds = (self.gas.speeds if isinstance(self.gas, SimpleCycle) else None) or (0.0,)
-        for speed in speeds if self.gas else ():
-            self._weights(speed, None)
+        for speed in (self.gas.speeds or (0.0,)) if self.gas else ():
+            self._weights(speed, None)  # refuses a pressure below that without heat
 
     @classmethod
     def load(cls, engine: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Engine:
         """An engine from its TOML file, or a shipped one by its name; `also` as in `from_toml`."""
         text, where = LIBRARY.find(engine)
-        return cls.from_toml(text, where=where, folder=Path(where).parent, also=also)
+        return cls.from_toml(text, where=where, also=also)
 
     @classmethod
-    def from_toml(
-        cls,
-        text: str,
-        *,
-        where: str = "",
-        folder: str | os.PathLike[str] = "",
-        also: Mapping[str, object] | None = None,
-    ) -> Engine:
-        """An engine from TOML text; a measured pressure is looked for in `folder`.
-
-        `also` holds changes as typed, {"masses.reciprocating": "0.7 kg"}; what is changed is no longer
-        assumed.
+    def from_toml(cls, text: str, *, where: str = "", also: Mapping[str, object] | None = None) -> Engine:
+        """An engine from TOML text; `also` holds changes as typed, {"masses.reciprocating": "0.7 kg"}.
 
         >>> engine = Engine.load("vaz-11113")
         >>> Engine.from_toml(engine.to_toml()) == engine
@@ -262,48 +202,29 @@ class Engine:
         found = read_document(text, TABLES, "an engine", where=where, also=also, usual=USUAL)
         before = f"{where}: " if where else ""
         wrong: list[str] = []
-
-        def part(place: str, make: Any, values: Any) -> Any:
-            return made(make, values, f"{before}{place}{' ' if place else ''}", wrong)
-
-        named: dict[str, Any] = found.pop("")
         parts: dict[str, Any] = {"gas": None}
         for key, make in PARTS.items():
-            tables = [table.name for table in PART_TABLES[key]]
-            values = {name: value for table in tables for name, value in (found[table] or {}).items()}
-            if found[tables[0]] is not None:
-                parts[key] = part(f"[{tables[0]}]", make, values)
+            first, *others = (table.name for table in PART_TABLES[key])
+            if found[first] is not None:
+                values = found[first] | {k: v for name in others for k, v in (found[name] or {}).items()}
+                parts[key] = made(make, values, f"{before}[{first}] ", wrong)
         parts["shafts"] = [
-            part(f"[shaft] {i},", BalancerShaft, row) for i, row in enumerate(found["shaft"], 1)
+            made(BalancerShaft, row, f"{before}[shaft] {i}, ", wrong)
+            for i, row in enumerate(found["shaft"], 1)
         ]
-        about = {"text": named.pop("assumed"), "changed": also or {}, "found": found}
-        parts["assumed"] = part("", assumed_keys, about)
-        if (indicator := found["indicator"]) is not None:
-            if found["cycle"] is not None:
-                wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
-            else:
-                path = Path(folder) / indicator.pop("file")
-                parts["gas"] = part("[indicator]", MeasuredCycle.from_csv, {"path": path, **indicator})
         if wrong:
             raise InputError(wrong)
         try:
-            return cls(**parts, **named)
+            return cls(**parts, **found[""])
         except InputError as error:
             raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
 
     def to_toml(self) -> str:
-        """The engine as TOML text, which `from_toml` reads back to an equal one.
-
-        A measured pressure is not in it: it stands in its own file.
-        """
-        top = {"name": self.name, "source": self.source, "assumed": ", ".join(self.assumed)}
+        """The engine as TOML text, which `from_toml` reads back to an equal one."""
+        top = {"name": self.name, "source": self.source, "assumed": self.assumed}
         blocks: list[tuple[Table, Any]] = [(TOP, top)]
         for key, tables in PART_TABLES.items():
-            part = getattr(self, key)
-            if isinstance(part, MeasuredCycle):
-                about = {"file": INDICATOR_FILE, "crankcase_pressure": part.crankcase_pressure}
-                blocks.append((INDICATOR, about))
-            elif part is not None:
+            if (part := getattr(self, key)) is not None:
                 blocks += [(table, part.values()) for table in tables]
         blocks += [(SHAFT, shaft.values()) for shaft in self.shafts]
         kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
@@ -321,11 +242,11 @@ class Engine:
         """Speed in rad/s at which a balancer is tuned, by default the highest."""
         return self.operation.tuning_speed or self.operation.highest_speed
 
-    def _weights(self, speed: float, load: float | None) -> tuple[Gas, Vector]:
+    def _weights(self, speed: float, load: float | None) -> tuple[SimpleCycle, Vector]:
         """The pressure, and the factors of its shapes; raises InputError without one, or at a bad load."""
         load = self.operation.load if load is None else load
         if self.gas is None:
-            raise InputError("[cycle], [indicator]: one of the two gives the gas torque; add one.")
+            raise InputError("[cycle]: it gives the gas torque; add one.")
         if not 0.0 <= load <= 1.0:
             raise InputError(f"load = {load}: it must be from 0 to 1.")
         return self.gas, self.gas.weights(self.cylinders, speed, load)

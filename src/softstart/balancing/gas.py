@@ -1,18 +1,15 @@
 """The gas pressure in a cylinder over a four-stroke cycle, and the harmonics of its torque.
 
 theta is the crank angle of one cylinder from its firing dead centre: expansion to pi, exhaust to 2 pi, intake
-to 3 pi, compression to 4 pi. The pressure is that of a simple cycle in closed form (`SimpleCycle`), or was
-measured (`MeasuredCycle`). It is given as `weights @ shapes(theta)`: the harmonics, the mean among them, are
-computed once for each shape, for all speeds and loads. Integrals over a cycle are exact to rounding, since
-the pressure is smooth between known angles.
+to 3 pi, compression to 4 pi. The pressure is given as `weights @ shapes(theta)`: the harmonics, the mean
+among them, are computed once for each shape, for all speeds and loads. Integrals over a cycle are exact to
+rounding, since the pressure is smooth between known angles.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import ClassVar
@@ -23,18 +20,12 @@ from numpy.polynomial import Chebyshev
 from softstart.arrays import Complex, Vector
 from softstart.balancing.parts import CYCLE_ANGLE, HIGHEST, Cylinders
 from softstart.errors import InputError
-from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import text_of
 from softstart.input.parameter_set import MaybeSeries, Number, ParameterSet, Series, parameter
-from softstart.quantities import to_si
 
 LONGEST = math.pi / 12.0  # rad, of a panel
-MANY = 100  # breaks, as of a measured pressure, leave panels so short that few nodes suffice
 BURNT = math.log(1000.0)  # Vibe's 6.908: 99.9 % at the end, here scaled to all
 DEGREE = 40  # of the polynomials that hold the heat integral
 GRADES = (0.0, 2**-16, 2**-13, 2**-10, 2**-7, 2**-5, 1 / 8, 1 / 4, 1 / 2, 3 / 4, 1.0)  # finer at the start
-WIDEST = math.radians(30.0)  # between neighbouring angles of a measurement
-EXAMPLE = "angle [deg],pressure [bar]"
 
 
 def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
@@ -45,7 +36,7 @@ def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
     True
     """
     edges = [0.0, *(b for b in sorted(breaks) if 0.0 < b < CYCLE_ANGLE), CYCLE_ANGLE]
-    x, w = np.polynomial.legendre.leggauss(10 if len(breaks) > MANY else 24)
+    x, w = np.polynomial.legendre.leggauss(24)
     places, weights = [], []
     for low, high in pairwise(edges):
         count = max(1, math.ceil((high - low) / LONGEST))
@@ -56,7 +47,7 @@ def nodes(breaks: Sequence[float]) -> tuple[Vector, Vector]:
 
 
 @lru_cache(maxsize=64)
-def torque_harmonics(cycle: Gas, cylinders: Cylinders) -> Complex:
+def torque_harmonics(cycle: SimpleCycle, cylinders: Cylinders) -> Complex:
     """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 48, of one cylinder; a row per shape."""
     theta, weights = nodes(cycle.breaks())
     per_pressure = -cylinders.area * cylinders.crank.slope(theta)
@@ -259,83 +250,3 @@ def _heat_pieces(cycle: SimpleCycle, cylinders: Cylinders) -> tuple[Vector, list
         pieces.append(rate.integ(lbnd=low, k=before))
         before = pieces[-1](high)
     return edges, pieces
-
-
-@dataclass(frozen=True)
-class MeasuredCycle:
-    """Pressures in Pa at rising crank angles in rad, 0 at the firing dead centre; straight lines between.
-
-    The angles cover one cycle of 4 pi, wherever it begins (-360 deg to 360 deg is usual), in steps of at most
-    30 deg. It is used for all speeds at load 1: a measurement at one operating point says nothing about
-    others. Raises InputError.
-
-    >>> angles = np.radians(np.arange(-360.0, 360.0, 10.0))
-    >>> len(MeasuredCycle(tuple(angles), tuple(1e5 + 0 * angles)).pressures)
-    72
-    """
-
-    angles: tuple[float, ...]
-    pressures: tuple[float, ...]
-    crankcase_pressure: float = 1e5
-
-    def __post_init__(self) -> None:
-        for name, unit in (("angles", "rad"), ("pressures", "Pa")):
-            values = np.asarray(to_si(list(getattr(self, name)), unit, name))
-            object.__setattr__(self, name, tuple(values.tolist()))
-        below = to_si(self.crankcase_pressure, "Pa", "crankcase_pressure")
-        object.__setattr__(self, "crankcase_pressure", below)
-        if not len(self.angles) == len(self.pressures) > 0:
-            raise InputError(f"there are {len(self.pressures)} pressures for {len(self.angles)} angles.")
-        steps = np.diff([*self.angles, self.angles[0] + CYCLE_ANGLE])
-        wrong = (steps <= 0.0) | (steps > WIDEST + 1e-9)
-        wrong[-1] = not -1e-9 <= steps[-1] <= WIDEST + 1e-9  # 0 where the last one is the first again
-        if wrong.any():
-            bad = int(np.argmax(wrong))
-            raise InputError(
-                f"angle {bad + 1} = {math.degrees(self.angles[bad]):g} deg: {math.degrees(steps[bad]):g} deg "
-                "to the next one (behind the last: to the first of the next cycle); give one whole cycle of "
-                f"720 deg in rising steps of at most {math.degrees(WIDEST):g} deg."
-            )
-        if not min(self.pressures) > 0.0:
-            raise InputError(f"pressure = {min(self.pressures):g} Pa: an absolute pressure is above 0.")
-
-    @classmethod
-    def from_csv(cls, path: str | os.PathLike[str], crankcase_pressure: float = 1e5) -> MeasuredCycle:
-        """From a CSV file whose first line names two columns with their units: angle [deg],pressure [bar].
-
-        Raises InputError with the line.
-        """
-        place = f'"{path}"'
-        wanted = (Wanted(("angle",), "rad"), Wanted(("pressure",), "Pa"))
-        text = text_of(path, f"a table with {EXAMPLE}", "CSV")
-        angles, pressures = read_columns(text, place, wanted, headed="units").values
-        try:
-            return cls(tuple(angles.tolist()), tuple(pressures.tolist()), crankcase_pressure)
-        except InputError as error:
-            raise InputError(f"{place}: {sentence}" for sentence in error.sentences) from None
-
-    def to_csv(self) -> str:
-        """The pressure as the CSV text that it is read from."""
-        rows = zip(self.angles, self.pressures, strict=True)
-        return "angle [rad],pressure [Pa]\n" + "".join(f"{phi!r},{p!r}\n" for phi, p in rows)
-
-    def breaks(self) -> tuple[float, ...]:
-        """The angles measured."""
-        return tuple(sorted({float(a) for a in np.mod(self.angles, CYCLE_ANGLE)}))
-
-    def shapes(self, cylinders: Cylinders, theta: Vector) -> Vector:
-        """The pressure, and 1."""
-        found = np.interp(theta, self.angles, self.pressures, period=CYCLE_ANGLE)
-        return np.stack([found, np.ones_like(found)])
-
-    def weights(self, cylinders: Cylinders, speed: float, load: float) -> Vector:
-        """The pressure less that below the piston; raises InputError for a load other than 1."""
-        if load != 1.0:
-            raise InputError(
-                f"load = {load:g}: a measured pressure is that of the load at which it was measured; leave "
-                "the load at 1, or describe the pressure by [cycle]."
-            )
-        return np.array([1.0, -self.crankcase_pressure])
-
-
-Gas = SimpleCycle | MeasuredCycle  # where the pressure comes from

@@ -117,7 +117,7 @@ def balance(*, engine: Engine, speeds: list[float] | None) -> Answer:
     ENGINE is a TOML file or the name of a shipped engine; by default the two-cylinder engine VAZ-11113 of the
     literature, some of whose parameters are assumed. The two-shaft balancer is tuned at one speed,
     balancer.tuning_speed; a first-order couple is balanced by a shaft with two opposite imbalances. The
-    pressure ([cycle] or [indicator]) is only needed for the gas torque.
+    pressure ([cycle]) is only needed for the gas torque.
     """
     from softstart.views.balances import balance_sheet
 

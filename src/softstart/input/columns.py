@@ -15,7 +15,7 @@ from softstart.errors import InputError
 from softstart.quantities import RefusedError, parse, show, with_points
 
 _NUMBER = re.compile(r"[+-]?[.,]?[0-9]|[+-]?(inf|nan)\b", re.IGNORECASE)
-Heading = Literal["any", "names", "units"]
+Heading = Literal["any", "names"]
 
 __all__ = ["Columns", "Wanted", "read_columns"]
 
@@ -43,7 +43,7 @@ def read_columns(
     decimal commas. Blank lines and lines that begin with # are passed over. A first line without numbers
     names the columns, with units as `torque [kN*m]`; if there are no more columns than wanted, other names
     will do, in this order. Without it there are exactly the columns wanted, in SI. `headed`: it must be there
-    and give "names", or names and "units". `missing`: an empty cell, or "nan", is NaN. What can be read in
+    and give "names". `missing`: an empty cell, or "nan", is NaN. What can be read in
     two ways is refused.
 
     >>> time, torque = Wanted(("time", "t"), "s"), Wanted(("torque", "u"), "N*m")
@@ -129,10 +129,8 @@ def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -
         free = iter(sorted(set(range(len(wanted))) - set(found.values())))
         found |= {k: next(free) for k in range(len(wanted)) if k not in found}
     places = [found[k] for k in sorted(found)]
-    if len(places) < len(wanted) or (headed == "units" and not all(units[i] for i in places)):
-        units_too = " with units" if headed == "units" else ""
-        form = ",".join(f"{one.names[0]} [{one.unit}]" if units_too else one.names[0] for one in wanted)
-        raise RefusedError(f"it must name the columns{units_too}, as {form}")
+    if len(places) < len(wanted):
+        raise RefusedError(f"it must name the columns, as {','.join(one.names[0] for one in wanted)}")
     for one, place in zip(wanted, places, strict=True):
         try:
             parse(f"1 {units[place]}", one.unit)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.balancing.engine import INDICATOR_FILE, TURNS, force_at, shaking_of_crank, shaking_of_shafts
-from softstart.balancing.gas import MeasuredCycle
+from softstart.balancing.engine import TURNS, force_at, shaking_of_crank, shaking_of_shafts
 from softstart.balancing.parts import CYCLE_ANGLE, HIGHEST, Counterweights
 from softstart.views.drawing import (
     COLOURS,
@@ -44,7 +43,7 @@ OVER_SPEED = (  # what is drawn over the speed, a height if there are any, a cou
 
 def balance_sheet(found: Balance) -> Sheet:
     """Orders, designs, what they leave over the speeds, and the balancer in a sentence."""
-    engine, assumed = found.engine, ", ".join(found.engine.assumed)
+    engine, assumed = found.engine, printable(found.engine.assumed)
     designs = "; ".join(f"{one.name}: {one.about}" for one in found.residuals)
     unknown = "The couples are not known: they need the spacing of the cylinders."
     rows = [{"balancer": one.name, **one.row(i)} for one in found.residuals for i in range(one.speeds.size)]
@@ -62,7 +61,6 @@ def balance_sheet(found: Balance) -> Sheet:
         figures=drawings(found),
         files={
             "engine.toml": engine.to_toml(),
-            **({INDICATOR_FILE: engine.gas.to_csv()} if isinstance(engine.gas, MeasuredCycle) else {}),
             "orders.csv": records_file(found.orders()),
             "residuals.csv": records_file(rows),
             **({} if engine.gas is None else {"torque.csv": columns_file(_cycle(found))}),
@@ -88,9 +86,7 @@ def _lines(found: Balance) -> list[str]:
     bore, stroke, rod = (1e3 * one for one in (cylinders.bore, cylinders.stroke, cylinders.rod_length))
     firing = ", ".join(short(math.degrees(angle)) for angle in cylinders.firing_angles)
     pressure = "none given, so only the inertia shakes"
-    if isinstance(gas, MeasuredCycle):
-        pressure = f"measured, {len(gas.angles)} points"
-    elif gas is not None:
+    if gas is not None:
         mean = 1e-5 * engine.indicated_work(w, found.load) / engine.displacement
         pressure = f"compression {gas.compression_ratio:g}, mean pressure {mean:.2f} bar, load {found.load:g}"
     uneven = engine.speed_fluctuation(w, found.load)

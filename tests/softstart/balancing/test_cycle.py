@@ -1,4 +1,4 @@
-"""The pressure: against an integration of the first law, by its work, and as measured."""
+"""The pressure: against an integration of the first law, and by its work."""
 
 import math
 from itertools import pairwise
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from tests.softstart.balancing.engines import RPM, engine
 
-from softstart.balancing import Cylinders, MeasuredCycle, SimpleCycle
+from softstart.balancing import Cylinders, SimpleCycle
 from softstart.balancing.gas import torque_harmonics
 from softstart.errors import InputError
 
@@ -117,83 +117,6 @@ def test_load_scales_intake_and_heat():
     full, half, none = (cycle.weights(ONE, W, load) for load in (1.0, 0.5, 0.0))
     assert [full[0], half[0], none[0]] == pytest.approx([0.9e5, 0.6e5, 0.3e5], rel=1e-14)
     assert [half[2] / full[2], none[2] / full[2]] == pytest.approx([2 / 3, 1 / 3], rel=1e-14)
-
-
-# measured ----------------------------------------------------------------------------------------------
-
-
-def sampled(cycle, step=0.5, first=-360.0):
-    angles = np.radians(np.arange(first, first + 720.0, step))
-    return MeasuredCycle(tuple(angles), tuple(pressure(cycle, angles)), cycle.crankcase_pressure)
-
-
-def test_a_measured_cycle_of_the_simple_one_gives_its_harmonics():
-    cycle = SimpleCycle(9.9, "9 bar", exhaust_opening="130 deg")
-    exact = engine((1, 2), gas=cycle, bore=0.08).gas_harmonics(W)
-    errors = []
-    for step in (2.0, 1.0, 0.5):
-        found = engine((1, 2), gas=sampled(cycle, step), bore=0.08).gas_harmonics(W)
-        errors.append(float(np.abs(found - exact)[:12].max()))
-    assert errors[-1] < 5e-5 * abs(exact[2])
-    assert errors[1] < 0.4 * errors[0]  # straight lines between: second order
-    assert errors[2] < 0.4 * errors[1]
-
-
-def test_where_a_measured_cycle_begins_does_not_matter():
-    cycle = SimpleCycle(9.9, "9 bar")
-    one, other = (engine(gas=sampled(cycle, 1.0, first)).gas_harmonics(W) for first in (-360.0, 0.0))
-    assert one == pytest.approx(other, abs=1e-10 * abs(one).max())
-
-
-def test_a_csv_file_is_read_with_its_units(tmp_path):
-    path = tmp_path / "indicator.csv"
-    angles = np.arange(-360.0, 361.0, 20.0)
-    lines = [f"{a},{1.0 + 0.01 * abs(a % 720)}" for a in angles]
-    lines[-1] = f"360,{lines[0].split(',')[1]}"
-    path.write_text("angle [deg],pressure [bar]\n" + "\n".join(lines) + "\n")
-    found = MeasuredCycle.from_csv(path)
-    assert found.angles[0] == pytest.approx(-2.0 * math.pi)
-    assert found.pressures[1] == pytest.approx(1e5 * (1.0 + 0.01 * 380.0))
-
-
-CSV = {
-    "no header": ("0,1\n20,1\n", "it must name the columns with units"),
-    "wrong names": ("a [deg],p [bar]\n0,1\n", "it must name the columns with units"),
-    "wrong unit": ("angle [deg],pressure [N]\n0,1\n", "N is a force, not a pressure"),
-    "a column short": ("angle [deg],pressure [bar]\n0\n", "has 1 value instead of 2, angle and pressure"),
-    "empty": ("", "it must name the columns with units"),
-    "few": ("angle [deg],pressure [bar]\n0,1\n20,1\n", "angle 2 = 20 deg: 700 deg to the next one"),
-}
-
-
-@pytest.mark.parametrize("kind", CSV)
-def test_a_bad_csv_file_is_refused_in_one_sentence(kind, tmp_path):
-    text, says = CSV[kind]
-    path = tmp_path / "indicator.csv"
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        MeasuredCycle.from_csv(path)
-    (sentence,) = caught.value.sentences
-    assert sentence.startswith(f'"{path}": ')
-    assert says in sentence
-    with pytest.raises(InputError, match="there is no such file"):
-        MeasuredCycle.from_csv(tmp_path / "nowhere.csv")
-
-
-def test_bad_measured_angles_and_pressures_are_refused():
-    even = np.radians(np.arange(0.0, 720.0, 10.0))
-    flat = np.full(even.size, 1e5)
-    swapped = even.copy()
-    swapped[5], swapped[6] = even[6], even[5]
-    for angles, pressures, says in (
-        (swapped, flat, "angle 6 = 60 deg: -10 deg to the next one"),
-        (even * 1.1, flat, "angle 72 = 781 deg: -61 deg to the next one"),
-        (even[:40], flat[:40], "angle 40 = 390 deg: 330 deg to the next one"),
-        (even, -flat, "an absolute pressure is above 0"),
-        (even, flat[:-1], "there are 71 pressures for 72 angles"),
-    ):
-        with pytest.raises(InputError, match=says):
-            MeasuredCycle(tuple(angles), tuple(pressures))
 
 
 BAD = {
