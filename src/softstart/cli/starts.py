@@ -178,7 +178,7 @@ def linear(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
     drive of the literature. The controller's step function is linearised at an instant of its start at which
     all gaps are closed; the loop is broken at the torque demand. Limit cycles through the gap of a drive are
-    predicted by the describing function and checked on the exact plant.
+    predicted by the describing function.
     """
     with working("running and linearising the start ..."), attributed():
         (made,) = make_controllers([controller], params, several=False)

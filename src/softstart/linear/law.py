@@ -139,26 +139,16 @@ class SampledStart:
         found += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
         return tuple(found)
 
-    def recorder(self, room: int = 0) -> Recorder:
-        """The kernel for a start of which so many spans are recorded at first, or none."""
-        return Recorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, room)
-
-    def samples(
-        self, until: float, begin: Sample | None = None, recorder: Recorder | None = None
-    ) -> Iterator[Sample]:
+    def samples(self, until: float, begin: Sample | None = None) -> Iterator[Sample]:
         """The start from its beginning or from a kept sample."""
-        recorder = recorder or self.recorder()
+        recorder = Recorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, 0)
         recorder.begin(until, bool(self.controller.sensors & Sensor.STAGE))
         now, state = recorder.state, self.first_state
         if begin is not None:
             recorder.work[:], state = begin.work, begin.state
-            now.n_spans = now.n_events = 0.0
             now.changed, now.t_end = 1.0, until
         name = f"{self.machine.name}, controller {label_of(self.controller)}"
         while (reason := recorder.advance()) != at.ENDED:
-            if reason == at.BUFFER_FULL:
-                recorder.grow()
-                continue
             if reason != at.ASK:
                 raise SimulationError(f"{name}: the start was given up at t = {now.time:.6g} s.")
             work = recorder.work.copy()
@@ -216,13 +206,12 @@ def _plain(controller: PlainController) -> Step:
 @dataclass(frozen=True, eq=False)
 class SampledRun:
     """The samples of a start, the longest stretch of them in one contact at one sample period (the last of
-    equals), and with the work of the kernel those to be linearised at, by index, and the last of all.
+    equals), and by index those with the work of the kernel, at which the controller is linearised.
     """
 
     samples: list[Sample]
     contact: range  # indices; empty if there is none
     kept: dict[int, Sample]
-    last: Sample
     steady: bool
 
     @property
@@ -257,7 +246,7 @@ def run_until_steady(start: SampledStart) -> SampledRun:
                 steady = bool(np.ptp(recent, axis=0).max() <= STEADY * sizes.base)
         if steady or len(samples) >= MOST_SAMPLES:
             break
-    return SampledRun(samples, contact, kept, sample, steady)
+    return SampledRun(samples, contact, kept, steady)
 
 
 def derivative(

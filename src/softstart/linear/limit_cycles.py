@@ -1,4 +1,4 @@
-"""Limit cycles through the gap: predicted by its describing function, and tried on the exact plant.
+"""Limit cycles through the gap, predicted by its describing function.
 
 "Where does the describing function of backlash come from?" From the first harmonic of a dead zone, as here.
 The describing function treats the shaft as a spring that is softer the less the twist leaves the gap. For a
@@ -26,12 +26,7 @@ torque there can be two amplitudes: n falls from 1 as the vibration begins to le
 again for large ones. A cycle is stable if the pole goes inside as the amplitude grows (Loeb's criterion).
 
 Assumed: the controller keeps in the gap the linear law it has in contact, no torque limit is reached, and the
-twist is nearly a sinusoid.
-
-The check on the exact plant: a start is placed on the cycle (the eigenvector of that pole) in the middle of
-the gap and continues under the controller itself, with its torque limits and modes. For a cycle predicted to
-be stable, frequency and amplitude after many periods are compared with the predicted ones. A cycle predicted
-to be unstable is a boundary: two starts, below and above its amplitude, should diverge from it.
+twist is nearly a sinusoid. `simulate` shows what the exact plant does.
 """
 
 from __future__ import annotations
@@ -45,10 +40,9 @@ from itertools import pairwise
 import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
-from softstart.kernel import records as at
-from softstart.linear.law import Sample, SampledRun
+from softstart.kernel.motor import M_MOTOR_SPEED
+from softstart.linear.law import SampledRun
 from softstart.linear.loop import ROUNDING, Loop
-from softstart.linear.plant import in_contact
 from softstart.linear.systems import SMALL, zeros_of
 
 SHARES = np.geomspace(1e-4, 1.0, 200)  # n, of the grid
@@ -56,12 +50,6 @@ SLOW = 1e-4 * math.pi  # rad a sample
 HOLDING = 10.0  # |1 + L| there with the gap open, above which a loop holds its speed
 LARGEST = 100.0  # amplitude, in half gaps and mean windups
 AMPLITUDES = 1500  # of the grid
-SETTLING, MEASURED = 60, 10  # periods
-POINTS = 200  # per period
-AGREED = 0.1  # relative difference of frequency and amplitude up to which a stable cycle counts as confirmed
-BELOW, ABOVE = 0.7, 1.4  # of the amplitude, for a cycle predicted to be unstable
-GONE = 1e-3
-STILL = 0.2  # of the predicted amplitude: below, the vibration counts as gone
 
 
 def share(amplitude: float, half_gap: float, bias: float = 0.0) -> float:
@@ -123,11 +111,10 @@ def _g(x: float) -> float:
 
 @dataclass(frozen=True)
 class Cycle:
-    """A predicted limit cycle, and what the exact plant does when it is started there.
+    """A predicted limit cycle.
 
-    `share` is n. Frequencies in rad/s, twist amplitudes and bias in rad, torques in N m. `beyond_limits` is
-    true if its demand exceeds what the motor can deliver; the measured figures are NaN where no vibration
-    remains.
+    `share` is n. Frequency in rad/s, twist amplitude and bias in rad, torques in N m. `beyond_limits` is true
+    if its demand exceeds what the motor can deliver.
     """
 
     share: float
@@ -137,35 +124,46 @@ class Cycle:
     mean_torque: float
     demand_amplitude: float
     stable: bool
-    beyond_limits: bool = False
-    measured_frequency: float = math.nan
-    measured_amplitude: float = math.nan
-    confirmed: bool = False
-    verdict: str = ""
+    beyond_limits: bool
 
 
 def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
-    """All limit cycles, predicted about the mean torque of the start, and checked on the exact plant.
+    """All limit cycles of the harmonic balance in order of frequency and amplitude.
 
     A loop that holds its speed carries the load torque in the mean, another one the torque of its start.
     """
     drive = loop.machine.design_drive
     if not drive.gap:
         return ()
+    back = max(1, round(float(drive.elastic_period) / run.period))
     alone = replace(loop, open=True).broken
-    holds = bool(abs(1.0 + alone.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING)
-    base = run.last if holds else run.kept[run.contact[-1]]
-    if holds:
-        w1, w2 = base.plant["w"][:2].tolist()
-        mean = float(drive.Mc + drive.load_viscous_friction * w2)
-        demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w1)
+    if abs(1.0 + alone.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING:
+        w = float(np.mean([one.measured[M_MOTOR_SPEED] for one in run.samples[-1 - back :]]))
+        mean = float(drive.Mc + drive.load_viscous_friction * w)
+        demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w)
     else:
-        back = max(1, round(float(drive.elastic_period) / run.period))
         recent = [run.samples[index] for index in run.contact[-1 - back :]]
         mean, demand = np.mean([(one.shaft_torque, one.demand) for one in recent], axis=0).tolist()
     room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
-    found = [checked(loop, base, cycle) for cycle in predicted(loop, mean)]
-    return tuple(replace(one, beyond_limits=one.demand_amplitude > room) for one in found)
+    half, c = 0.5 * float(drive.gap), float(drive.c)
+    wound = abs(mean) / c
+    amplitudes = (wound or half) + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
+
+    def excess(n: float, amplitudes: Vector) -> Vector:
+        return np.array([n_at(float(one), half, c, mean) for one in amplitudes]) - n
+
+    found = []
+    for n in crossings(loop):
+        pole, vector, read = _on_the_circle(loop, n)
+        w = cmath.phase(pole) / loop.period
+        lower, upper = (abs(_on_the_circle(loop, n * by, pole)[0]) for by in (1.0 - 1e-5, 1.0 + 1e-5))
+        for amplitude in zeros_of(partial(excess, n), amplitudes):
+            less, more = excess(n, amplitude * np.array([1.0 - 1e-5, 1.0 + 1e-5]))
+            swing = amplitude * abs(complex(read[1] @ vector))
+            bias = bias_for(mean, amplitude, half, c)
+            stable = bool((upper - lower) * (more - less) < 0.0)
+            found.append(Cycle(n, w, amplitude, bias, mean, swing, stable, swing > room))
+    return tuple(sorted(found, key=lambda one: (one.frequency, one.amplitude)))
 
 
 def oscillating(loop: Loop, n: float) -> tuple[Complex, Complex, Matrix]:
@@ -198,100 +196,8 @@ def crossings(loop: Loop) -> list[float]:
     return [n for n in found if np.min(np.abs(outside(n))) < SMALL]
 
 
-def predicted(loop: Loop, mean_torque: float) -> list[Cycle]:
-    """All limit cycles of the harmonic balance in order of frequency and amplitude."""
-    drive = loop.machine.design_drive
-    half, c = 0.5 * float(drive.gap), float(drive.c)
-    wound = abs(mean_torque) / c
-    amplitudes = (wound or half) + np.geomspace(1e-9, LARGEST, AMPLITUDES) * (half + wound)
-
-    def excess(n: float, amplitudes: Vector) -> Vector:
-        return np.array([n_at(float(one), half, c, mean_torque) for one in amplitudes]) - n
-
-    found = []
-    for n in crossings(loop):
-        pole, vector, read = _on_the_circle(loop, n)
-        w = cmath.phase(pole) / loop.period
-        lower, upper = (abs(_on_the_circle(loop, n * by, pole)[0]) for by in (1.0 - 1e-5, 1.0 + 1e-5))
-        for amplitude in zeros_of(partial(excess, n), amplitudes):
-            less, more = excess(n, amplitude * np.array([1.0 - 1e-5, 1.0 + 1e-5]))
-            demand = amplitude * abs(complex(read[1] @ vector))
-            bias = bias_for(mean_torque, amplitude, half, c)
-            stable = bool((upper - lower) * (more - less) < 0.0)
-            found.append(Cycle(n, w, amplitude, bias, mean_torque, demand, stable))
-    return sorted(found, key=lambda one: (one.frequency, one.amplitude))
-
-
 def _on_the_circle(loop: Loop, n: float, near: complex | None = None) -> tuple[complex, Complex, Matrix]:
     """The pole nearest to the circle, or to another one; its vector for a twist of 1 rad; what is read."""
     poles, vectors, read = oscillating(loop, n)
     nearest = int(np.argmin(np.abs(np.abs(poles) - 1.0) if near is None else np.abs(poles - near)))
     return complex(poles[nearest]), vectors[:, nearest] / vectors[1, nearest], read
-
-
-def checked(loop: Loop, base: Sample, cycle: Cycle) -> Cycle:
-    """The cycle with what the exact plant does, started on it from the sample `base`."""
-    if cycle.stable:
-        frequency, amplitude = _after(loop, base, cycle, 1.0)
-        if math.isnan(frequency) or amplitude < STILL * cycle.amplitude:
-            return replace(cycle, measured_amplitude=amplitude, verdict="not confirmed: the vibration decays")
-        off_w, off_a = frequency / cycle.frequency - 1.0, amplitude / cycle.amplitude - 1.0
-        confirmed = max(abs(off_w), abs(off_a)) <= AGREED
-        verdict = "confirmed" if confirmed else "there is a limit cycle, further off"
-        return replace(
-            cycle, measured_frequency=frequency, measured_amplitude=amplitude, confirmed=confirmed,
-            verdict=f"{verdict}: frequency {100.0 * off_w:+.1f} %, amplitude {100.0 * off_a:+.1f} % from "
-            "predicted",
-        )  # fmt: skip
-    ends = [_after(loop, base, cycle, factor) for factor in (BELOW, ABOVE)]
-    lower, upper = (0.0 if math.isnan(w) or a < GONE * cycle.amplitude else a for w, a in ends)
-    confirmed = lower < BELOW * cycle.amplitude and upper > cycle.amplitude
-    verdict = "confirmed as a boundary" if confirmed else "not confirmed as a boundary"
-    return replace(
-        cycle, confirmed=confirmed,
-        verdict=f"{verdict}: from {BELOW:g} and {ABOVE:g} times its amplitude the vibration ends at "
-        f"{lower:.2g} and {upper:.2g} rad",
-    )  # fmt: skip
-
-
-def _after(loop: Loop, base: Sample, cycle: Cycle, factor: float) -> tuple[float, float]:
-    """Frequency and amplitude after many periods; NaN and the amplitude if it no longer oscillates.
-
-    The frequency is the mean between upward crossings of the mid value, the amplitude half the range.
-    """
-    period = 2.0 * math.pi / cycle.frequency
-    end = base.time + (SETTLING + MEASURED) * period
-    recorder = loop.start.recorder(256)
-    for _ in loop.start.samples(end, _on_the_cycle(loop, base, cycle, factor * cycle.amplitude), recorder):
-        pass
-    times = np.linspace(end - MEASURED * period, end * (1.0 - 1e-12), MEASURED * POINTS)
-    twist = recorder.finished().at(times)["twist"][:, 0]
-    beyond = twist - 0.5 * (twist.min() + twist.max())
-    up = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
-    amplitude = 0.5 * float(np.ptp(twist))
-    if up.size < 3:
-        return math.nan, amplitude
-    crossed = times[up] + beyond[up] / (beyond[up] - beyond[up + 1]) * (times[1] - times[0])
-    return 2.0 * math.pi * (up.size - 1) / float(crossed[-1] - crossed[0]), amplitude
-
-
-def _on_the_cycle(loop: Loop, base: Sample, cycle: Cycle, amplitude: float) -> Sample:
-    """A sample with the gap open, in the middle of the part of it that the twist crosses, going up."""
-    half, bias, states = 0.5 * float(loop.machine.design_drive.gap), cycle.bias, loop.point.states
-    low, high = max(-half, bias - amplitude), min(half, bias + amplitude)
-    if low >= high:  # this vibration does not leave the flank: start just off it
-        low, high = half * (1.0 - 1e-3), half
-    sine = min(max((0.5 * (low + high) - bias) / amplitude, -1.0), 1.0)
-    turn = amplitude * complex(math.sqrt(1.0 - sine * sine), sine)  # twist = bias + Im(turn e^jwt)
-    state = np.imag(turn * _on_the_circle(loop, cycle.share)[1])
-    now = base.plant
-    # twist and its rate as such, all else about the sample
-    state[1] = 0.5 * (low + high) - float(now["theta"][0])
-    state[2] = state[3] + cycle.frequency * turn.real - float(now["w"][0] - now["w"][1])
-    begin = base.displaced(in_contact(loop.machine), state)
-    if loop.start.differencing:
-        begin.plant["sample_angle"] += state[-1 - len(states)]
-    begin.plant["mode"][0] = at.OPEN
-    begin.plant["stage"] += 1.0 - begin.plant["stage"] % 2.0  # the gap is open: an odd stage
-    begin.state[states] += state[state.size - len(states) :]
-    return begin

@@ -6,7 +6,7 @@ in `loop`); its modes; and the limit cycles that backlash causes (`limit_cycles`
     law            the start on the exact plant, sample by sample; the derivative of the controller's step
     plant          the machine in contact at the sample instants
     loop           law and plant joined: margins, delay margin, modes
-    limit_cycles   the describing function of backlash; cycles predicted and tried on the exact plant
+    limit_cycles   the describing function of backlash, and the cycles that it predicts
     systems        linear sampled systems: response, modes, crossings
 """
 
@@ -106,7 +106,7 @@ class LinearView:
 
     @cached_property
     def cycles(self) -> tuple[Cycle, ...]:
-        """Limit cycles through the gap, predicted and checked; none of a chain, which has several gaps."""
+        """Limit cycles through the gap, predicted; none of a chain, which has several gaps."""
         if self.loop is None or len(self.drive.shaft_names) > 1:
             return ()
         return limit_cycles(self.loop, self.run)
