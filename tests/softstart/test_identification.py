@@ -157,7 +157,7 @@ def fit_of(log: Log, drive: Drive, position: float, offset: float) -> tuple[Fitt
     unknowns = unknowns_of(NAMES, drive, [log], [True])
     own = {"position": position, "offset": offset}
     x = [one.number(own.get(one.name, float(getattr(drive, one.name, 0.0)))) for one in unknowns]
-    return Fitter.of([LogModel.of(log, drive.replace(start_position="mid-gap"))], unknowns), np.array(x)
+    return Fitter([LogModel.of(log, drive.replace(start_position="mid-gap"))], unknowns), np.array(x)
 
 
 @pytest.mark.parametrize(("experiment", "lines"), [("start", 64.0), (REVERSE, 64.0), (REVERSE, 1024.0)])
@@ -315,7 +315,7 @@ def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(
     for sign in (-1.0, 1.0):
         x = best.x.copy()
         x[i] = fitter.end(i, sign, half, best, ())
-        begin = fitter.settled(x, tuple(one.error for one in best.spots), best.sizes)
+        begin = fitter.settled(x, best.errors, best.sizes)
         other = fitter.valued(fitter.descended(begin, i, best), best)
         assert other.value - best.value == pytest.approx(fitter.threshold(best), rel=0.12)
 
@@ -325,10 +325,10 @@ def test_the_slope_of_the_likelihood_is_that_of_differences(solved: tuple[Fitter
     fitter, best = solved
     residual, jacobian = best.white
     deviations = np.sqrt(np.diag(fitter.covariance(best)))
-    exact, errors = jacobian.T @ residual + best.drift, tuple(one.error for one in best.spots)
+    exact = jacobian.T @ residual + best.drift
     for i, move in enumerate(0.2 * deviations):
         ahead, back = (
-            fitter.settled(best.x + sign * move * np.eye(exact.size)[i], errors, best.sizes).likelihood
+            fitter.settled(best.x + sign * move * np.eye(exact.size)[i], best.errors, best.sizes).likelihood
             for sign in (1.0, -1.0)
         )
         assert exact[i] * deviations[i] == pytest.approx(0.25 * (ahead - back) / 0.2, abs=0.01)

@@ -1,7 +1,4 @@
-"""What the exact plant would have logged: signals at the samples, and their response to torque errors.
-
-Everything here is a function of the parameters and of the torque error: no result depends on an earlier call.
-"""
+"""What the exact plant would have logged: signals at the samples, and their response to torque errors."""
 
 from __future__ import annotations
 
@@ -73,17 +70,34 @@ class LogModel:
     drive: Drive  # the guess without limits
     dead_time: float
     block: int
+    rows: NDArray[np.bool_]  # the samples that count,
+    values: Vector  # what they tell,
+    root: Vector  # and the deviations of what encoder or log round
 
     @classmethod
     def of(cls, log: Log, drive: Drive, most_blocks: int = MOST_BLOCKS) -> LogModel:
         """The model of a log of this drive."""
         wide = drive.replace(**unlimited(log), brake="none")
         block = max(1, math.ceil(log.time.size / most_blocks))
-        return cls(log, drive, wide.replace(computing_delay=0.0), float(wide.computing_delay), block)
+        rows = np.isfinite(log.values)
+        values = log.values[rows]
+        if log.kind == "angle" and log.count:
+            values, variance = edges(log.time[rows], values, log.count)
+            counts = np.isfinite(variance)
+            rows[rows], values, root = counts, values[counts], np.sqrt(variance[counts])
+        else:
+            root = np.full(values.size, max(log.count / math.sqrt(12.0), 1e-3 * log.scale))
+        delay = float(wide.computing_delay)
+        return cls(log, drive, wide.replace(computing_delay=0.0), delay, block, rows, values, root)
 
     def first(self, share: float) -> LogModel:
-        """The model of the first part of the log: at least four samples of it."""
-        return replace(self, log=self.log.first(max(4, math.ceil(share * self.times.size))))
+        """The model of the first part of the log, at least four samples of it, all weighted alike."""
+        log = self.log.first(max(4, math.ceil(share * self.times.size)))
+        rows = self.rows[: log.time.size]
+        count = int(rows.sum())
+        return replace(
+            self, log=log, rows=rows, values=self.values[:count], root=np.full(count, self.log.scale)
+        )
 
     @property
     def times(self) -> Vector:
@@ -190,12 +204,9 @@ def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     Samples on one count have nearly the same error while the motor creeps, and together they tell one thing:
     when the count ended. In the last of them the motor was before that edge by less than it then moved to the
     next sample: by half of that on average, and uniformly about it. How far it moves follows from the times
-    to the neighbouring edges, the shorter of which is taken for the variance. A motor that passes a count or
-    more from sample to sample has the variance of a rounded number, count^2/12. The first sample, and the
-    last, are rounded numbers.
-
-    All this depends on the log alone: a covariance that follows the fitted motion fits what it rounds, and
-    found the torque error of a single start with 64 lines a quarter too small.
+    to the neighbouring edges, the shorter of which is taken for the variance. Faster samples, the first and
+    the last are rounded numbers, of the variance count^2/12. All this depends on the log alone: weights that
+    follow the fitted motion find the torque error of a coarse start too small.
 
     >>> angle, variance = edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
     >>> angle.round(2).tolist(), (12.0 * variance).round(2).tolist()

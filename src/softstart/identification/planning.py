@@ -1,14 +1,10 @@
-"""What an experiment would tell, before it is run: Fisher information, and a torque that tells more.
-
-`plan_experiments` answers which experiment to run: expected intervals of the standard ones, and of one torque
-whose levels are chosen for this drive.
-"""
+"""Which experiment to run: expected intervals of standard ones, and of a torque planned for a drive."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -19,10 +15,18 @@ from softstart.chain.machines import records
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import Fitter, Point, Sizes, data_of
+from softstart.identification.fitting import Fitter, Point, Sizes
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
-from softstart.identification.unknowns import Unknown, chosen, unknowns_of, usual, values_of
+from softstart.identification.unknowns import (
+    USUAL,
+    Unknown,
+    chosen,
+    position_is_unknown,
+    unknowns_of,
+    usual,
+    values_of,
+)
 from softstart.kernel.records import S_PHI
 from softstart.profile import TorqueProfile
 from softstart.quantities import show, to_si
@@ -108,8 +112,6 @@ class Plan:
     >>> plan = plan_experiments(crane, log_period="4 ms", optimise=False)
     >>> [one.name for one in plan.experiments]
     ['start', 'two levels', 'two levels, then reverse', 'reversed three times', 'shaking']
-    >>> plan["start"].widths["gap"] > plan["two levels, then reverse"].widths["gap"]
-    True
 
     References
     ----------
@@ -175,14 +177,13 @@ def plan_experiments(
     """Find what standard experiments would tell about a drive, and a torque that tells more.
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
-    interval that a fit would have (Fisher information). The position in the gap is unknown in each where the
-    load is reactive. The log has the angle of the motor.
+    interval that a fit would have (Fisher information), of a log of the motor's angle from an unknown
+    position in the gap where the load is reactive.
 
     The planned torque has at least nine levels, and the duration of the best standard experiment that keeps
-    the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA:
-    M. J. D. Powell), minimising `Experiment.score` with the peak of the shaft torque from each position and
-    the travel within the limits. The best torque that keeps all limits on the exact plant is returned: never
-    less than the best standard experiment tells within them. It is a local optimum.
+    the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA),
+    minimising `Experiment.score`. The best torque that keeps all limits on the exact plant is returned, a
+    local optimum: it never tells less than the best standard experiment within them.
 
     Parameters
     ----------
@@ -238,21 +239,20 @@ def plan_experiments(
     bench = Bench(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
     experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
-        usual_peak = drive.permissible_torque or max(one.peak for one in experiments)
-        limits = [("max_torque", max_torque, usual_peak, "N*m"), ("max_travel", max_travel, math.inf, "rad")]
-        torque, travel = (
-            usual if given is None else _between(key, given, unit, math.inf, "")
-            for key, given, usual, unit in limits
-        )
+        torque, travel = drive.permissible_torque or max(one.peak for one in experiments), math.inf
+        if max_torque is not None:
+            torque = _between("max_torque", max_torque, "N*m")
+        if max_travel is not None:
+            travel = _between("max_travel", max_travel, "rad")
         experiments.append(bench.designed(standard, torque, travel))
     return Plan(drive, tuple(experiments), period, error)
 
 
-def _between(name: str, given: float | str, unit: str, most: float, why: str) -> float:
+def _between(name: str, given: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
     """A number above 0 and at most this."""
     value = float(to_si(given, unit, name=name))
     if not 0.0 < value <= most:
-        limit = f" and at most {most:.3g} {unit}: {why}" if most < math.inf else ""
+        limit = f" and at most {most:.3g} {unit}: {why}" if why else ""
         raise InputError(f"{name} = {show(given)}: give a value above 0{limit}.")
     return value
 
@@ -284,37 +284,33 @@ def made_up_log(
         profile, end = steps_of(*standard_levels(drive)[experiment])
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
-    generator = np.random.default_rng(seed)
-    played = demand + ripple * generator.standard_normal(time.size)
-    model = LogModel.of(Log.planned(time, played, signal), _at_rest(drive))
-    start = {POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {}
-    states = model.motion(start).at(time)
-    angle = states["phi"][:, 0] - states["phi"][0, 0]
-    count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
-    if count:
+    played = demand + ripple * np.random.default_rng(seed).standard_normal(time.size)
+    start = {POSITION: position} if position_is_unknown(drive) else {}
+    states = LogModel.of(Log.planned(time, played), _at_rest(drive)).motion(start).at(time)
+    angle, speed = states["phi"][:, 0] - states["phi"][0, 0], states["w"][:, 0]
+    if count := _count_of(drive):
         angle = np.floor(angle / count + phase) * count
-    speed = states["w"][:, 0] if not count else np.diff(angle, prepend=angle[0]) / log_period
+        speed = np.diff(angle, prepend=angle[0]) / log_period
     torque = demand if torque_is == "demand" else states["u"]
     values = {signal: speed if signal == "speed" else angle}
     return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
 
 
-def _moving(drive: Drive) -> bool:
-    """Whether the position in the gap is unknown."""
-    return (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
+def _count_of(drive: Drive) -> float:
+    """What the encoder counts, rad; 0 of an ideal one."""
+    return 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
 
 
 def _at_rest(drive: Drive) -> Drive:
-    return drive.replace(start_position="mid-gap") if _moving(drive) else drive.design_drive
+    return drive.replace(start_position="mid-gap") if position_is_unknown(drive) else drive.design_drive
 
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:
-    names = usual(drive, lag=True)
-    asked = chosen(free, names, list(dict.fromkeys([*names, *FRICTIONS])), "this log")
-    missing = [name for name in asked if float(getattr(drive, name)) == 0.0]
-    if free is not None and missing:
+    names = [name for name in usual(drive, lag=True) if float(getattr(drive, name))]
+    asked = chosen(free, names, [*USUAL, "load_torque", "torque_lag", *FRICTIONS], "this log")
+    if missing := [name for name in asked if not float(getattr(drive, name))]:
         raise InputError(f"free = {show(missing[0])}: it is 0 in the drive; give a guess of it.")
-    return tuple(name for name in asked if name not in missing)
+    return tuple(asked)
 
 
 def _level(drive: Drive) -> float:
@@ -409,7 +405,7 @@ class Bench:
     def places(self) -> Vector:
         """Positions of the motor in the gap, rad."""
         half = 0.5 * float(self.drive.gap)
-        return np.linspace(-half, half, CHECKED) if _moving(self.drive) else np.zeros(1)
+        return np.linspace(-half, half, CHECKED) if position_is_unknown(self.drive) else np.zeros(1)
 
     def experiment(self, name: str, durations: Vector, levels: Vector) -> Experiment:
         """What these levels would tell, and how they load the drive."""
@@ -433,18 +429,19 @@ class Bench:
         period = max(self.period, end / samples)
         time = np.arange(0.0, end + 0.5 * period, period)
         log = Log.planned(time, profile.at(time))
-        unknowns = unknowns_of(self.free, drive, [log], [_moving(drive)])
+        unknowns = unknowns_of(self.free, drive, [log], [position_is_unknown(drive)])
         numbers = {POSITION: PLACE, "offset": 0.0}
         x = np.array([
             one.number(float(numbers.get(one.name, getattr(drive, one.name, 0.0)))) for one in unknowns
         ])  # fmt: skip
-        model = LogModel.of(log, _at_rest(drive), SAMPLES)
-        signal = model.signals([values_of(unknowns, x, 0)])[0]
-        count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
-        model = replace(model, log=log.changed(values=signal, count=count))
-        logged = np.round(signal / count) * count if count else signal
-        fitter = Fitter((model,), unknowns, (data_of(model, logged),))
-        spot = fitter.spot(x, 0, np.zeros(model.blocks), derivatives=True)
+        values = values_of(unknowns, x, 0)
+        signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([values])[0]
+        if count := _count_of(drive):
+            signal = np.round(signal / count) * count
+        model = LogModel.of(log.changed(values=signal, count=count), _at_rest(drive), SAMPLES)
+        fitter = Fitter([model], unknowns)
+        spot = fitter.spot(x, 0, np.zeros(model.blocks))
+        spot = spot._replace(jacobian=spot.rotation @ fitter.jacobian(x, 0, spot.error))
         # a longer period stands for samples left out: the same error of the torque in each of them
         sizes = Sizes(1.0, self.ripple * math.sqrt(self.period / period))
         variances = np.diag(fitter.covariance(Point(x, sizes, (spot,), np.zeros(x.size))))
@@ -459,7 +456,7 @@ class Bench:
 
     def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
         """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
-        starts = records(self.wide, start_position=places) if _moving(self.drive) else [self.wide]
+        starts = records(self.wide, start_position=places) if position_is_unknown(self.drive) else [self.wide]
         player = make_controller("profile", {"profile": profile}).set_up(self.wide)
         notes = prepared(starts).notes([player], until=end)
         for one in notes.starts:
@@ -477,7 +474,7 @@ class Bench:
         model = LogModel.of(Log.planned(times, profile.at(times)), _at_rest(self.drive))
         found = np.empty((2, places.size))
         for i, share in enumerate((places / (0.5 * float(self.drive.gap) or 1.0)).tolist()):
-            motion = model.motion({POSITION: share} if _moving(self.drive) else {})
+            motion = model.motion({POSITION: share} if position_is_unknown(self.drive) else {})
             angles = motion.states[:, S_PHI]
             found[:, i] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
         return found[0], found[1]

@@ -25,10 +25,8 @@ from softstart.start.comparison import INTERVAL, intervals
 from softstart.start.simulation import simulate
 
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
-CONFIDENCE = 0.95
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file
-DIGITS = 3  # of half an interval, with which a value is written: it moves by 0.5 % of that at most
 FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an identification
 
 
@@ -68,21 +66,6 @@ class Estimate:
         """Half the interval over the value, as a share; infinite if the value is 0."""
         return 0.5 * (self.upper - self.lower) / abs(self.value) if self.value else math.inf
 
-    def rounded(self) -> Estimate:
-        """Value and ends to three digits of half the interval, of themselves where they are smaller.
-
-        >>> one = Estimate("gap", 0.0796834172, 0.0781726453, 0.0812174625, known=True).rounded()
-        >>> one.value, one.lower, one.upper
-        (0.07968, 0.07817, 0.08122)
-        """
-        half = 0.5 * (self.upper - self.lower)
-        numbers = {
-            name: round(number, DIGITS - 1 - math.floor(math.log10(min(half, abs(number)))))
-            for name in ("value", "lower", "upper")
-            if (number := getattr(self, name)) and half > 0.0
-        }
-        return replace(self, **numbers)
-
     def moved(self, shares: ArrayLike) -> Vector:
         """Values so many half intervals away: 1 is the end further from 0, -1 the other end, by logarithms.
 
@@ -112,8 +95,8 @@ class Identification:
     ----------
     drive, guess : Drive
         The drive with the values found, and that from which the search began.
-    logs : tuple of Log
-        The logs, in the order given; none if the identification was loaded. `residuals` are in their units.
+    logs, residuals : tuple
+        The logs, in the order given, and model minus log in their units; none if it was loaded.
     estimates : tuple of Estimate
         One for each parameter that was free, then the position of each log.
     correlations : array of shape (k, k)
@@ -133,8 +116,6 @@ class Identification:
     >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
     >>> [one.name for one in found.estimates if not one.known]
     []
-    >>> abs(found.drive.gap / 0.08 - 1.0) < 0.05
-    True
 
     References
     ----------
@@ -149,9 +130,7 @@ class Identification:
     ripple: float
     searches: int
     agreed: int
-    notes: tuple[
-        str, ...
-    ]  # what was done to the logs, what they show that the model has not, what is unknown
+    notes: tuple[str, ...]
     residuals: tuple[Vector, ...]
 
     def __getitem__(self, name: str) -> Estimate:
@@ -165,7 +144,7 @@ class Identification:
 
     @property
     def stated(self) -> bool:
-        """Whether intervals are stated: not where the drive does not explain the logs, or time was short."""
+        """Whether intervals are stated: not where the drive does not explain the logs."""
         return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
 
     def draws(self, count: int = 200, seed: int = 0) -> Records:
@@ -179,13 +158,8 @@ class Identification:
         values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
         normal = np.random.default_rng(seed).standard_normal((count, len(which)))
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
-        return records(
-            self.drive,
-            **{
-                self.estimates[i].name: self.estimates[i].moved(move)
-                for i, move in zip(which, moves.T, strict=True)
-            },
-        )
+        moved = {one.name: one.moved(move) for one, move in zip(self.shared, moves.T, strict=True)}
+        return records(self.drive, **moved)
 
     def k_dyn(
         self, controllers: Sequence[str], count: int = 200, seed: int = 0
@@ -219,19 +193,12 @@ class Identification:
                     f"{DRIVE_FILE} alone, as a drive without intervals."
                 )
 
-    def rounded(self) -> Self:
-        """The identification as it is written, without digits that the logs do not tell."""
-        estimates = tuple(one.rounded() for one in self.estimates)
-        values = {one.name: one.value for one in estimates if one.name in PARAMETERS}
-        return replace(self, drive=self.drive.replace(**values), estimates=estimates)
-
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder: `rounded`."""
+        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder."""
         Path(folder).mkdir(parents=True, exist_ok=True)
-        kept = self.rounded()
-        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | kept.summary(), indent=2)
-        for name, content in ((DRIVE_FILE, kept.drive.to_toml()), (FILE, text + "\n")):
-            write_whole(Path(folder) / name, lambda stream, content=content: stream.write(content))  # type: ignore[misc]
+        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | self.summary(), indent=2)
+        write_whole(Path(folder) / DRIVE_FILE, lambda stream: stream.write(self.drive.to_toml()))
+        write_whole(Path(folder) / FILE, lambda stream: stream.write(text + "\n"))
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> Self:
@@ -256,12 +223,11 @@ class Identification:
             )
             correlations = np.array(kept["correlations"], dtype=np.float64)
             _check_kept(estimates, correlations)
-            guess = Drive.from_toml(kept["guess"], where=f"{path}, guess")
             found = cls(
-                drive=Drive.load(Path(folder) / DRIVE_FILE), guess=guess, logs=(), estimates=estimates,
+                drive=Drive.load(Path(folder) / DRIVE_FILE),
+                guess=Drive.from_toml(kept["guess"], where=f"{path}, guess"), logs=(), estimates=estimates,
                 correlations=correlations, ripple=float(kept["ripple"]), searches=int(kept["searches"]),
-                agreed=int(kept["agreed"]),
-                notes=tuple(map(str, kept["notes"])), residuals=(),
+                agreed=int(kept["agreed"]), notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
             raise InputError(
@@ -277,16 +243,14 @@ class Identification:
 
     def summary(self) -> dict[str, Any]:
         """Everything as numbers and words, for JSON."""
+        estimates = []
+        for one in self.estimates:
+            ends = {} if self.stated else {"lower": None, "upper": None}
+            percent = 100.0 * one.half_width if one.value and self.stated else None
+            estimates.append(plain_fields(one) | ends | {"half_width_percent": percent})
         return {
             "drive": self.drive.given() | {"name": self.drive.name},
-            "estimates": [
-                {
-                    **plain_fields(one),
-                    **({} if self.stated else {"lower": None, "upper": None}),
-                    "half_width_percent": 100.0 * one.half_width if one.value and self.stated else None,
-                }
-                for one in self.estimates
-            ],
+            "estimates": estimates,
             "correlations": self.correlations.tolist(),
             "ripple": self.ripple,
             "searches": self.searches,
@@ -314,7 +278,6 @@ class Identification:
 
 
 def _or_nan(value: Any) -> Any:
-    """What a file has, NaN in place of null."""
     return math.nan if value is None else value
 
 

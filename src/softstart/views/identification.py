@@ -101,7 +101,7 @@ def identification_sheet(
         notes=found.notes,
         figures={"logs": found.plot} if found.logs else {},
         files=files,
-        machine=found.rounded().drive,
+        machine=found.drive,
     )
 
 
