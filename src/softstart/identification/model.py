@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -95,9 +95,8 @@ class LogModel:
         log = self.log.first(max(4, math.ceil(share * self.times.size)))
         rows = self.rows[: log.time.size]
         count = int(rows.sum())
-        return replace(
-            self, log=log, rows=rows, values=self.values[:count], root=np.full(count, self.log.scale)
-        )
+        root = np.full(count, log.scale or self.log.scale)  # a motor may be at rest at first
+        return replace(self, log=log, rows=rows, values=self.values[:count], root=root)
 
     @property
     def times(self) -> Vector:
@@ -111,10 +110,9 @@ class LogModel:
 
     def signals(self, values: Sequence[Mapping[str, float]], error: Vector | None = None) -> Matrix:
         """What would have been logged under each set of values and this torque error: a row for each."""
-        players = {row.get(DEAD_TIME): self._player(row, error) for row in values}
         out = np.empty((len(values), self.times.size))
-        for i, (row, plant) in enumerate(zip(values, self._plants(values), strict=True)):
-            motion, lag = self._played(plant, players[row.get(DEAD_TIME)]), row.get(FILTER, 0.0)
+        for i, (row, motion) in enumerate(zip(values, self.motions(values, error), strict=True)):
+            lag = row.get(FILTER, 0.0)
             if lag > 0.0 and self.log.kind == "speed":
                 out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
             elif self.log.kind == "speed":
@@ -138,7 +136,20 @@ class LogModel:
 
     def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Recorded:
         """The start under the torque of the log and this error of it."""
-        return self._played(self._plants([values])[0], self._player(values, error))
+        return next(self.motions([values], error))
+
+    def motions(
+        self, values: Sequence[Mapping[str, float]], error: Vector | None = None
+    ) -> Iterator[Recorded]:
+        """The start with each set of values."""
+        players = {row.get(DEAD_TIME): self._player(row, error) for row in values}
+        for row, plant in zip(values, self._plants(values), strict=True):
+            recorder = Recorder(plant, 0, 4 * self.times.size + 256)
+            until = float(self.times[-1]) * (1.0 + 1e-9)
+            reason = run_one(players[row.get(DEAD_TIME)], self.drive, recorder, until)
+            if reason != ENDED:
+                raise SimulationError(f"The start of the log could not be computed (status {reason}).")
+            yield recorder.finished()
 
     def _plants(self, values: Sequence[Mapping[str, float]]) -> list[Rows]:
         """The rows of the kernel for each set of values."""
@@ -164,13 +175,6 @@ class LogModel:
         if error is not None:
             torque = torque + np.repeat(error, self.block)[: torque.size] / math.sqrt(self.block)
         return make_controller("profile", {"profile": TorqueProfile(knots, torque[owners])})
-
-    def _played(self, plant: Rows, player: Controller) -> Recorded:
-        recorder = Recorder(plant, 0, 4 * self.times.size + 256)
-        reason = run_one(player, self.drive, recorder, float(self.times[-1]) * (1.0 + 1e-9))
-        if reason != ENDED:
-            raise SimulationError(f"The start of the log could not be computed (status {reason}).")
-        return recorder.finished()
 
     @property
     def _fine(self) -> Vector:

@@ -34,32 +34,16 @@ FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an id
 class Estimate:
     """One parameter: its value, its interval of 95 %, and whether the logs tell it.
 
-    Attributes
-    ----------
-    name : str
-        The parameter of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank).
-    value, lower, upper : float
-        In SI. What is unknown has the value at which the search ended. Ends are NaN where none is stated.
-    known, reason : bool, str
-        Not known is what has an interval wider than a factor of 3 (of a friction, than a tenth of the torque
-        that accelerates), and for what reason.
-
-    Examples
-    --------
     >>> Estimate("gap", 0.08, 0.079, 0.081, known=True).half_width
     0.0125...
-
-    References
-    ----------
-    docs/identification.md.
     """
 
-    name: str
-    value: float
-    lower: float
+    name: str  # of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank)
+    value: float  # SI; of what is unknown that at which the search ended
+    lower: float  # NaN where no interval is stated
     upper: float
-    known: bool
-    reason: str = ""
+    known: bool  # whether upper/lower < 3 (of a friction, known within a tenth of the accelerating torque)
+    reason: str = ""  # why it is not known
 
     @property
     def half_width(self) -> float:
@@ -97,8 +81,9 @@ class Identification:
         The drive with the values found, and that from which the search began.
     logs, residuals : tuple
         The logs, in the order given, and model minus log in their units; none if it was loaded.
-    estimates : tuple of Estimate
-        One for each parameter that was free, then the position of each log.
+    estimates : tuple
+        Of each parameter that was free, then of the position of each log: name, value, lower and upper end
+        of the interval of 95 %, known, reason.
     correlations : array of shape (k, k)
         Of the logarithms of the estimates (of positions and frictions themselves).
     ripple : float
@@ -221,13 +206,12 @@ class Identification:
                 Estimate(**{f.name: _or_nan(one[f.name]) for f in fields(Estimate)})
                 for one in kept["estimates"]
             )
-            correlations = np.array(kept["correlations"], dtype=np.float64)
-            _check_kept(estimates, correlations)
+            guess = Drive.from_toml(kept["guess"], where=f"{path}, guess")
             found = cls(
-                drive=Drive.load(Path(folder) / DRIVE_FILE),
-                guess=Drive.from_toml(kept["guess"], where=f"{path}, guess"), logs=(), estimates=estimates,
-                correlations=correlations, ripple=float(kept["ripple"]), searches=int(kept["searches"]),
-                agreed=int(kept["agreed"]), notes=tuple(map(str, kept["notes"])), residuals=(),
+                drive=Drive.load(Path(folder) / DRIVE_FILE), guess=guess, logs=(), estimates=estimates,
+                correlations=np.array(kept["correlations"], dtype=np.float64), ripple=float(kept["ripple"]),
+                searches=int(kept["searches"]), agreed=int(kept["agreed"]),
+                notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
             raise InputError(
@@ -279,13 +263,3 @@ class Identification:
 
 def _or_nan(value: Any) -> Any:
     return math.nan if value is None else value
-
-
-def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
-    """That estimates and correlations of a file fit together."""
-    for one in estimates:
-        if not (-math.inf < one.lower <= one.value <= one.upper < math.inf or math.isnan(one.lower)):
-            raise ValueError(f"{one.name}: {one.value} in {one.lower} to {one.upper}")
-    size = len(estimates)
-    if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):
-        raise ValueError(f"the correlations of {size} estimates are a symmetric table")

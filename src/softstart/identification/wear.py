@@ -92,43 +92,14 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Wear:
-    """How the gap of a drive grows, and when it reaches its limit.
+    """How the gap of a drive grows, and when it reaches its limit."""
 
-    Attributes
-    ----------
-    found, names, dates : tuple
-        The identifications, the oldest first; what they are called, and when their logs were taken.
-    line : Line
-        The growth of the gap: `growth`, rad a year, and its interval; `at`, `reaches`.
-    limit : float or None
-        The gap at which the drive is worn, rad.
-    notes : tuple of str
-        What else has changed, and what the line cannot tell.
-
-    Examples
-    --------
-    >>> from softstart import Drive, identify
-    >>> from softstart.identification.planning import made_up_log
-    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-    >>> plan = {"log_period": 8e-3, "ripple": 1.0}
-    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
-    ...     for one in (crane, crane.replace(gap=0.1))]
-    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
-    >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
-    True
-
-    References
-    ----------
-    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
-    docs/identification.md.
-    """
-
-    found: tuple[Identification, ...]
+    found: tuple[Identification, ...]  # the oldest first
     names: tuple[str, ...]
-    dates: tuple[date, ...]
+    dates: tuple[date, ...]  # when their logs were taken
     line: Line
-    limit: float | None
-    notes: tuple[str, ...]
+    limit: float | None  # the gap at which the drive is worn, rad
+    notes: tuple[str, ...]  # what else has changed, and what the line cannot tell
 
     @property
     def gaps(self) -> tuple[Estimate, ...]:
@@ -194,7 +165,7 @@ def follow_wear(
     Returns
     -------
     Wear
-        Growth of the gap with its interval, and the date of the limit.
+        `line.growth`, rad a year, with its interval; `worn`, the date of the limit with its interval; notes.
 
     Raises
     ------
@@ -203,13 +174,20 @@ def follow_wear(
 
     Examples
     --------
-    >>> follow_wear(["nowhere"], ["2026"])
-    Traceback (most recent call last):
-    softstart.errors.InputError: wear: one identification shows no growth; name two or more, of other dates.
+    >>> from softstart import Drive, identify
+    >>> from softstart.identification.planning import made_up_log
+    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
+    >>> plan = {"log_period": 8e-3, "ripple": 1.0}
+    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
+    ...     for one in (crane, crane.replace(gap=0.1))]
+    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
+    >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
+    True
 
     References
     ----------
-    Fieller's theorem: `Wear`; docs/identification.md.
+    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
+    docs/identification.md.
     """
     if isinstance(found, Identification | str | os.PathLike) or len(found) < 2:
         raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
@@ -266,12 +244,6 @@ def _date_after(first: date, years: float) -> date | None:
 def _notes(each: Sequence[Identification], line: Line) -> list[str]:
     """What else has changed, and what the line cannot tell."""
     notes = []
-    growth, lower, _ = line.growth
-    if lower <= 0.0:
-        notes.append(
-            f"The growth of the gap, {growth:.2g} rad a year, is not told apart from none; an identification "
-            "later on, or with narrower intervals, will tell."
-        )
     if line.chance < CROOKED:
         notes.append(
             f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
