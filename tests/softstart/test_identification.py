@@ -12,7 +12,17 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 from tests.softstart.optimal.drives import random_unknown
 
-from softstart import Drive, Identification, InputError, Log, Run, identify, plan_experiments, simulate
+from softstart import (
+    Drive,
+    Identification,
+    InputError,
+    Log,
+    Run,
+    compare,
+    identify,
+    plan_experiments,
+    simulate,
+)
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.identification.fitting import Fitter, Point, Sizes
@@ -232,10 +242,11 @@ def test_other_units_of_torque_scale_what_they_must_and_nothing_else(found, log:
         scale = 1.0 if name in ("gap", "torque_lag") else off
         assert low[name].value == pytest.approx(scale * found[name].value, rel=0.2 * found[name].half_width)
     strategies = ["direct", "s-curve", "pulse-coast-hold"]
-    right = found.k_dyn(strategies, count=50)
-    for strategy, (value, lower, upper) in low.k_dyn(strategies, count=50).items():
-        assert lower <= value <= upper
-        assert value == pytest.approx(right[strategy][0], rel=0.02)
+    right = compare(found.drive, strategies)
+    for row, other in zip(compare(low, strategies, worst_case=()).rows, right.rows, strict=True):
+        lower, upper = row.intervals["k_dyn"]
+        assert lower <= row.run.k_dyn <= upper
+        assert row.run.k_dyn == pytest.approx(other.run.k_dyn, rel=0.02)
 
 
 @pytest.mark.slow
@@ -368,7 +379,6 @@ def test_where_another_machine_made_the_log_no_interval_is_stated(
     found.save(tmp_path)
     read = Identification.load(tmp_path)
     assert all(math.isnan(one.upper) for one in read.estimates)
-    assert math.isnan(read.k_dyn(["direct"])["direct"][1])
     with pytest.raises(InputError, match="states no intervals"):
         read.draws()
 

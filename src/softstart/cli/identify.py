@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,7 +12,6 @@ from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import reading
 from softstart.cli.running import Answer, answers, working
-from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
@@ -92,25 +90,17 @@ def identify(
     read = [softstart.Log.load(one, columns=columns, torque_is=torque_is) for one in logs]
     with working("fitting the drive to the logs ...") as progress:
         found = softstart.identify(read, drive, progress=progress, **asked)
-        k_dyns = found.k_dyn(controllers)
+        compared = softstart.compare(found if found.stated else found.drive, controllers, worst_case=())
+    none = (math.nan, math.nan)
+    k_dyns = {row.name: (row.run.k_dyn, *row.intervals.get("k_dyn", none)) for row in compared.rows}
     from softstart.views.identification import identification_sheet
 
     of_each = {name: dict(zip(("value", "lower", "upper"), v, strict=True)) for name, v in k_dyns.items()}
     return lambda: found.summary() | {"k_dyn": of_each}, identification_sheet(found, k_dyns)
 
 
-def _folders(names: Sequence[str], _: str) -> Sequence[str]:
-    """The folders, each of an identification."""
-    if wrong := next((name for name in names if not Path(name, "identification.json").is_file()), ""):
-        raise InputError(
-            f'"{wrong}": there is no identification.json in such a folder; give folders that softstart '
-            "identify --out has written."
-        )
-    return names
-
-
 @click.command()
-@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, callback=reading(_folders))
+@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
     help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
 @click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),

@@ -2,6 +2,6 @@
 
 Read in this order: logs.py (a log read and checked), model.py (what the exact plant would have logged),
 unknowns.py (which numbers a fit finds), fitting.py (the likelihood, and intervals from it), solving.py (what
-the logs cannot tell, and what the model has not), result.py (the answer, its file, draws, and K_dyn with its
-interval); planning.py (which experiment to run); wear.py (the gap over the years).
+the logs cannot tell, and what the model has not), result.py (the answer, its file, and draws); planning.py
+(which experiment to run); wear.py (the gap over the years).
 """

@@ -145,9 +145,12 @@ class Fitter:
 
     # ---- one log at one x --------------------------------------------------------------------------------
 
-    def residual(self, x: Vector, log: int, error: Vector | None = None) -> Vector:
-        """Model minus log in the samples that count, in units of their rounding."""
-        return np.asarray(self._residuals([x], log, error)[0])
+    def residuals(self, points: Sequence[Vector], log: int, error: Vector | None = None) -> Matrix:
+        """Model minus log in the samples that count, in units of their rounding, a row for each x."""
+        model = self.models[log]
+        signals = model.signals([values_of(self.unknowns, x, log) for x in points], error)[:, model.rows]
+        offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
+        return np.asarray((signals + offsets[:, None] - model.values) / model.root)
 
     def jacobian(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """The derivatives of the residual, by differences."""
@@ -155,18 +158,12 @@ class Fitter:
         steps = [-STEP if self.unknowns[i].kind == "position" and x[i] > 0.5 else STEP for i in moved]
         unit = np.eye(x.size)
         points = [x, *(x + step * unit[i] for i, step in zip(moved, steps, strict=True))]
-        residuals = self._residuals(points, log, error)
+        residuals = self.residuals(points, log, error)
         found = np.zeros((residuals.shape[1], x.size))
         found[:, moved] = ((residuals[1:] - residuals[0]) / np.array(steps)[:, None]).T
         for i in self._offset(log):
             found[:, i] = 1.0 / self.models[log].root
         return found
-
-    def _residuals(self, points: Sequence[Vector], log: int, error: Vector | None) -> Matrix:
-        model = self.models[log]
-        signals = model.signals([values_of(self.unknowns, x, log) for x in points], error)[:, model.rows]
-        offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
-        return np.asarray((signals + offsets[:, None] - model.values) / model.root)
 
     def _moved(self, log: int) -> list[int]:
         """Which numbers the motion of a log depends on."""
@@ -185,7 +182,7 @@ class Fitter:
         """A log about x and this torque error, without derivatives."""
         response = self.response(x, log, error)
         eigenvalues, vectors = np.linalg.eigh(response @ response.T)
-        residual = vectors.T @ (self.residual(x, log, error) - response @ error)
+        residual = vectors.T @ (self.residuals([x], log, error)[0] - response @ error)
         return Spot(error, residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
 
     def left(self, point: Point) -> list[Vector]:
@@ -236,7 +233,7 @@ class Fitter:
             part = replace(self, models=[one.first(share) for one in self.models])
             found = least_squares(
                 lambda at, x=x, pull=pull, part=part: np.concatenate(
-                    [*(part.residual(at, i) for i in logs), pull @ (at - x)]
+                    [*(part.residuals([at], i)[0] for i in logs), pull @ (at - x)]
                 ),
                 x,
                 jac=lambda at, pull=pull, part=part: np.vstack([*(part.jacobian(at, i) for i in logs), pull]),

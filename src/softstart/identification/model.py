@@ -112,25 +112,23 @@ class LogModel:
         """What would have been logged under each set of values and this torque error: a row for each."""
         out = np.empty((len(values), self.times.size))
         for i, (row, motion) in enumerate(zip(values, self.motions(values, error), strict=True)):
-            lag = row.get(FILTER, 0.0)
-            if lag > 0.0 and self.log.kind == "speed":
-                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
-            elif self.log.kind == "speed":
-                out[i] = motion.at(self.times)["w"][:, 0]
-            else:
+            if self.log.kind == "angle":
                 out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts(0)[0, 0]
+            elif lag := row.get(FILTER, 0.0):
+                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
+            else:
+                out[i] = motion.at(self.times)["w"][:, 0]
         return out
 
     def responses(self, values: Mapping[str, float], error: Vector | None = None) -> Matrix:
         """D signal/d error, a row for each sample and a column for each block, about this torque error."""
         knots, owners = knots_of(self.log, values.get(DEAD_TIME, self.dead_time))
-        lag, speed = values.get(FILTER, 0.0), self.log.kind == "speed"
-        smoothed = speed and lag > 0.0
+        lag = values.get(FILTER, 0.0)  # of a speed
         found = self.motion(values, error).sensitivities(
-            knots, marks=self._fine if smoothed else self.times, owners=owners // self.block,
-            parts=slice(1, 2) if speed else slice(4, 5),
+            knots, marks=self._fine if lag else self.times, owners=owners // self.block,
+            parts=slice(1, 2) if self.log.kind == "speed" else slice(4, 5),
         )[1][:, 0]  # fmt: skip
-        if smoothed:
+        if lag:
             found = filtered(self._fine, found.T, lag).T[::FINE]
         return np.asarray(found / math.sqrt(self.block))
 

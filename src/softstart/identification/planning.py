@@ -217,10 +217,9 @@ def made_up_log(
     signal: Kind = "angle",
     torque_is: TorqueIs = "demand",
 ) -> Log:
-    """A log that the exact plant makes up: torque error, encoder and all; for trying, and for tests.
+    """A log that the exact plant makes up, with a torque error of `ripple` N m in each sample.
 
-    `ripple` is the standard deviation of the error of the torque in each sample, N m; `position` where in the
-    gap it begins; `phase` that of the encoder.
+    It begins at a `position` in the gap and a `phase` of the encoder.
 
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08)
     >>> made_up_log(crane, "start").kind
@@ -285,11 +284,10 @@ def standard_levels(drive: Drive) -> dict[str, tuple[Vector, Vector]]:
 
 
 def largest(figure: Callable[[Vector], Sequence[Vector] | Matrix], places: Vector) -> float:
-    """The largest value of a figure that is continuous in the start position.
+    """The largest value of a figure that is continuous in the start position, from values and contacts.
 
-    `figure` gives values and counts of contacts. An interval is halved while it may hold a larger value, by
-    the values at its ends and the slopes there and beside; and where the count changes: a contact that is
-    only just made, or just missed, has a steep and narrow peak beside it.
+    An interval is halved while it may hold a larger value, by the values at its ends and the slopes there and
+    beside; and where the contacts change: one that is only just made has a steep and narrow peak beside it.
 
     >>> round(largest(lambda x: (1.0 - abs(x - 0.1234567), x > 0.12), np.linspace(0.0, 1.0, 5)), 9)
     1.0
@@ -322,17 +320,13 @@ def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A drive, an inverter's log and an encoder: what any torque would tell.
-
-    `period` is that of the samples, s, `ripple` the torque error in each, N m; `free` is what is to be found,
-    and `wanted` what of it a score is about.
-    """
+    """A drive, an inverter's log and an encoder: what any torque would tell."""
 
     drive: Drive
-    period: float
-    ripple: float
-    free: tuple[str, ...]
-    wanted: tuple[str, ...] = ()
+    period: float  # of the samples, s
+    ripple: float  # torque error in each, N m
+    free: tuple[str, ...]  # what is to be found
+    wanted: tuple[str, ...] = ()  # what of it a score is about; all if none
     progress: Callable[[str], None] = lambda _: None
 
     @property

@@ -1,11 +1,11 @@
-"""What was identified: values with intervals, what the logs cannot tell, and K_dyn with its interval."""
+"""What was identified: values with intervals, what the logs cannot tell, drives that they leave possible."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -21,8 +21,7 @@ from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
 from softstart.quantities import RefusedError
-from softstart.start.comparison import INTERVAL, intervals
-from softstart.start.simulation import simulate
+from softstart.start.comparison import INTERVAL
 
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
@@ -145,19 +144,6 @@ class Identification:
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
         moved = {one.name: one.moved(move) for one, move in zip(self.shared, moves.T, strict=True)}
         return records(self.drive, **moved)
-
-    def k_dyn(
-        self, controllers: Sequence[str], count: int = 200, seed: int = 0
-    ) -> dict[str, tuple[float, float, float]]:
-        """K_dyn of each strategy with its interval of 95 %: of the drive found, lower end, upper end.
-
-        Each strategy is set up for the drive found and started on `draws`. Ends are NaN without intervals.
-        """
-        runs = {name: simulate(self.drive, name) for name in controllers}
-        if not self.stated:
-            return {name: (float(run.k_dyn), math.nan, math.nan) for name, run in runs.items()}
-        drawn = self.draws(count, seed)
-        return {name: (float(run.k_dyn), *intervals(run, drawn, name)["k_dyn"]) for name, run in runs.items()}
 
     def with_settings(self, settings: Iterable[str]) -> Self:
         """The identification with other parameters of its drive, as typed at a command line.

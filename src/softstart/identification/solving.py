@@ -40,7 +40,6 @@ UNSETTLED: Final = 4.0  # gain of the likelihood by another step, from which the
 CHANCE, INDEPENDENT = 1e-5, 1e-4  # that errors alone leave such a slow torque, such correlations
 WAVES: Final = 20  # torques that change slowly, of which none must be left
 LAGS: Final = 20  # samples over which what is left must not be correlated
-TOO_NOISY: Final = 5.0  # standard deviations of a variance that is larger than the encoder explains
 DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
@@ -204,7 +203,7 @@ def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tupl
 
 
 def _check_inertia(log: Log, drive: Drive) -> None:
-    """Refuse a log whose units cannot be right: torque over acceleration is not near the inertia guessed."""
+    """Refuse a log whose units cannot be right: torque over acceleration is far from the inertia guessed."""
     speed, impulse = log.moved
     inertia = float(np.max(np.abs(impulse))) / max(float(np.max(np.abs(speed))), 1e-300)
     low, high = float(drive.J1), float(drive.J1 + drive.J2)
@@ -310,10 +309,6 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
         shown.append(f"a torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest")
     if (slow := min(_slow_torque(one, sizes) for one in best.spots)) < CHANCE:
         shown.append(f"a torque that changes slowly (chance {slow:.1g})")
-    counted = all(one.log.kind == "angle" and one.log.count for one in fitter.models)
-    samples = sum(one.residual.size for one in best.spots)
-    if counted and sizes.noise**2 - 1.0 > TOO_NOISY * math.sqrt(2.0 / samples):
-        shown.append(f"an angle {sizes.noise:.3g} times as far off as the encoder rounds")
     for model, spot in zip(fitter.models, best.spots, strict=True):
         left = spot.innovations(sizes)
         if (chance := _whiteness(left)) < INDEPENDENT:

@@ -34,9 +34,8 @@ POWERS: Final = {"gap": 0.5, "load_torque": 1.0} | dict.fromkeys(FRICTIONS, 1.0)
 class Unknown:
     """One number x of a fit, and the value that it stands for.
 
-    x = ln(value/scale), or (value/scale)^power. A position in the gap is 1 - 2 x^2, so that x is the root of
-    the share of the gap before the driving flank: with the root of the gap it makes the time to that flank.
-    An offset of an angle is x itself. What is of one log only has its number in `log`.
+    x = ln(value/scale), or (value/scale)^power. A position in the gap is 1 - 2 x^2: with the root of the gap
+    x makes the time to the driving flank. An offset of an angle is x itself.
     """
 
     name: str
@@ -46,7 +45,7 @@ class Unknown:
     upper: float
     scale: float = 1.0
     power: float = 1.0
-    log: int | None = None
+    log: int | None = None  # the only one that it is of
 
     @property
     def title(self) -> str:
@@ -128,11 +127,8 @@ class Unknown:
 def unknowns_of(
     names: Sequence[str], drive: Drive, logs: Sequence[Log], moving: Sequence[bool]
 ) -> tuple[Unknown, ...]:
-    """The parameters that all logs share, then the position of each log that is `moving`, then offsets.
-
-    The unit of a friction is the one that takes a tenth of the torque that accelerates, at the target speed
-    if it is viscous; that of gap and load torque is the drive's own.
-    """
+    """The parameters that all logs share, then the position of each log that is `moving`, then offsets."""
+    # the unit of a friction takes a tenth of the torque that accelerates, if viscous at the target speed
     torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
     found = []
     for name in names:

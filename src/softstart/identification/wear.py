@@ -42,9 +42,7 @@ class Line:
         >>> round(line.slope, 6), round(math.sqrt(line.covariance[1, 1]), 6)
         (0.01, 0.005)
         """
-        rows = np.column_stack([np.ones_like(years), years]) / deviations[:, None]
-        covariance = np.linalg.inv(rows.T @ rows)
-        start, slope = (covariance @ rows.T @ (gaps / deviations)).tolist()
+        (slope, start), covariance = np.polyfit(years, gaps, 1, w=1.0 / deviations, cov="unscaled")
         squares = float(np.sum(((start + slope * years - gaps) / deviations) ** 2))
         chance, quantile, freedom = 1.0, INTERVAL.quantile, gaps.size - 2
         if freedom:
@@ -52,7 +50,7 @@ class Line:
         if freedom and squares > freedom:
             covariance = squares / freedom * covariance
             quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
-        return Line(start, slope, np.asarray(covariance), chance, quantile)
+        return Line(float(start), float(slope), covariance[::-1, ::-1], chance, quantile)
 
     @property
     def growth(self) -> tuple[float, float, float]:
