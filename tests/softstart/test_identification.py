@@ -12,17 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 from tests.softstart.optimal.drives import random_unknown
 
-from softstart import (
-    Drive,
-    Identification,
-    InputError,
-    Log,
-    Run,
-    compare,
-    identify,
-    plan_experiments,
-    simulate,
-)
+from softstart import Drive, Identification, InputError, Log, compare, identify, plan_experiments, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.identification.fitting import Fitter, Point, Sizes
@@ -511,7 +501,7 @@ def planned() -> Plan:
     return plan_experiments(TRUTH.replace(permissible_torque=70.0), log_period="8 ms", ripple=1.0)
 
 
-def loads(one: Experiment, position: float) -> Run:
+def loads(one: Experiment, position: float) -> Any:
     """The experiment on the exact plant."""
     drive = TRUTH.replace(start_position=position, minimum_torque=-100.0, maximum_torque=100.0)
     return simulate(drive, make_controller("profile", {"profile": one.profile}), until=one.end)

@@ -411,10 +411,12 @@ class Bench:
         """The experiment, its levels made smaller until it keeps the limits; None if hardly any is left."""
         share = 1.0
         while share > LEAST:
-            found = self.experiment("planned", durations, share * levels)
-            over = max(found.peak / torque, found.travel / travel)
+            over = self.over(durations, share * levels, torque, travel)
             if over <= 1.0:
-                return found
+                found = self.experiment("planned", durations, share * levels)
+                over = max(found.peak / torque, found.travel / travel)
+                if over <= 1.0:
+                    return found
             share *= (1.0 - NEAR) / over
         return None
 
