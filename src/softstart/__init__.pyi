@@ -25,13 +25,9 @@ from softstart.drive.records import Records as Records
 from softstart.errors import InputError as InputError
 from softstart.errors import SimulationError as SimulationError
 from softstart.identification.logs import Log as Log
-from softstart.identification.planning import Experiment as Experiment
-from softstart.identification.planning import Plan as Plan
 from softstart.identification.planning import plan_experiments as plan_experiments
-from softstart.identification.result import Estimate as Estimate
 from softstart.identification.result import Identification as Identification
 from softstart.identification.solving import identify as identify
-from softstart.identification.wear import Wear as Wear
 from softstart.identification.wear import follow_wear as follow_wear
 from softstart.linear.view import LinearView as LinearView
 from softstart.linear.view import linear_view as linear_view

@@ -97,7 +97,7 @@ def covered(
     )  # fmt: skip
     guess = off_by(truth, factor, generator)
     before = time.process_time()
-    found = identify(log, guess, searches=1 if factor == 1.0 else 12, seed=number)
+    found = identify(log, guess, searches=1 if factor == 1.0 else 12)
     seconds = time.process_time() - before
     rubs = {name: float(getattr(truth, name)) for name in FRICTIONS}
     return {"truth": {"position 1": position, **rubs}, **told(found, seconds)}
@@ -109,7 +109,7 @@ def searched(lines: float, period: float, factor: float, number: int) -> dict[st
     log = made_up_log(drive, REVERSE, log_period=period, ripple=RIPPLE, position=0.35, phase=0.6, seed=11)
     guess = off_by(drive, factor if number else 1.0, np.random.default_rng(number))
     before = time.process_time()
-    found = identify(log, guess, seed=number)
+    found = identify(log, guess)
     return told(found, time.process_time() - before)
 
 

@@ -119,10 +119,7 @@ OPTIONS: dict[str, list[str]] = {
     "report": ["--controllers", "--set", "--param", "--resolution", "--budget", "--project"],
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
     "init": ["--set", "--json"],
-    "identify": [
-        "--columns", "--torque-is", "--torque-constant", "--rated-torque", "--free", "--restarts",
-        "--controllers", "--set", "--json",
-    ],
+    "identify": ["--columns", "--torque-is", "--free", "--restarts", "--controllers", "--set", "--json"],
     "wear": ["--dates", "--worn-gap", "--json"],
     "plan": [
         "--log-period", "--ripple", "--free", "--max-torque", "--max-travel", "--wanted", "--set", "--json",

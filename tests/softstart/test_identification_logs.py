@@ -89,29 +89,19 @@ def test_logs_with_clocks_and_sampling_of_their_own_are_fitted_together(log: Log
     assert both["position 2"].value == pytest.approx(0.5, abs=0.1)
 
 
-# ---- current --------------------------------------------------------------------------------------------
+# ---- columns --------------------------------------------------------------------------------------------
 
 
-def test_a_current_with_a_constant_stands_for_the_torque(log: Log, tmp_path: Path) -> None:
+def test_a_current_with_a_factor_stands_for_the_torque(log: Log, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = zip(log.time.tolist(), (log.torque / 1.2).tolist(), log.values.tolist(), strict=True)
     path.write_text("t [s],current [A],phi [rad]\n" + "\n".join(f"{t},{i},{a}" for t, i, a in rows))
-    read = Log.load(path, columns={"angle": "phi"}, torque_is="demand", torque_constant="1200 N*m/kA")
+    read = Log.load(path, columns={"torque": "1.2 * current [N*m]"}, torque_is="demand")
     assert read.torque == pytest.approx(log.torque, rel=1e-14, abs=1e-14)
-    assert read.notes[0] == "the torque is 1.2 N m/A times the current"
-    turned = Log.load(
-        path, columns={"angle": "-phi", "current": "-current"}, torque_is="demand", torque_constant=1.2
-    )
+    turned = Log.load(path, columns={"angle": "-phi", "torque": "-1.2*current[N*m]"}, torque_is="demand")
     assert turned.torque == pytest.approx(-log.torque, rel=1e-14, abs=1e-14)
-    for columns, constant, sentence in (
-        ({}, None, "none is called torque; .*; a current takes --torque-constant"),
-        ({"current": "current"}, None, "a current is read with the torque constant"),
-        ({"torque": "current"}, 1.2, "a torque without it"),
-        ({}, "1.2 N*m", "torque_constant = .*is a torque"),
-        ({}, -1.2, "give a value above 0"),
-    ):
-        with pytest.raises(InputError, match=sentence):
-            Log.load(path, columns={"angle": "phi", **columns}, torque_constant=constant)
+    with pytest.raises(InputError, match=r"current \[A\].*is a current.*\[N\*m\]"):
+        Log.load(path, columns={"torque": "1.2*current"})
 
 
 def test_a_unit_in_columns_takes_the_place_of_that_of_the_file(log: Log, tmp_path: Path) -> None:
@@ -135,7 +125,7 @@ def test_a_unit_in_columns_takes_the_place_of_that_of_the_file(log: Log, tmp_pat
 FILES = {  # heading, row, decimal mark, encoding, what the columns are called
     "preamble": (
         "Name;MyScope\nStarttime of export;2025-03-11 08:12:05\n\nTime [ms];ActTorque [%];ActPos [deg]",
-        "{t:.0f};{percent:.8f};{deg:.8f}", ",", "utf-8", {"torque": "ActTorque", "angle": "ActPos"},
+        "{t:.0f};{percent:.8f};{deg:.8f}", ",", "utf-8", {"torque": ".12*ActTorque[Nm]", "angle": "ActPos"},
     ),
     "spreadsheet": (
         "Zeit [ms];Drehmoment [Nm];Lage [deg]", "{t:.1f};{torque:.8f};{deg:.8f}", ",", "utf-8-sig",
@@ -147,7 +137,7 @@ FILES = {  # heading, row, decimal mark, encoding, what the columns are called
     ),
     "commas": (
         "Time [ms],M (%),w,fActPosition (\N{DEGREE SIGN})", "{t:.1f},{percent:.8f},0,{deg:.8f}", ".",
-        "cp1252", {"torque": "M", "angle": "fActPosition"},
+        "cp1252", {"torque": ".12*M[Nm]", "angle": "fActPosition"},
     ),
 }  # fmt: skip
 
@@ -165,11 +155,10 @@ def test_a_file_is_read_by_the_names_of_its_columns(log: Log, kind: str, tmp_pat
     path.write_text("\n".join([heading, *rows]), encoding=encoding)
     with pytest.raises(InputError, match=r"there are the columns .*; write --columns"):
         Log.load(path)
-    read = Log.load(path, columns=columns, rated_torque="12 N*m")
+    read = Log.load(path, columns=columns)
     assert read.time == pytest.approx(2.0 * log.time, abs=1e-9)
     assert read.torque == pytest.approx(log.torque, abs=1e-7)
     assert read.values == pytest.approx(log.values, abs=1e-7)
-    assert ("the torque is in % of 12 N m" in read.notes) == ("percent" in row)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +167,7 @@ def test_a_file_is_read_by_the_names_of_its_columns(log: Log, kind: str, tmp_pat
         ("\0\0", "this is not a text file; export the signals as CSV"),
         ("0;1;2\n1;1;2", "no line above the numbers names the columns"),
         ("s;torque;angle\n0;1;2\n1;1;2", "none is called time; write --columns .time=NAME .ms."),
-        ("time;torque [%];angle\n0;1;2\n1;1;2", "is in %; give the torque at 100 %, as --rated-torque"),
+        ("time;torque [%];angle\n0;1;2\n1;1;2", r"torque \[%\].*of %, as .torque=1.2\*NAME \[N\*m\]"),
         ("time,torque [% TN],angle\n0,1,2\n1,1,2", r"torque \[% TN\].*--columns .torque=NAME \[N\*m\]"),
         ("time,torque,speed [%]\n0,1,2\n1,1,2", r"speed \[%\].*is no unit.*speed=NAME \[rad/s\]"),
         ("time,torque,torque,angle\n0,1,1,2\n1,1,1,2", "2 are called torque; write"),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,11 +12,11 @@ from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import reading
 from softstart.cli.running import Answer, answers, working
-from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
     from softstart.drive import Drive
+    from softstart.identification.logs import TorqueIs
 
 STRATEGIES = ["direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold"]
 
@@ -63,17 +62,12 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
 @options.set_option
 @click.option("--columns", metavar="SIGNAL=NAME,...",
     callback=reading(lambda text, option: options.read_params(text.split(","), option, "speed=n_act")),
-    help="Names of the columns in the log, for example time=t,torque=-M_act,speed=n_act[rpm]; a minus "
-    "inverts the sign, a unit in brackets replaces that of the log.")  # fmt: skip
+    help="Names of the columns in the log, for example time=t,torque=1.2*iq[N*m],speed=-n_act[rpm]; a minus "
+    "inverts the sign, a factor makes a torque of a current or of %, a unit in brackets replaces that of the "
+    "log.")  # fmt: skip
 @click.option(
     "--torque-is", metavar="measured|demand", type=click.Choice(["measured", "demand"]), default="measured",
     help="Meaning of the torque in the log. Default: measured.",
-)  # fmt: skip
-@click.option("--torque-constant", metavar="CONSTANT", callback=options.quantity("N*m/A"),
-    help="Torque constant, for example '1.2 N*m/A', if the log has the current instead of the torque."
-)  # fmt: skip
-@click.option("--rated-torque", metavar="TORQUE", callback=options.quantity("N*m"),
-    help="Torque at 100 %, for example '12 N*m', if the log has the torque in %. Default: that of the drive."
 )  # fmt: skip
 @free_option
 @click.option("--restarts", "searches", metavar="N", callback=options.count(), default="12",
@@ -84,7 +78,8 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
 )  # fmt: skip
 @answers("Write the identified drive (drive.toml), residuals, figure and report.md into this folder.")
 def identify(
-    *, logs: tuple[str, ...], drive: Machine, controllers: list[str], **asked: Any
+    *, logs: tuple[str, ...], drive: Machine, controllers: list[str], columns: dict[str, str],
+    torque_is: TorqueIs, **asked: Any,
 ) -> Answer:  # fmt: skip
     """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
@@ -92,28 +87,20 @@ def identify(
     line, "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs of the same drive are
     fitted together.
     """
-    asked["columns"] = asked["columns"] or {}
+    read = [softstart.Log.load(one, columns=columns, torque_is=torque_is) for one in logs]
     with working("fitting the drive to the logs ...") as progress:
-        found = softstart.identify(list(logs), drive, progress=progress, **asked)
-        k_dyns = found.k_dyn(controllers)
+        found = softstart.identify(read, drive, progress=progress, **asked)
+        compared = softstart.compare(found if found.stated else found.drive, controllers, worst_case=())
+    none = (math.nan, math.nan)
+    k_dyns = {row.name: (row.run.k_dyn, *row.intervals.get("k_dyn", none)) for row in compared.rows}
     from softstart.views.identification import identification_sheet
 
     of_each = {name: dict(zip(("value", "lower", "upper"), v, strict=True)) for name, v in k_dyns.items()}
     return lambda: found.summary() | {"k_dyn": of_each}, identification_sheet(found, k_dyns)
 
 
-def _folders(names: Sequence[str], _: str) -> Sequence[str]:
-    """The folders, each of an identification."""
-    if wrong := next((name for name in names if not Path(name, "identification.json").is_file()), ""):
-        raise InputError(
-            f'"{wrong}": there is no identification.json in such a folder; give folders that softstart '
-            "identify --out has written."
-        )
-    return names
-
-
 @click.command()
-@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, callback=reading(_folders))
+@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
     help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
 @click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),

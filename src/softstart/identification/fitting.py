@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import brentq, least_squares, lsq_linear, minimize
 from scipy.stats import qmc
@@ -33,8 +32,8 @@ from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError, SimulationError
-from softstart.identification.model import LogModel, edges
-from softstart.identification.unknowns import FACTOR, Unknown, values_of
+from softstart.identification.model import LogModel
+from softstart.identification.unknowns import Unknown, values_of
 from softstart.start.comparison import INTERVAL
 
 HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
@@ -47,12 +46,7 @@ ERROR_SETTLED: Final = 0.1  # standard deviations, all samples together
 # large it is (coarse encoder, few samples) must not conclude that there is none
 RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
 MOST_RIPPLE: Final = 0.25  # of the largest torque: more is no small error, of which G tells
-LOADS: Final = (
-    0.08,
-    0.25,
-    0.45,
-    0.7,
-)  # load torques from which other explanations are sought, over the largest
+LOADS: Final = (0.08, 0.25, 0.45, 0.7)  # of the largest load torque: from there other explanations are sought
 NEAR: Final = 0.04  # relative error of the root of a difference of L at an end of an interval
 FARTHER: Final = 1.6  # times as far, where an end is not reached
 MOST_STEPS, HALVINGS = 30, 7  # towards the most likely x, each step cut if need be
@@ -61,20 +55,9 @@ STEEP, ROUGHLY = 1e-3, 0.02  # what L must still gain for another step; where al
 SAME: Final = 0.3  # standard errors between two explanations that are one
 HOPELESS: Final = 100.0  # above the least L: no place there is as likely
 
-Progress = Callable[[str], None]
-Errors = tuple[Vector, ...]  # the torque error of each log, one number for each block of samples
-
-
-class Data(NamedTuple):
-    """What a log tells: its samples that count, their values, and the deviations of their rounding."""
-
-    rows: NDArray[np.bool_]
-    values: Vector
-    root: Vector
-
 
 class Sizes(NamedTuple):
-    """How large the errors are: of the measurement in units of `Data.root`, of the torque in N m."""
+    """How large the errors are: of the measurement in units of its rounding, of the torque in N m."""
 
     noise: float
     ripple: float
@@ -85,10 +68,10 @@ class Spot(NamedTuple):
 
     error: Vector  # the torque error e, one number for each block of samples
     residual: Vector  # f(x, e) - G e - y
-    jacobian: Matrix
     rotation: Matrix
     eigenvalues: Vector  # of G G'
     response: Matrix  # G, not turned
+    jacobian: Matrix = np.zeros((0, 0))
 
     def variance(self, sizes: Sizes) -> Vector:
         """The diagonal of V."""
@@ -118,6 +101,11 @@ class Point(NamedTuple):
     value: float = math.nan  # of the restricted likelihood, see `Fitter.valued`
 
     @property
+    def errors(self) -> list[Vector]:
+        """The torque error of each log."""
+        return [one.error for one in self.spots]
+
+    @property
     def likelihood(self) -> float:
         """L."""
         variances = [(one.residual, one.variance(self.sizes)) for one in self.spots]
@@ -132,44 +120,18 @@ class Point(NamedTuple):
         return np.concatenate(residuals), np.vstack(jacobians)
 
 
-def data_of(model: LogModel, logged: Vector) -> Data:
-    """The samples that count, with the deviations of what encoder or log round."""
-    log = model.log
-    rows = np.isfinite(logged)
-    if log.kind != "angle" or log.count == 0.0:
-        return Data(rows, logged[rows], np.full(int(rows.sum()), max(log.floor, 1e-3 * log.scale)))
-    values, variance = edges(log.time[rows], logged[rows], log.count)
-    counts = np.isfinite(variance)
-    rows[rows] = counts
-    return Data(rows, values[counts], np.sqrt(variance[counts]))
-
-
 @dataclass(frozen=True, eq=False)
 class Fitter:
-    """Logs, their models, and the unknowns; each method is a function of what it is given."""
+    """Models of logs, and the unknowns; each method is a function of what it is given."""
 
-    models: tuple[LogModel, ...]
-    unknowns: tuple[Unknown, ...]
-    data: tuple[Data, ...]
-    progress: Progress = lambda _: None
-
-    @classmethod
-    def of(
-        cls, models: Sequence[LogModel], unknowns: Sequence[Unknown], progress: Progress | None = None
-    ) -> Fitter:
-        """The fit of these unknowns to the logs of these models."""
-        data = tuple(data_of(one, one.log.values) for one in models)
-        return cls(tuple(models), tuple(unknowns), data, progress or (lambda _: None))
+    models: Sequence[LogModel]
+    unknowns: Sequence[Unknown]
+    progress: Callable[[str], None] = lambda _: None
 
     @property
-    def lower(self) -> Vector:
-        """The least x."""
-        return np.array([one.lower for one in self.unknowns])
-
-    @property
-    def upper(self) -> Vector:
-        """The largest x."""
-        return np.array([one.upper for one in self.unknowns])
+    def bounds(self) -> tuple[Vector, Vector]:
+        """The least and the largest x."""
+        return np.array([one.lower for one in self.unknowns]), np.array([one.upper for one in self.unknowns])
 
     @property
     def weights(self) -> Matrix:
@@ -183,9 +145,12 @@ class Fitter:
 
     # ---- one log at one x --------------------------------------------------------------------------------
 
-    def residual(self, x: Vector, log: int, error: Vector | None = None) -> Vector:
-        """Model minus log in the samples that count, in units of their rounding."""
-        return np.asarray(self._residuals([x], log, error)[0])
+    def residuals(self, points: Sequence[Vector], log: int, error: Vector | None = None) -> Matrix:
+        """Model minus log in the samples that count, in units of their rounding, a row for each x."""
+        model = self.models[log]
+        signals = model.signals([values_of(self.unknowns, x, log) for x in points], error)[:, model.rows]
+        offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
+        return np.asarray((signals + offsets[:, None] - model.values) / model.root)
 
     def jacobian(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """The derivatives of the residual, by differences."""
@@ -193,19 +158,12 @@ class Fitter:
         steps = [-STEP if self.unknowns[i].kind == "position" and x[i] > 0.5 else STEP for i in moved]
         unit = np.eye(x.size)
         points = [x, *(x + step * unit[i] for i, step in zip(moved, steps, strict=True))]
-        residuals = self._residuals(points, log, error)
+        residuals = self.residuals(points, log, error)
         found = np.zeros((residuals.shape[1], x.size))
         found[:, moved] = ((residuals[1:] - residuals[0]) / np.array(steps)[:, None]).T
         for i in self._offset(log):
-            found[:, i] = 1.0 / self.data[log].root
+            found[:, i] = 1.0 / self.models[log].root
         return found
-
-    def _residuals(self, points: Sequence[Vector], log: int, error: Vector | None) -> Matrix:
-        rows, values, root = self.data[log]
-        model = self.models[log]
-        signals = model.signals([values_of(self.unknowns, x, log) for x in points], error)[:, rows]
-        offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
-        return np.asarray((signals + offsets[:, None] - values) / root)
 
     def _moved(self, log: int) -> list[int]:
         """Which numbers the motion of a log depends on."""
@@ -216,32 +174,30 @@ class Fitter:
 
     def response(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """G: how the samples that count answer to a torque error, in units of their rounding."""
-        rows, _, root = self.data[log]
-        values = values_of(self.unknowns, x, log)
-        return np.asarray(self.models[log].responses(values, error)[rows] / root[:, None])
+        model = self.models[log]
+        responses = model.responses(values_of(self.unknowns, x, log), error)
+        return np.asarray(responses[model.rows] / model.root[:, None])
 
-    def spot(self, x: Vector, log: int, error: Vector, *, derivatives: bool = False) -> Spot:
-        """A log about x and this torque error."""
+    def spot(self, x: Vector, log: int, error: Vector) -> Spot:
+        """A log about x and this torque error, without derivatives."""
         response = self.response(x, log, error)
         eigenvalues, vectors = np.linalg.eigh(response @ response.T)
-        residual = vectors.T @ (self.residual(x, log, error) - response @ error)
-        jacobian = vectors.T @ self.jacobian(x, log, error) if derivatives else np.zeros((residual.size, 0))
-        return Spot(error, residual, jacobian, vectors.T, np.maximum(eigenvalues, 0.0), response)
+        residual = vectors.T @ (self.residuals([x], log, error)[0] - response @ error)
+        return Spot(error, residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
 
     def left(self, point: Point) -> list[Vector]:
         """Model minus log in each sample of each log, in its unit."""
         found = []
-        for log, (model, spot) in enumerate(zip(self.models, point.spots, strict=True)):
+        for log, (model, error) in enumerate(zip(self.models, point.errors, strict=True)):
             values = values_of(self.unknowns, point.x, log)
-            response = model.responses(values, spot.error)
-            one = model.signals([values], spot.error)[0] - response @ spot.error - model.log.values
-            one += sum(point.x[i] for i in self._offset(log))
-            found.append(one[np.isfinite(model.log.values)])
+            one = model.signals([values], error)[0] - model.responses(values, error) @ error
+            one += sum(point.x[i] for i in self._offset(log)) - model.log.values
+            found.append(one[np.isfinite(one)])
         return found
 
     # ---- the search --------------------------------------------------------------------------------------
 
-    def search(self, most: int, seed: int) -> list[tuple[Vector, float]]:
+    def search(self, most: int) -> list[tuple[Vector, float]]:
         """Minima of the plain squares, best first: from the guess, then from points all over the range.
 
         Each search follows the logs from their beginning, over longer and longer parts: what comes early is
@@ -249,21 +205,17 @@ class Fitter:
         """
         guess = np.array([one.guess for one in self.unknowns])
         free = [i for i, one in enumerate(self.unknowns) if one.kind != "offset"]
-        draws = qmc.Sobol(len(free), seed=seed).random_base2(max(1, math.ceil(math.log2(max(most, 2)))))
+        draws = qmc.Sobol(len(free), seed=0).random_base2(max(1, (most - 1).bit_length()))
         found: list[tuple[Vector, float]] = []
         for number in range(most):
             start = guess.copy()
-            for i, draw in zip(free, draws[number - 1], strict=True) if number else ():
-                one, move = self.unknowns[i], 2.0 * draw - 1.0
-                if one.kind == "position":
-                    start[i] = math.sqrt(draw)
-                elif one.is_friction:
-                    start[i] = guess[i] + move * math.log(FACTOR)
-                else:
-                    start[i] = one.number(one.value(guess[i]) * FACTOR**move)
+            if number:
+                start[free] = [
+                    self.unknowns[i].drawn(one) for i, one in zip(free, draws[number - 1], strict=True)
+                ]
             self.progress(f"search {number + 1}")
             try:
-                found.append(self._followed(np.clip(start, self.lower, self.upper)))
+                found.append(self._followed(np.clip(start, *self.bounds)))
             except (InputError, SimulationError):
                 continue
             found.sort(key=lambda one: one[1])
@@ -274,42 +226,30 @@ class Fitter:
         return found
 
     def _followed(self, x: Vector) -> tuple[Vector, float]:
-        cost = math.inf
+        cost, logs = math.inf, range(len(self.models))
         for share in HORIZONS:
             last = share == HORIZONS[-1]
             pull = np.zeros((0, x.size)) if last else np.eye(x.size)
-            plain = self._plain(share)
+            part = replace(self, models=[one.first(share) for one in self.models])
             found = least_squares(
-                lambda at, x=x, pull=pull, plain=plain: np.concatenate(
-                    [*(plain.residual(at, i) for i in range(len(plain.models))), pull @ (at - x)]
+                lambda at, x=x, pull=pull, part=part: np.concatenate(
+                    [*(part.residuals([at], i)[0] for i in logs), pull @ (at - x)]
                 ),
                 x,
-                jac=lambda at, pull=pull, plain=plain: np.vstack(
-                    [*(plain.jacobian(at, i) for i in range(len(plain.models))), pull]
-                ),
-                bounds=(self.lower, self.upper), max_nfev=60 if last else 25, xtol=1e-10,
+                jac=lambda at, pull=pull, part=part: np.vstack([*(part.jacobian(at, i) for i in logs), pull]),
+                bounds=self.bounds, max_nfev=60 if last else 25, xtol=1e-10,
             )  # fmt: skip
             x, cost = found.x, float(2.0 * found.cost)
         return x, cost
-
-    def _plain(self, share: float) -> Fitter:
-        """The first share of each log, its samples weighted alike."""
-        models = tuple(one if share >= 1.0 else one.first(share) for one in self.models)
-        data = []
-        for model, one in zip(models, self.data, strict=True):
-            rows = one.rows[: model.times.size]
-            count = int(rows.sum())
-            data.append(Data(rows, one.values[:count], np.full(count, model.log.scale)))
-        return replace(self, models=models, data=tuple(data))
 
     # ---- the most likely x -------------------------------------------------------------------------------
 
     def refined(self, x: Vector, held: int | None = None) -> Point:
         """The most likely x near this one. `held`: the number that stays."""
-        errors = tuple(np.zeros(one.blocks) for one in self.models)
+        errors = [np.zeros(one.blocks) for one in self.models]
         return self.descended(self.settled(x, errors, Sizes(1.0, RIPPLE * self.largest_torque)), held)
 
-    def settled(self, x: Vector, errors: Errors, sizes: Sizes) -> Point:
+    def settled(self, x: Vector, errors: Sequence[Vector], sizes: Sizes) -> Point:
         """The covariance at x about the torque errors that are most likely there, sought from `errors`."""
         spots = []
         for log, error in enumerate(errors):
@@ -328,22 +268,20 @@ class Fitter:
         Bounded linear least squares for each step, cut until L is less: the drift of ln|V| is a force on x,
         which is added to the residual along J, so that the steps end where J' V^-1 r + drift = 0.
         """
+        point = self.derived(point, best)
         for _ in range(MOST_STEPS):
-            point = self.derived(point, best)
             step, gain = self.step(point, held)
             if gain < (STEEP if best is None else ROUGHLY):
                 break
             length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
             for cut in (length * 0.5 ** np.arange(HALVINGS)).tolist():
-                at = np.clip(point.x + cut * step, self.lower, self.upper)
-                new = self.settled(at, tuple(one.error for one in point.spots), point.sizes)
+                new = self.settled(np.clip(point.x + cut * step, *self.bounds), point.errors, point.sizes)
                 if new.likelihood < point.likelihood - 0.1 * cut * gain:
                     break
             else:
                 break
-            point = new
-            self.progress("weights and fit")
-        return point if point.spots[0].jacobian.size else self.derived(point, best)
+            point = self.derived(new, best)
+        return point
 
     def derived(self, point: Point, best: Point | None = None) -> Point:
         """The point with the derivatives of its spots, and with sizes and drift unless those of the best."""
@@ -353,7 +291,7 @@ class Fitter:
         )
         if best is not None:
             return point._replace(spots=spots, drift=best.drift)
-        point = Point(point.x, self.sized(spots, spots, point.sizes), spots, np.zeros(point.x.size))
+        point = Point(point.x, self.sized(spots, point.sizes), spots, np.zeros(point.x.size))
         small = point.sizes.ripple <= MOST_RIPPLE * self.largest_torque
         return point._replace(drift=self.drift(point)) if small else point
 
@@ -363,10 +301,11 @@ class Fitter:
         damped = np.vstack([jacobian, np.sqrt(self.weights)])
         force = jacobian @ np.linalg.solve(damped.T @ damped, point.drift)
         free = np.array([i for i in range(point.x.size) if i != held])
-        room = np.array([self.lower - point.x - 1e-12, self.upper - point.x + 1e-12])[:, free]
+        lower, upper = self.bounds
+        room = (lower - point.x - 1e-12)[free], (upper - point.x + 1e-12)[free]
         wanted = np.concatenate([-residual - force, np.zeros(point.x.size)])
         step = np.zeros(point.x.size)
-        step[free] = lsq_linear(damped[:, free], wanted, bounds=(room[0], room[1]), method="bvls").x
+        step[free] = lsq_linear(damped[:, free], wanted, bounds=room, method="bvls").x
         gradient = jacobian.T @ residual + point.drift
         return step, -float(2.0 * gradient @ step + np.sum((damped @ step) ** 2))
 
@@ -393,30 +332,26 @@ class Fitter:
 
     # ---- how large the errors are ------------------------------------------------------------------------
 
-    def restricted(
-        self, spots: Sequence[Spot], about: Sequence[Spot], sizes: Sizes, *, follows: bool = True
-    ) -> float:
+    def restricted(self, spots: Sequence[Spot], sizes: Sizes, about: Sequence[Spot] | None = None) -> float:
         """L + ln|J' V^-1 J|; J and V of the last term are those of `about`.
 
-        Where x `follows` along J, it need not be the most likely one.
+        Without `about` x need not be the most likely one: it follows along J.
         """
         value = (math.log(sizes.ripple / (RIPPLE * self.largest_torque)) / math.log(RIPPLE_FACTOR)) ** 2
         information, pull = np.zeros_like(self.weights), np.zeros(len(self.weights))
-        for one, other in zip(spots, about, strict=True):
+        for one, other in zip(spots, about or spots, strict=True):
             variance = one.variance(sizes)
             value += float(np.log(variance).sum() + one.residual @ (one.residual / variance))
             weighted = other.jacobian / other.variance(sizes)[:, None]
             information += other.jacobian.T @ weighted
-            if follows:
+            if about is None:
                 pull += weighted.T @ one.residual
         values, vectors = np.linalg.eigh(information)
         kept = values > 1e-12 * values[-1]
         along = (vectors.T @ pull)[kept]
         return value + float(np.log(values[kept]).sum() - np.sum(along**2 / values[kept]))
 
-    def sized(
-        self, spots: Sequence[Spot], about: Sequence[Spot], before: Sizes, *, follows: bool = True
-    ) -> Sizes:
+    def sized(self, spots: Sequence[Spot], before: Sizes, about: Sequence[Spot] | None = None) -> Sizes:
         """Noise and ripple where `restricted` is least, from where they stood; at least the rounding."""
 
         def sizes_at(logs: Vector) -> Sizes:
@@ -426,20 +361,18 @@ class Fitter:
         begin = np.log([math.sqrt(max(before.noise**2 - 1.0, 0.01)), before.ripple])
         simplex = begin + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
         options = {"xatol": 3e-3, "fatol": 1e-3, "initial_simplex": simplex}
-
-        def loss(logs: Vector) -> float:
-            return self.restricted(spots, about, sizes_at(logs), follows=follows)
-
-        return sizes_at(minimize(loss, begin, method="Nelder-Mead", options=options).x)
+        found = minimize(
+            lambda logs: self.restricted(spots, sizes_at(logs), about), begin,
+            method="Nelder-Mead", options=options,
+        )  # fmt: skip
+        return sizes_at(found.x)
 
     # ---- intervals ---------------------------------------------------------------------------------------
 
     def valued(self, point: Point, best: Point) -> Point:
         """A point with the sizes that are most likely there, and its value of `restricted`."""
-        sizes = self.sized(point.spots, best.spots, point.sizes, follows=False)
-        return point._replace(
-            sizes=sizes, value=self.restricted(point.spots, best.spots, sizes, follows=False)
-        )
+        sizes = self.sized(point.spots, point.sizes, best.spots)
+        return point._replace(sizes=sizes, value=self.restricted(point.spots, sizes, best.spots))
 
     def threshold(self, best: Point) -> float:
         """By how much `restricted` is larger at the ends of an interval.
@@ -448,32 +381,27 @@ class Fitter:
         freedom: were f linear, the ends are those of Student's t. It is 1.96^2 if the size is known. Minus
         twice the log likelihood of the logarithm of a deviation with nu of them has the curvature 4 nu.
         """
-        each = [self.restricted(best.spots, best.spots, one) for one in self._ripples(best, (-0.1, 0.0, 0.1))]
-        freedom = max((each[0] - 2.0 * each[1] + each[2]) / 0.04, 2.0)
+        low, middle, high = (self.restricted(best.spots, one) for one in _ripples(best, [-0.1, 0.0, 0.1]))
+        freedom = max((low - 2.0 * middle + high) / 0.04, 2.0)
         quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
         return freedom * math.log1p(quantile**2 / freedom)
 
     def halves(self, best: Point) -> Vector:
         """Half the interval of each number, were f linear: the farthest end over all sizes of the errors."""
-        reach, most = np.zeros(best.x.size), self.threshold(best)
-        most += self.restricted(best.spots, best.spots, best.sizes)
-        for sizes in self._ripples(best, np.linspace(-1.5, 1.5, 31).tolist()):
-            left = most - self.restricted(best.spots, best.spots, sizes)
+        reach = np.zeros(best.x.size)
+        most = self.threshold(best) + self.restricted(best.spots, best.sizes)
+        for sizes in _ripples(best, np.linspace(-1.5, 1.5, 31).tolist()):
+            left = most - self.restricted(best.spots, sizes)
             if left > 0.0:
                 reach = np.maximum(reach, left * np.diag(self.covariance(best._replace(sizes=sizes))))
         return np.asarray(np.sqrt(reach))
 
-    @staticmethod
-    def _ripples(best: Point, logs: Sequence[float]) -> list[Sizes]:
-        return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(one)) for one in logs]
-
     def refitted(self, i: int, number: float, near: Point, best: Point) -> Point:
         """All else refitted with x_i at a number, from a point nearby."""
         along = self.covariance(near)[:, i]
-        x = np.clip(near.x + along / along[i] * (number - near.x[i]), self.lower, self.upper)
+        x = np.clip(near.x + along / along[i] * (number - near.x[i]), *self.bounds)
         x[i] = number
-        begin = self.settled(x, tuple(one.error for one in near.spots), near.sizes)
-        return self.valued(self.descended(begin, i, best), best)
+        return self.valued(self.descended(self.settled(x, near.errors, near.sizes), i, best), best)
 
     def end(self, i: int, sign: float, half: float, best: Point, others: Sequence[Point]) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half of it, were f linear.
@@ -482,14 +410,14 @@ class Fitter:
         bound, if it is not as large there. It is sought from the best point and from other explanations, and
         the farthest is the end. None lies nearer than the linear one.
         """
-        bound = float((self.upper if sign > 0.0 else self.lower)[i])
+        bound = float(self.bounds[sign > 0.0][i])
         far = sign * min(sign * float(best.x[i]) + half, sign * bound)
         for about in (best, *others):
             far = sign * max(sign * far, sign * self._end_from(i, sign, far, about, best))
         return far
 
     def _end_from(self, i: int, sign: float, first: float, about: Point, best: Point) -> float:
-        bound = float((self.upper if sign > 0.0 else self.lower)[i])
+        bound = float(self.bounds[sign > 0.0][i])
         middle, most = float(about.x[i]), math.sqrt(self.threshold(best))
         points = {middle: about}
 
@@ -514,31 +442,27 @@ class Fitter:
             return outside  # no nearer than from the best point
         return float(brentq(over, inside, outside, xtol=0.5 * NEAR * abs(outside - middle)))
 
-    def explanations(self, best: Point, seek: bool) -> tuple[Point, list[Point]]:
-        """The best point, and other places where the logs are explained nearly as well, if they are sought.
+    def explanations(self, best: Point) -> tuple[Point, list[Point]]:
+        """The best point, and other places where the logs are explained nearly as well.
 
         A start that begins at the flank and one that crosses the gap first are two valleys: no step along
         one of them finds the other. So positions begin in mid-gap with the load torque at values over its
         range, all else is fitted, then the load torque too; and again from the flank.
         """
         places = [i for i, one in enumerate(self.unknowns) if one.kind == "position"]
-        loads = [i for i, one in enumerate(self.unknowns) if one.name == "load_torque"]
-        if not seek or not places or not loads:
+        load = next((i for i, one in enumerate(self.unknowns) if one.name == "load_torque"), None)
+        if not places or load is None:
             return best, []
-        (load,) = loads
-        starts: list[tuple[Vector, int | None]] = []
-        for share in LOADS:
-            x = best.x.copy()
-            x[load], x[places] = share * self.upper[load], math.sqrt(0.5)
-            starts.append((x, load))
-        flank = best.x.copy()
-        flank[places] = 0.0
         found = []
-        for x, held in (*starts, (flank, None)):
+        for share in (*LOADS, None):
+            x = best.x.copy()
+            x[places] = 0.0 if share is None else math.sqrt(0.5)
+            if share is not None:
+                x[load] = share * self.unknowns[load].upper
             try:
-                first = self.valued(self.refined(x, held), best)
+                first = self.valued(self.refined(x, None if share is None else load), best)
                 if first.value < best.value + HOPELESS:
-                    found.append(self.refined(first.x) if held is not None else first)
+                    found.append(first if share is None else self.refined(first.x))
             except (InputError, SimulationError):
                 continue
         for one in found:
@@ -550,6 +474,11 @@ class Fitter:
             if one.value < best.value + self.threshold(best) and min(apart) > SAME:
                 others.append(one)
         return best, others
+
+
+def _ripples(best: Point, logs: Sequence[float]) -> list[Sizes]:
+    """The sizes of the best point with the ripple so many e-folds larger."""
+    return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(one)) for one in logs]
 
 
 def agreeing(found: Sequence[tuple[Vector, float]]) -> int:

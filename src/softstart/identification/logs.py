@@ -6,19 +6,20 @@ import csv
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import cumulative_trapezoid
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
 from softstart.input.files import read_text, write_whole
-from softstart.quantities import RefusedError, nearest, parse, show, to_si
+from softstart.quantities import RefusedError, nearest, parse, show
 
 Kind = Literal["angle", "speed"]
 TorqueIs = Literal["demand", "measured"]
@@ -26,7 +27,6 @@ TorqueIs = Literal["demand", "measured"]
 COLUMNS: Final = {
     "time": Wanted(("time", "t"), "s"),
     "torque": Wanted(("torque", "u", "demand"), "N*m"),
-    "current": Wanted(("current", "i", "iq"), "A"),
     "angle": Wanted(("angle", "phi", "position"), "rad"),
     "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
 }
@@ -51,10 +51,8 @@ class Log:
         Instants of the samples in s, rising, evenly spaced or not.
     torque : array_like, shape (n,)
         Motor torque in N m at these instants.
-    angle : array_like, shape (n,), optional
-        Angle of the motor in rad; NaN where it is missing.
-    speed : array_like, shape (n,), optional
-        Speed of the motor in rad/s, in place of the angle; NaN where it is missing.
+    angle, speed : array_like, shape (n,), optional
+        Angle of the motor in rad, or its speed in rad/s: one of the two; NaN where it is missing.
     torque_is : {"measured", "demand"}
         "measured": straight lines join the samples of the torque. "demand": each is held until the next, and
         the motor's torque follows with the lag of the drive.
@@ -118,19 +116,21 @@ class Log:
         seconds, torques, values = columns.values()
         _check_times(seconds, name)
         notes: list[str] = []
-        if kind == "angle":
-            values = _unwrapped(values, notes)
+        seen = np.isfinite(values)
+        jumps = float(np.abs(np.diff(values[seen])).max(initial=0.0))
+        if kind == "angle" and jumps >= 0.6 * TURN and float(np.ptp(values[seen])) <= 1.001 * TURN:
+            notes.append("the angle wraps at a full turn and was unwrapped")
+            values[seen] = np.unwrap(values[seen])
         vars(self).update(
             time=seconds, torque=torques, values=values, kind=kind, torque_is=torque_is, name=name,
             count=_count(values),
         )  # fmt: skip
         self._check_motion()
-        rows = int(np.isfinite(values).sum())
-        if rows > MOST_ROWS:
-            every = math.ceil(rows / MOST_ROWS)
-            values = np.where(np.arange(values.size) % every == 0, values, math.nan)
+        every = math.ceil(int(seen.sum()) / MOST_ROWS)
+        if every > 1:
+            values[np.arange(values.size) % every != 0] = math.nan
             notes.append(f"the fit looks at every sample in {every} of the {kind}, and at all of the torque")
-        vars(self).update(values=values, notes=tuple(notes))
+        vars(self).update(notes=tuple(notes))
 
     @classmethod
     def load(
@@ -139,8 +139,6 @@ class Log:
         *,
         columns: Mapping[str, str] | None = None,
         torque_is: TorqueIs = "measured",
-        torque_constant: float | str | None = None,
-        rated_torque: float | str | None = None,
     ) -> Log:
         """A log from a CSV file whose heading names the columns, as `time [ms];torque [N*m];speed [rpm]`.
 
@@ -151,34 +149,14 @@ class Log:
         path : str or path
             The file; semicolons, tabs or commas divide the columns, decimal commas are read.
         columns : mapping, optional
-            What the file calls time, torque (or current), angle and speed; a name after a minus has the other
-            sign, and a unit in brackets behind it takes the place of that of the file: `-n_act [rpm]`.
+            What the file calls time, torque, angle and speed, as `-n_act [rpm]`: a minus turns the sign, and
+            a unit in brackets takes the place of that of the file. A factor before the name makes a torque of
+            a current, or of a share in %: `1.2*iq [N*m]`.
         torque_is : {"measured", "demand"}
             As for `Log`.
-        torque_constant : float or str, optional
-            Torque over current in N m/A, or with a unit: the file has the current that makes the torque in
-            place of it.
-        rated_torque : float or str, optional
-            The torque at 100 % in N m, or with a unit, where the file has it in %.
         """
-        where = os.fspath(path)
-        rated = None if rated_torque is None else _above_0("rated_torque", rated_torque, "N*m")
-        constant = None if torque_constant is None else _above_0("torque_constant", torque_constant, "N*m/A")
-        cause, other = ("torque", "current") if constant is None else ("current", "torque")
-        asked = _asked_columns(columns or {})
-        if other in asked:
-            raise InputError(
-                f"columns: {other}: a current is read with the torque constant, and a torque without it; "
-                'give --torque-constant "1.2 N*m/A", or leave it out.'
-            )
-        found, notes = _read_columns(where, asked, cause, rated)
-        torque = found.pop(cause)
-        if constant is not None:
-            torque = constant * torque
-            notes.append(f"the torque is {constant:g} N m/A times the current")
-        values: dict[str, Any] = found
-        log = cls(values.pop("time"), torque, torque_is=torque_is, name=Path(where).name, **values)
-        return log.changed(notes=(*notes, *log.notes))
+        found = _read_columns(os.fspath(path), _asked_columns(columns or {}))
+        return cls(torque_is=torque_is, name=Path(path).name, **found)
 
     def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
         """Write the log to a CSV file that `load` reads; `about` goes into a comment above it."""
@@ -216,19 +194,13 @@ class Log:
         steps = np.diff(self.time)
         period = float(np.median(steps))
         even = float(np.ptp(steps)) <= 1e-6 * period and bool(np.isfinite(self.values).all())
-        if self.kind != "speed" or not even or not lines or not self.count:
-            return self
-        if abs(self.count * period / (TURN / (4.0 * lines)) - 1.0) > 0.01:
+        counts = self.count * period / TURN * 4.0 * lines
+        if self.kind != "speed" or not even or abs(counts - 1.0) > 0.01:
             return self
         angle = np.concatenate([[0.0], np.cumsum(self.values[1:] * steps)])
         one = Log(self.time, self.torque, angle=angle, torque_is=self.torque_is, name=self.name)
         told = "the speed is the difference of encoder counts, and was summed to the angle"
         return one.changed(notes=(*self.notes, told))
-
-    @property
-    def floor(self) -> float:
-        """Standard deviation of what the encoder rounds."""
-        return self.count / math.sqrt(12.0)
 
     @property
     def scale(self) -> float:
@@ -240,10 +212,10 @@ class Log:
     def moved(self) -> tuple[Vector, Vector]:
         """Speed of the motor, and impulse of its torque until then, N m s, in the samples of the motion."""
         seen = np.isfinite(self.values)
-        time, values, torque = self.time[seen], self.values[seen], self.torque
-        speed = values if self.kind == "speed" else np.gradient(values, time)
-        impulse = np.append(0.0, np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(self.time)))
-        return speed, impulse[seen]
+        speed = self.values[seen]
+        if self.kind == "angle":
+            speed = np.gradient(speed, self.time[seen])
+        return speed, cumulative_trapezoid(self.torque, self.time, initial=0.0)[seen]
 
     def _check_motion(self) -> None:
         name, kind = self.name, self.kind
@@ -277,124 +249,6 @@ class Log:
             )
 
 
-# ---- the file -------------------------------------------------------------------------------------------
-
-
-class _Asked(NamedTuple):
-    """What a file calls a signal: name, sign, and a unit that takes the place of its own."""
-
-    name: str
-    sign: float
-    unit: str
-
-
-def _asked_columns(columns: Mapping[str, str]) -> dict[str, _Asked]:
-    """The columns as people write them.
-
-    >>> _asked_columns({"speed": "-n_act [rpm]"})
-    {'speed': _Asked(name='n_act', sign=-1.0, unit='rpm')}
-    """
-    found = {}
-    for key, text in columns.items():
-        part = re.fullmatch(r"\s*(-?)\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
-        if key not in COLUMNS or part is None:
-            near = nearest(key, COLUMNS) if key not in COLUMNS else key
-            raise InputError(
-                f"columns: {key} = {show(text)}: "
-                + (f"did you mean {near}=NAME?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act.")
-            )
-        found[key] = _Asked(part[2], -1.0 if part[1] else 1.0, part[3] or "")
-    return found
-
-
-def _read_columns(
-    where: str, asked: Mapping[str, _Asked], cause: str, rated: float | None
-) -> tuple[dict[str, Vector], list[str]]:
-    """Time, torque or current, and angle or speed of a file in SI; `rated`: the torque at 100 %."""
-    try:
-        text = read_text(Path(where), also="cp1252")
-        if "\0" in text:
-            raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
-        lines = text.splitlines()
-        rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
-        first = next((i for i in rows if re.match(r"\s*[+-]?[.,]?[0-9]", lines[i])), 0)
-        above = [i for i in rows if i < first]
-        if not above:
-            raise RefusedError(f"no line above the numbers names the columns; write it there, as {FORM}")
-        lines[: above[-1]] = ["#"] * above[-1]
-        mark = next((one for one in ";\t" if any(one in line for line in lines)), ",")
-        cells = next(csv.reader([lines[above[-1]]], delimiter=mark, skipinitialspace=True))
-        named = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?\s*", cell, re.DOTALL) for cell in cells]
-        names, units = ([part[i] or "" if part else "" for part in named] for i in (1, 2))
-        heading, factors, notes = [""] * len(cells), {}, list[str]()
-        for key, i in _places(names, cells, asked, cause).items():
-            own = asked.get(key, _Asked("", 1.0, ""))
-            unit = (own.unit or units[i]).strip()
-            heading[i], factors[key] = key, own.sign * _in_si(unit, key, cells[i], rated)
-            notes += [f"the torque is in % of {rated:.5g} N m"] if unit == "%" else []
-    except RefusedError as refusal:
-        raise InputError(f"log = {where}: {refusal.reason}.") from None
-    lines[above[-1]] = mark.join(heading)
-    wanted = [Wanted((key,), COLUMNS[key].unit) for key in factors]
-    columns = read_columns("\n".join(lines), f"log = {where}", wanted, headed="names", missing=True).values
-    each = zip(factors.items(), columns, strict=True)
-    return {key: factor * column for (key, factor), column in each}, notes
-
-
-def _places(names: list[str], cells: list[str], asked: Mapping[str, _Asked], cause: str) -> dict[str, int]:
-    """In which column each signal stands."""
-
-    def places(key: str) -> list[int]:
-        known = [asked[key].name] if key in asked else COLUMNS[key].names
-        return [i for i, name in enumerate(names) if name.lower() in [one.lower() for one in known]]
-
-    motions = [key for key in ("angle", "speed") if key in asked] or [
-        key for key in ("angle", "speed") if places(key)
-    ]
-    found = {key: places(key) for key in ("time", cause, *motions)}
-    wrong = [
-        f"{f'{len(columns)} are' if columns else 'none is'} called {asked[key].name if key in asked else key}"
-        for key, columns in found.items()
-        if len(columns) != 1
-    ]
-    if len(motions) != 1:
-        wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
-    if wrong:
-        current = "; a current takes --torque-constant" if cause == "torque" and places("current") else ""
-        raise RefusedError(
-            f"there are the columns {', '.join(filter(None, cells))}; {' and '.join(wrong)}; write --columns "
-            f'"time=NAME [ms],{cause}=NAME,speed=NAME [rpm]" with names of this file{current}'
-        )
-    return {key: columns[0] for key, columns in found.items()}
-
-
-def _in_si(unit: str, key: str, cell: str, rated: float | None) -> float:
-    """One of this unit in SI; a torque in % is a share of the rated torque."""
-    if unit == "%" and key == "torque":
-        if rated is None:
-            raise RefusedError(f'{show(cell)} is in %; give the torque at 100 %, as --rated-torque "12 N*m"')
-        return 0.01 * rated
-    try:
-        return float(parse(f"1 {unit}", COLUMNS[key].unit))
-    except RefusedError as refusal:
-        raise RefusedError(
-            f'{show(cell)}: {refusal.reason}; or name the unit that is meant, as --columns "{key}=NAME '
-            f'[{COLUMNS[key].unit}]"'
-        ) from None
-
-
-def _above_0(name: str, given: float | str, unit: str) -> float:
-    value = float(to_si(given, unit, name=name))
-    if not value > 0.0:
-        raise InputError(
-            f"{name} = {show(given)}: give a value above 0; a minus before the column turns the sign."
-        )
-    return value
-
-
-# ---- the samples ----------------------------------------------------------------------------------------
-
-
 def _check_times(time: Vector, name: str) -> None:
     if time.size < FEWEST:
         raise InputError(f"{name}: {time.size} samples; a fit needs {FEWEST} or more.")
@@ -404,30 +258,13 @@ def _check_times(time: Vector, name: str) -> None:
         raise InputError(
             f"{name}: time goes from {time[i]:g} s to {time[i + 1]:g} s at sample {i + 2}; it must rise."
         )
-    typical = float(np.median(steps))
-    if float(steps.max()) > HOLE * typical:
-        i = int(np.argmax(steps))
+    i, typical = int(np.argmax(steps)), float(np.median(steps))
+    if steps[i] > HOLE * typical:
         raise InputError(
             f"{name}: there is no sample from {time[i]:g} s to {time[i + 1]:g} s, and every {typical:g} s "
             "elsewhere; the torque in between is not known; cut the log there, and give the parts that begin "
             "at standstill."
         )
-
-
-def _unwrapped(angle: Vector, notes: list[str]) -> Vector:
-    """The angle without jumps by a full turn."""
-    seen = np.isfinite(angle)
-    values = angle[seen]
-    if (
-        values.size < 2
-        or float(np.ptp(values)) > TURN * 1.001
-        or float(np.max(np.abs(np.diff(values)))) < 0.6 * TURN
-    ):
-        return angle
-    notes.append("the angle wraps at a full turn and was unwrapped")
-    whole = angle.copy()
-    whole[seen] = np.unwrap(values)
-    return whole
 
 
 def _count(values: Vector) -> float:
@@ -445,11 +282,95 @@ def _count(values: Vector) -> float:
     for step in steps.tolist():  # Euclid's greatest common divisor, but for rounding
         one, other = max(step, count), min(step, count)
         while other > LEAST_COUNT * largest:
-            one, other = other, one - other * round(one / other)
-            other = abs(other)
+            one, other = other, abs(one - other * round(one / other))
         count = one
         if count < 5.0 * LEAST_COUNT * largest:
             return 0.0
     multiples = np.round(steps / count)
     count = float(np.sum(steps) / np.sum(multiples))
     return count if float(np.max(np.abs(steps / count - multiples))) < 0.05 else 0.0
+
+
+# ---- the file -------------------------------------------------------------------------------------------
+
+
+def _asked_columns(columns: Mapping[str, str]) -> dict[str, tuple[str, float, str]]:
+    """Name, factor and unit of the columns as people write them.
+
+    >>> _asked_columns({"speed": "-n_act [rpm]", "torque": "0.12 * M"})
+    {'speed': ('n_act', -1.0, 'rpm'), 'torque': ('M', 0.12, '')}
+    """
+    found = {}
+    for key, text in columns.items():
+        part = re.fullmatch(r"\s*(-?)\s*(?:(\d*\.?\d+)\s*\*)?\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
+        if key not in COLUMNS or part is None:
+            near = nearest(key, COLUMNS) if key not in COLUMNS else key
+            remedy = f"did you mean {near}=NAME?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act."
+            raise InputError(f"columns: {key} = {show(text)}: {remedy}")
+        minus, factor, name, unit = part.groups("")
+        found[key] = name, float(f"{minus}{factor or 1}"), unit
+    return found
+
+
+def _read_columns(where: str, asked: Mapping[str, tuple[str, float, str]]) -> dict[str, Vector]:
+    """Time, torque, and angle or speed of a file in SI."""
+    try:
+        text = read_text(Path(where), also="cp1252")
+        if "\0" in text:
+            raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
+        lines = text.splitlines()
+        rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+        first = next((i for i in rows if re.match(r"\s*[+-]?[.,]?[0-9]", lines[i])), 0)
+        head = max((i for i in rows if i < first), default=None)
+        if head is None:
+            raise RefusedError(f"no line above the numbers names the columns; write it there, as {FORM}")
+        lines[:head] = ["#"] * head
+        mark = next((one for one in ";\t" if any(one in line for line in lines)), ",")
+        cells = next(csv.reader([lines[head]], delimiter=mark, skipinitialspace=True))
+        parts = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?\s*", cell, re.DOTALL) for cell in cells]
+        names, units = ([part[i] or "" if part else "" for part in parts] for i in (1, 2))
+        heading, factors = [""] * len(cells), {}
+        for key, i in _places(names, asked).items():
+            _, factor, unit = asked.get(key, ("", 1.0, ""))
+            heading[i], factors[key] = key, factor * _in_si(unit or units[i], key, cells[i])
+    except RefusedError as refusal:
+        raise InputError(f"log = {where}: {refusal.reason}.") from None
+    lines[head] = mark.join(heading)
+    wanted = [Wanted((key,), COLUMNS[key].unit) for key in factors]
+    columns = read_columns("\n".join(lines), f"log = {where}", wanted, headed="names", missing=True).values
+    return {key: factor * column for (key, factor), column in zip(factors.items(), columns, strict=True)}
+
+
+def _places(names: Sequence[str], asked: Mapping[str, tuple[str, float, str]]) -> dict[str, int]:
+    """In which column each signal stands."""
+    found: dict[str, list[int]] = {}
+    for key, one in COLUMNS.items():
+        known = [name.lower() for name in ([asked[key][0]] if key in asked else one.names)]
+        found[key] = [i for i, name in enumerate(names) if name.lower() in known]
+    motions = [key for key in ("angle", "speed") if key in asked]
+    motions = motions or [key for key in ("angle", "speed") if found[key]]
+    wanted, wrong = ("time", "torque", *motions), list[str]()
+    for key in wanted:
+        if len(found[key]) != 1:
+            many = f"{len(found[key])} are" if found[key] else "none is"
+            wrong.append(f"{many} called {asked[key][0] if key in asked else key}")
+    if len(motions) != 1:
+        wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
+    if wrong:
+        raise RefusedError(
+            f"there are the columns {', '.join(filter(None, names))}; {' and '.join(wrong)}; write --columns "
+            '"time=NAME [ms],torque=NAME,speed=NAME [rpm]" with names of this file'
+        )
+    return {key: found[key][0] for key in wanted}
+
+
+def _in_si(unit: str, key: str, cell: str) -> float:
+    """One of this unit in SI."""
+    try:
+        return float(parse(f"1 {unit.strip()}", COLUMNS[key].unit))
+    except RefusedError as refusal:
+        named = f'"{key}=NAME [{COLUMNS[key].unit}]"'
+        of_other = '; of a current in A, or of %, as "torque=1.2*NAME [N*m]"' if key == "torque" else ""
+        raise RefusedError(
+            f"{show(cell)}: {refusal.reason}; or name the unit that is meant, as --columns {named}{of_other}"
+        ) from None

@@ -1,12 +1,9 @@
-"""What the exact plant would have logged: signals at the samples, and their response to torque errors.
-
-Everything here is a function of the parameters and of the torque error: no result depends on an earlier call.
-"""
+"""What the exact plant would have logged: signals at the samples, and their response to torque errors."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -73,17 +70,33 @@ class LogModel:
     drive: Drive  # the guess without limits
     dead_time: float
     block: int
+    rows: NDArray[np.bool_]  # the samples that count,
+    values: Vector  # what they tell,
+    root: Vector  # and the deviations of what encoder or log round
 
     @classmethod
     def of(cls, log: Log, drive: Drive, most_blocks: int = MOST_BLOCKS) -> LogModel:
         """The model of a log of this drive."""
         wide = drive.replace(**unlimited(log), brake="none")
         block = max(1, math.ceil(log.time.size / most_blocks))
-        return cls(log, drive, wide.replace(computing_delay=0.0), float(wide.computing_delay), block)
+        rows = np.isfinite(log.values)
+        values = log.values[rows]
+        if log.kind == "angle" and log.count:
+            values, variance = edges(log.time[rows], values, log.count)
+            counts = np.isfinite(variance)
+            rows[rows], values, root = counts, values[counts], np.sqrt(variance[counts])
+        else:
+            root = np.full(values.size, max(log.count / math.sqrt(12.0), 1e-3 * log.scale))
+        delay = float(wide.computing_delay)
+        return cls(log, drive, wide.replace(computing_delay=0.0), delay, block, rows, values, root)
 
     def first(self, share: float) -> LogModel:
-        """The model of the first part of the log: at least four samples of it."""
-        return replace(self, log=self.log.first(max(4, math.ceil(share * self.times.size))))
+        """The model of the first part of the log, at least four samples of it, all weighted alike."""
+        log = self.log.first(max(4, math.ceil(share * self.times.size)))
+        rows = self.rows[: log.time.size]
+        count = int(rows.sum())
+        root = np.full(count, log.scale or self.log.scale)  # a motor may be at rest at first
+        return replace(self, log=log, rows=rows, values=self.values[:count], root=root)
 
     @property
     def times(self) -> Vector:
@@ -97,34 +110,44 @@ class LogModel:
 
     def signals(self, values: Sequence[Mapping[str, float]], error: Vector | None = None) -> Matrix:
         """What would have been logged under each set of values and this torque error: a row for each."""
-        players = {row.get(DEAD_TIME): self._player(row, error) for row in values}
         out = np.empty((len(values), self.times.size))
-        for i, (row, plant) in enumerate(zip(values, self._plants(values), strict=True)):
-            motion, lag = self._played(plant, players[row.get(DEAD_TIME)]), row.get(FILTER, 0.0)
-            if lag > 0.0 and self.log.kind == "speed":
-                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
-            elif self.log.kind == "speed":
-                out[i] = motion.at(self.times)["w"][:, 0]
-            else:
+        for i, (row, motion) in enumerate(zip(values, self.motions(values, error), strict=True)):
+            if self.log.kind == "angle":
                 out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts(0)[0, 0]
+            elif lag := row.get(FILTER, 0.0):
+                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
+            else:
+                out[i] = motion.at(self.times)["w"][:, 0]
         return out
 
     def responses(self, values: Mapping[str, float], error: Vector | None = None) -> Matrix:
         """D signal/d error, a row for each sample and a column for each block, about this torque error."""
         knots, owners = knots_of(self.log, values.get(DEAD_TIME, self.dead_time))
-        lag, speed = values.get(FILTER, 0.0), self.log.kind == "speed"
-        smoothed = speed and lag > 0.0
+        lag = values.get(FILTER, 0.0)  # of a speed
         found = self.motion(values, error).sensitivities(
-            knots, marks=self._fine if smoothed else self.times, owners=owners // self.block,
-            parts=slice(1, 2) if speed else slice(4, 5),
+            knots, marks=self._fine if lag else self.times, owners=owners // self.block,
+            parts=slice(1, 2) if self.log.kind == "speed" else slice(4, 5),
         )[1][:, 0]  # fmt: skip
-        if smoothed:
+        if lag:
             found = filtered(self._fine, found.T, lag).T[::FINE]
         return np.asarray(found / math.sqrt(self.block))
 
     def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Recorded:
         """The start under the torque of the log and this error of it."""
-        return self._played(self._plants([values])[0], self._player(values, error))
+        return next(self.motions([values], error))
+
+    def motions(
+        self, values: Sequence[Mapping[str, float]], error: Vector | None = None
+    ) -> Iterator[Recorded]:
+        """The start with each set of values."""
+        players = {row.get(DEAD_TIME): self._player(row, error) for row in values}
+        for row, plant in zip(values, self._plants(values), strict=True):
+            recorder = Recorder(plant, 0, 4 * self.times.size + 256)
+            until = float(self.times[-1]) * (1.0 + 1e-9)
+            reason = run_one(players[row.get(DEAD_TIME)], self.drive, recorder, until)
+            if reason != ENDED:
+                raise SimulationError(f"The start of the log could not be computed (status {reason}).")
+            yield recorder.finished()
 
     def _plants(self, values: Sequence[Mapping[str, float]]) -> list[Rows]:
         """The rows of the kernel for each set of values."""
@@ -150,13 +173,6 @@ class LogModel:
         if error is not None:
             torque = torque + np.repeat(error, self.block)[: torque.size] / math.sqrt(self.block)
         return make_controller("profile", {"profile": TorqueProfile(knots, torque[owners])})
-
-    def _played(self, plant: Rows, player: Controller) -> Recorded:
-        recorder = Recorder(plant, 0, 4 * self.times.size + 256)
-        reason = run_one(player, self.drive, recorder, float(self.times[-1]) * (1.0 + 1e-9))
-        if reason != ENDED:
-            raise SimulationError(f"The start of the log could not be computed (status {reason}).")
-        return recorder.finished()
 
     @property
     def _fine(self) -> Vector:
@@ -190,12 +206,9 @@ def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     Samples on one count have nearly the same error while the motor creeps, and together they tell one thing:
     when the count ended. In the last of them the motor was before that edge by less than it then moved to the
     next sample: by half of that on average, and uniformly about it. How far it moves follows from the times
-    to the neighbouring edges, the shorter of which is taken for the variance. A motor that passes a count or
-    more from sample to sample has the variance of a rounded number, count^2/12. The first sample, and the
-    last, are rounded numbers.
-
-    All this depends on the log alone: a covariance that follows the fitted motion fits what it rounds, and
-    found the torque error of a single start with 64 lines a quarter too small.
+    to the neighbouring edges, the shorter of which is taken for the variance. Faster samples, the first and
+    the last are rounded numbers, of the variance count^2/12. All this depends on the log alone: weights that
+    follow the fitted motion find the torque error of a coarse start too small.
 
     >>> angle, variance = edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
     >>> angle.round(2).tolist(), (12.0 * variance).round(2).tolist()

@@ -1,42 +1,40 @@
-"""What an experiment would tell, before it is run: Fisher information, and a torque that tells more.
-
-`plan_experiments` answers which experiment to run: expected intervals of the standard ones, and of one torque
-whose levels are chosen for this drive.
-"""
+"""Which experiment to run: expected intervals of standard ones, and of a torque planned for a drive."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import minimize
 
-from softstart.arrays import Vector
-from softstart.chain.machines import records
-from softstart.controller import make_controller
+from softstart.arrays import Matrix, Vector
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import Fitter, Point, Sizes, data_of
+from softstart.identification.fitting import Fitter, Point, Sizes
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
-from softstart.identification.unknowns import Unknown, chosen, unknowns_of, usual, values_of
+from softstart.identification.unknowns import (
+    USUAL,
+    chosen,
+    position_is_unknown,
+    unknowns_of,
+    usual,
+    values_of,
+)
 from softstart.kernel.records import S_PHI
 from softstart.profile import TorqueProfile
 from softstart.quantities import show, to_si
-from softstart.start.batch import prepared
 from softstart.start.comparison import INTERVAL
-from softstart.start.engine import ended
-from softstart.start.rows import MAX_EVENTS
 
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
 PLACE: Final = -0.6  # position in the gap for which widths are stated
 CHECKED: Final = 257  # start positions from which an experiment is simulated first, see `largest`
-DESIGN, COARSE = 2, 4  # of these every second while a torque is designed, and every fourth for the travel
+COARSE: Final = 4  # of these every fourth while a torque is designed, and for the travel
 KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
 EXACT: Final = 1e-9  # relative error of a largest value
 SHORTEST: Final = 1e-13  # of the gap, between positions
@@ -52,74 +50,25 @@ NEAR: Final = 0.01  # relative distance of a design to its limits: for positions
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A torque demand and what it would tell.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    profile : TorqueProfile
-        The torque demand; `end`, s, is when the log ends.
-    widths : dict
-        Half an interval of 95 % over the value for each parameter; infinite where it would be unknown.
-    peak, travel : float
-        Peak of the shaft torque, N m, and travel of the load, rad at the motor shaft, on the exact plant,
-        each from the worst position in the gap.
-    score : float
-        Root mean square of the half intervals of the wanted parameters; less is better.
-
-    Examples
-    --------
-    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-    >>> shaking = plan_experiments(crane, optimise=False)["shaking"]
-    >>> shaking.peak < crane.load_torque * 6, round(shaking.travel, 1)
-    (True, 0.1)
-
-    References
-    ----------
-    docs/identification.md.
-    """
+    """A torque demand and what it would tell."""
 
     name: str
     profile: TorqueProfile
-    end: float
-    widths: dict[str, float]
-    peak: float
-    travel: float
-    score: float = math.nan
+    end: float  # of the log, s
+    widths: dict[str, float]  # half an interval of 95 % over the value; infinite where it would be unknown
+    peak: float  # of the shaft torque, N m, from the worst position in the gap
+    travel: float  # of the load, rad at the motor shaft, from the worst position
+    score: float = math.nan  # root mean square of the half intervals of wanted parameters; less is better
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Experiments for a drive: the standard ones, then the planned one.
-
-    Attributes
-    ----------
-    drive : Drive
-        The drive as it is thought to be.
-    experiments : tuple of Experiment
-        The standard ones, then the planned one.
-    log_period, ripple : float
-        Sample period of the log, s; torque error in each sample, N m.
-
-    Examples
-    --------
-    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-    >>> plan = plan_experiments(crane, log_period="4 ms", optimise=False)
-    >>> [one.name for one in plan.experiments]
-    ['start', 'two levels', 'two levels, then reverse', 'reversed three times', 'shaking']
-    >>> plan["start"].widths["gap"] > plan["two levels, then reverse"].widths["gap"]
-    True
-
-    References
-    ----------
-    docs/identification.md.
-    """
+    """Experiments for a drive: the standard ones, then the planned one."""
 
     drive: Drive
     experiments: tuple[Experiment, ...]
-    log_period: float
-    ripple: float
+    log_period: float  # s
+    ripple: float  # torque error in each sample, N m
 
     def __getitem__(self, name: str) -> Experiment:
         """The experiment of this name."""
@@ -175,14 +124,13 @@ def plan_experiments(
     """Find what standard experiments would tell about a drive, and a torque that tells more.
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
-    interval that a fit would have (Fisher information). The position in the gap is unknown in each where the
-    load is reactive. The log has the angle of the motor.
+    interval that a fit would have (Fisher information), of a log of the motor's angle from an unknown
+    position in the gap where the load is reactive.
 
     The planned torque has at least nine levels, and the duration of the best standard experiment that keeps
-    the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA:
-    M. J. D. Powell), minimising `Experiment.score` with the peak of the shaft torque from each position and
-    the travel within the limits. The best torque that keeps all limits on the exact plant is returned: never
-    less than the best standard experiment tells within them. It is a local optimum.
+    the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA),
+    minimising `Experiment.score`. The best torque that keeps all limits on the exact plant is returned, a
+    local optimum: it never tells less than the best standard experiment within them.
 
     Parameters
     ----------
@@ -209,7 +157,8 @@ def plan_experiments(
     Returns
     -------
     Plan
-        The experiments with their intervals, peaks and travel.
+        `experiments`, each with its profile, `widths` (half intervals over values), peak of the shaft torque,
+        N m, and travel of the load, rad, both from the worst position; `best` is the one that tells most.
 
     Raises
     ------
@@ -238,21 +187,20 @@ def plan_experiments(
     bench = Bench(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
     experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
-        usual_peak = drive.permissible_torque or max(one.peak for one in experiments)
-        limits = [("max_torque", max_torque, usual_peak, "N*m"), ("max_travel", max_travel, math.inf, "rad")]
-        torque, travel = (
-            usual if given is None else _between(key, given, unit, math.inf, "")
-            for key, given, usual, unit in limits
-        )
+        torque, travel = drive.permissible_torque or max(one.peak for one in experiments), math.inf
+        if max_torque is not None:
+            torque = _between("max_torque", max_torque, "N*m")
+        if max_travel is not None:
+            travel = _between("max_travel", max_travel, "rad")
         experiments.append(bench.designed(standard, torque, travel))
     return Plan(drive, tuple(experiments), period, error)
 
 
-def _between(name: str, given: float | str, unit: str, most: float, why: str) -> float:
+def _between(name: str, given: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
     """A number above 0 and at most this."""
     value = float(to_si(given, unit, name=name))
     if not 0.0 < value <= most:
-        limit = f" and at most {most:.3g} {unit}: {why}" if most < math.inf else ""
+        limit = f" and at most {most:.3g} {unit}: {why}" if why else ""
         raise InputError(f"{name} = {show(given)}: give a value above 0{limit}.")
     return value
 
@@ -269,10 +217,9 @@ def made_up_log(
     signal: Kind = "angle",
     torque_is: TorqueIs = "demand",
 ) -> Log:
-    """A log that the exact plant makes up: torque error, encoder and all; for trying, and for tests.
+    """A log that the exact plant makes up, with a torque error of `ripple` N m in each sample.
 
-    `ripple` is the standard deviation of the error of the torque in each sample, N m; `position` where in the
-    gap it begins; `phase` that of the encoder.
+    It begins at a `position` in the gap and a `phase` of the encoder.
 
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08)
     >>> made_up_log(crane, "start").kind
@@ -284,37 +231,33 @@ def made_up_log(
         profile, end = steps_of(*standard_levels(drive)[experiment])
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
-    generator = np.random.default_rng(seed)
-    played = demand + ripple * generator.standard_normal(time.size)
-    model = LogModel.of(Log.planned(time, played, signal), _at_rest(drive))
-    start = {POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {}
-    states = model.motion(start).at(time)
-    angle = states["phi"][:, 0] - states["phi"][0, 0]
-    count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
-    if count:
+    played = demand + ripple * np.random.default_rng(seed).standard_normal(time.size)
+    start = {POSITION: position} if position_is_unknown(drive) else {}
+    states = LogModel.of(Log.planned(time, played), _at_rest(drive)).motion(start).at(time)
+    angle, speed = states["phi"][:, 0] - states["phi"][0, 0], states["w"][:, 0]
+    if count := _count_of(drive):
         angle = np.floor(angle / count + phase) * count
-    speed = states["w"][:, 0] if not count else np.diff(angle, prepend=angle[0]) / log_period
+        speed = np.diff(angle, prepend=angle[0]) / log_period
     torque = demand if torque_is == "demand" else states["u"]
     values = {signal: speed if signal == "speed" else angle}
     return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
 
 
-def _moving(drive: Drive) -> bool:
-    """Whether the position in the gap is unknown."""
-    return (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
+def _count_of(drive: Drive) -> float:
+    """What the encoder counts, rad; 0 of an ideal one."""
+    return 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
 
 
 def _at_rest(drive: Drive) -> Drive:
-    return drive.replace(start_position="mid-gap") if _moving(drive) else drive.design_drive
+    return drive.replace(start_position="mid-gap") if position_is_unknown(drive) else drive.design_drive
 
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:
-    names = usual(drive, lag=True)
-    asked = chosen(free, names, list(dict.fromkeys([*names, *FRICTIONS])), "this log")
-    missing = [name for name in asked if float(getattr(drive, name)) == 0.0]
-    if free is not None and missing:
+    names = [name for name in usual(drive, lag=True) if float(getattr(drive, name))]
+    asked = chosen(free, names, [*USUAL, "load_torque", "torque_lag", *FRICTIONS], "this log")
+    if missing := [name for name in asked if not float(getattr(drive, name))]:
         raise InputError(f"free = {show(missing[0])}: it is 0 in the drive; give a guess of it.")
-    return tuple(name for name in asked if name not in missing)
+    return tuple(asked)
 
 
 def _level(drive: Drive) -> float:
@@ -340,12 +283,11 @@ def standard_levels(drive: Drive) -> dict[str, tuple[Vector, Vector]]:
     return {name: (part * np.array(parts), np.array(levels)) for name, (parts, levels) in table.items()}
 
 
-def largest(figure: Callable[[Vector], tuple[Vector, Vector]], places: Vector) -> float:
-    """The largest value of a figure that is continuous in the start position.
+def largest(figure: Callable[[Vector], Sequence[Vector] | Matrix], places: Vector) -> float:
+    """The largest value of a figure that is continuous in the start position, from values and contacts.
 
-    `figure` gives values and counts of contacts. An interval is halved while it may hold a larger value, by
-    the values at its ends and the slopes there and beside; and where the count changes: a contact that is
-    only just made, or just missed, has a steep and narrow peak beside it.
+    An interval is halved while it may hold a larger value, by the values at its ends and the slopes there and
+    beside; and where the contacts change: one that is only just made has a steep and narrow peak beside it.
 
     >>> round(largest(lambda x: (1.0 - abs(x - 0.1234567), x > 0.12), np.linspace(0.0, 1.0, 5)), 9)
     1.0
@@ -376,129 +318,102 @@ def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     return TorqueProfile.steps(edges, levels), float(edges[-1])
 
 
-def _score(widths: Sequence[float]) -> float:
-    """Of logarithms, so that units do not matter: A-optimal.
-
-    A determinant (D-optimal) would pay for a vague gap with a sharp inertia.
-    """
-    return float(np.sqrt(np.mean(np.minimum(widths, 1e3) ** 2)))
-
-
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A drive, an inverter's log and an encoder: what any torque would tell.
-
-    `period` is that of the samples, s, `ripple` the torque error in each, N m; `free` is what is to be found,
-    and `wanted` what of it a score is about.
-    """
+    """A drive, an inverter's log and an encoder: what any torque would tell."""
 
     drive: Drive
-    period: float
-    ripple: float
-    free: tuple[str, ...]
-    wanted: tuple[str, ...] = ()
+    period: float  # of the samples, s
+    ripple: float  # torque error in each, N m
+    free: tuple[str, ...]  # what is to be found
+    wanted: tuple[str, ...] = ()  # what of it a score is about; all if none
     progress: Callable[[str], None] = lambda _: None
 
     @property
-    def wide(self) -> Drive:
-        """The drive with a motor that has the torque of any design."""
-        limit = 10.0 * float(self.drive.Ms)
-        return _at_rest(self.drive).replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
-
-    @property
     def places(self) -> Vector:
-        """Positions of the motor in the gap, rad."""
-        half = 0.5 * float(self.drive.gap)
-        return np.linspace(-half, half, CHECKED) if _moving(self.drive) else np.zeros(1)
+        """Positions in the gap, from -1 to 1."""
+        return np.linspace(-1.0, 1.0, CHECKED) if position_is_unknown(self.drive) else np.zeros(1)
 
     def experiment(self, name: str, durations: Vector, levels: Vector) -> Experiment:
         """What these levels would tell, and how they load the drive."""
         self.progress(name)
         profile, end = steps_of(durations, levels)
-        widths = {
-            one.name: self.width(one, x, half) if one.known(x, half) else math.inf
-            for one, x, half in self.halves(profile, end, SAMPLES)
-        }
-        score = _score([widths[one] for one in self.wanted or widths])
-        return Experiment(name, profile, end, widths, *self.load(profile, end), score)
+        widths = self.widths(profile, end, SAMPLES)
+        return Experiment(name, profile, end, widths, *self.load(profile, end), self.score(widths))
 
-    @staticmethod
-    def width(one: Unknown, x: float, half: float) -> float:
-        """Half an interval of a value as a share of it."""
-        return math.sinh(half) if one.kind == "logarithm" else one.share(x, half)
+    def score(self, widths: dict[str, float]) -> float:
+        """Of logarithms, so that units do not matter: A-optimal.
 
-    def halves(self, profile: TorqueProfile, end: float, samples: int) -> list[tuple[Unknown, float, float]]:
-        """Each parameter of the drive, its number x of the fit, and half the expected interval of that."""
+        A determinant (D-optimal) would pay for a vague gap with a sharp inertia.
+        """
+        wanted = [widths[name] for name in self.wanted or widths]
+        return float(np.sqrt(np.mean(np.minimum(wanted, 1e3) ** 2)))
+
+    def widths(
+        self, profile: TorqueProfile, end: float, samples: int, *, vague: bool = False
+    ) -> dict[str, float]:
+        """Half the expected interval of each parameter over its value; if unknown infinite, or `vague`."""
         drive = self.drive
         period = max(self.period, end / samples)
         time = np.arange(0.0, end + 0.5 * period, period)
         log = Log.planned(time, profile.at(time))
-        unknowns = unknowns_of(self.free, drive, [log], [_moving(drive)])
+        unknowns = unknowns_of(self.free, drive, [log], [position_is_unknown(drive)])
         numbers = {POSITION: PLACE, "offset": 0.0}
         x = np.array([
             one.number(float(numbers.get(one.name, getattr(drive, one.name, 0.0)))) for one in unknowns
         ])  # fmt: skip
-        model = LogModel.of(log, _at_rest(drive), SAMPLES)
-        signal = model.signals([values_of(unknowns, x, 0)])[0]
-        count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
-        model = replace(model, log=log.changed(values=signal, count=count))
-        logged = np.round(signal / count) * count if count else signal
-        fitter = Fitter((model,), unknowns, (data_of(model, logged),))
-        spot = fitter.spot(x, 0, np.zeros(model.blocks), derivatives=True)
+        signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([values_of(unknowns, x, 0)])[0]
+        if count := _count_of(drive):
+            signal = np.round(signal / count) * count
+        model = LogModel.of(log.changed(values=signal, count=count), _at_rest(drive), SAMPLES)
+        fitter = Fitter([model], unknowns)
+        spot = fitter.spot(x, 0, np.zeros(model.blocks))
+        spot = spot._replace(jacobian=spot.rotation @ fitter.jacobian(x, 0, spot.error))
         # a longer period stands for samples left out: the same error of the torque in each of them
         sizes = Sizes(1.0, self.ripple * math.sqrt(self.period / period))
-        variances = np.diag(fitter.covariance(Point(x, sizes, (spot,), np.zeros(x.size))))
+        variances = np.diag(fitter.covariance(Point(x, sizes, (spot,))))
         reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
-        each = zip(unknowns, x.tolist(), reach, strict=True)
-        return [(one, number, half) for one, number, half in each if one.log is None]
+        found = {}
+        for one, number, half in zip(unknowns, x.tolist(), reach, strict=True):
+            if one.log is None:
+                share = math.sinh(half) if one.kind == "logarithm" else one.share(number, half)
+                found[one.name] = share if vague or one.known(number, half) else math.inf
+        return found
 
     def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
-        peak = largest(lambda places: self.peaks(profile, end, places), self.places)
-        return peak, largest(lambda places: self.travels(profile, end, places), self.places[::COARSE])
+        peak = largest(lambda places: self.loads(profile, end, places)[[0, 2]], self.places)
+        return peak, largest(lambda places: self.loads(profile, end, places)[1:], self.places[::COARSE])
 
-    def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
-        """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
-        starts = records(self.wide, start_position=places) if _moving(self.drive) else [self.wide]
-        player = make_controller("profile", {"profile": profile}).set_up(self.wide)
-        notes = prepared(starts).notes([player], until=end)
-        for one in notes.starts:
-            ended(one, int(one["status"]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
-        return notes.peaks[:, 0], notes["gap_events"]
+    def loads(self, profile: TorqueProfile, end: float, places: Vector) -> Matrix:
+        """From each position peak of the shaft torque, travel of the load, and changes of the contact.
 
-    def travels(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
-        """Travel of the load from each of these positions, and how often the gap opens and closes.
-
-        Seen at events and samples: exact for a reactive load, which turns at events only.
+        The travel is seen at events and samples: exact for a reactive load, which turns at events only.
         """
         times = np.union1d(profile.time[profile.time < end], end)
         if self.drive.load_kind != "reactive":
             times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
         model = LogModel.of(Log.planned(times, profile.at(times)), _at_rest(self.drive))
-        found = np.empty((2, places.size))
-        for i, share in enumerate((places / (0.5 * float(self.drive.gap) or 1.0)).tolist()):
-            motion = model.motion({POSITION: share} if _moving(self.drive) else {})
+        starts = [{POSITION: place} if position_is_unknown(self.drive) else {} for place in places.tolist()]
+        found = np.empty((3, places.size))
+        for i, motion in enumerate(model.motions(starts)):
             angles = motion.states[:, S_PHI]
-            found[:, i] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
-        return found[0], found[1]
+            travel = np.max(np.abs(angles - angles[0]))
+            found[:, i] = abs(motion.shafts["peak"][0]), travel, motion.notes.gap_events
+        return found
 
     def over(self, durations: Vector, levels: Vector, torque: float, travel: float) -> float:
         """The worst of some positions over the limits."""
-        played = steps_of(durations, levels)
-        found = float(self.peaks(*played, self.places[::DESIGN])[0].max()) / torque
-        if travel < math.inf:
-            found = max(found, float(self.travels(*played, self.places[:: 4 * COARSE])[0].max()) / travel)
-        return found
+        peaks, travels, _ = self.loads(*steps_of(durations, levels), self.places[::COARSE])
+        return max(float(peaks.max()) / torque, float(travels.max()) / travel)
 
-    def within(
-        self, name: str, durations: Vector, levels: Vector, torque: float, travel: float
-    ) -> Experiment | None:
+    def within(self, durations: Vector, levels: Vector, torque: float, travel: float) -> Experiment | None:
         """The experiment, its levels made smaller until it keeps the limits; None if hardly any is left."""
         share = 1.0
         while share > LEAST:
             over = self.over(durations, share * levels, torque, travel)
             if over <= 1.0:
-                found = self.experiment(name, durations, share * levels)
+                found = self.experiment("planned", durations, share * levels)
                 over = max(found.peak / torque, found.travel / travel)
                 if over <= 1.0:
                     return found
@@ -509,7 +424,7 @@ class Bench:
         self, standard: dict[str, tuple[Vector, Vector]], torque: float, travel: float
     ) -> Experiment:
         """The torque within the limits that tells most, from the best of the standard ones."""
-        each = {name: self.within("planned", *levels, torque, travel) for name, levels in standard.items()}
+        each = {name: self.within(*levels, torque, travel) for name, levels in standard.items()}
         kept = {name: one for name, one in each.items() if one is not None}
         if not kept:
             raise InputError(
@@ -535,9 +450,8 @@ class Bench:
                     break
                 played = played * (1.0 - NEAR) / over
             # a design needs the slope of what is unknown
-            halves = self.halves(*steps_of(durations, played), ROUGH)
-            widths = {one.name: self.width(one, x, half) for one, x, half in halves}
-            tried.append((_score([widths[name] for name in self.wanted or widths]), played))
+            widths = self.widths(*steps_of(durations, played), ROUGH, vague=True)
+            tried.append((self.score(widths), played))
             return math.log(tried[-1][0])
 
         self.progress("planned")
@@ -545,5 +459,5 @@ class Bench:
         draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
         minimize(score, min(draws, key=score), method="COBYLA", options={"rhobeg": SPREAD, "maxiter": TRIALS})
         tried.sort(key=lambda one: one[0])
-        exact = (self.within("planned", durations, played, torque, travel) for _, played in tried[:EXACTLY])
+        exact = (self.within(durations, played, torque, travel) for _, played in tried[:EXACTLY])
         return min((one for one in (kept[seed], *exact) if one is not None), key=lambda one: one.score)

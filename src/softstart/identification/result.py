@@ -1,11 +1,11 @@
-"""What was identified: values with intervals, what the logs cannot tell, and K_dyn with its interval."""
+"""What was identified: values with intervals, what the logs cannot tell, drives that they leave possible."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -21,14 +21,11 @@ from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
 from softstart.quantities import RefusedError
-from softstart.start.comparison import INTERVAL, intervals
-from softstart.start.simulation import simulate
+from softstart.start.comparison import INTERVAL
 
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
-CONFIDENCE = 0.95
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file
-DIGITS = 3  # of half an interval, with which a value is written: it moves by 0.5 % of that at most
 FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an identification
 
 
@@ -36,52 +33,21 @@ FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an id
 class Estimate:
     """One parameter: its value, its interval of 95 %, and whether the logs tell it.
 
-    Attributes
-    ----------
-    name : str
-        The parameter of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank).
-    value, lower, upper : float
-        In SI. What is unknown has the value at which the search ended. Ends are NaN where none is stated.
-    known, reason : bool, str
-        Not known is what has an interval wider than a factor of 3 (of a friction, than a tenth of the torque
-        that accelerates), and for what reason.
-
-    Examples
-    --------
     >>> Estimate("gap", 0.08, 0.079, 0.081, known=True).half_width
     0.0125...
-
-    References
-    ----------
-    docs/identification.md.
     """
 
-    name: str
-    value: float
-    lower: float
+    name: str  # of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank)
+    value: float  # SI; of what is unknown that at which the search ended
+    lower: float  # NaN where no interval is stated
     upper: float
-    known: bool
-    reason: str = ""
+    known: bool  # whether upper/lower < 3 (of a friction, known within a tenth of the accelerating torque)
+    reason: str = ""  # why it is not known
 
     @property
     def half_width(self) -> float:
         """Half the interval over the value, as a share; infinite if the value is 0."""
         return 0.5 * (self.upper - self.lower) / abs(self.value) if self.value else math.inf
-
-    def rounded(self) -> Estimate:
-        """Value and ends to three digits of half the interval, of themselves where they are smaller.
-
-        >>> one = Estimate("gap", 0.0796834172, 0.0781726453, 0.0812174625, known=True).rounded()
-        >>> one.value, one.lower, one.upper
-        (0.07968, 0.07817, 0.08122)
-        """
-        half = 0.5 * (self.upper - self.lower)
-        numbers = {
-            name: round(number, DIGITS - 1 - math.floor(math.log10(min(half, abs(number)))))
-            for name in ("value", "lower", "upper")
-            if (number := getattr(self, name)) and half > 0.0
-        }
-        return replace(self, **numbers)
 
     def moved(self, shares: ArrayLike) -> Vector:
         """Values so many half intervals away: 1 is the end further from 0, -1 the other end, by logarithms.
@@ -112,10 +78,11 @@ class Identification:
     ----------
     drive, guess : Drive
         The drive with the values found, and that from which the search began.
-    logs : tuple of Log
-        The logs, in the order given; none if the identification was loaded. `residuals` are in their units.
-    estimates : tuple of Estimate
-        One for each parameter that was free, then the position of each log.
+    logs, residuals : tuple
+        The logs, in the order given, and model minus log in their units; none if it was loaded.
+    estimates : tuple
+        Of each parameter that was free, then of the position of each log: name, value, lower and upper end
+        of the interval of 95 %, known, reason.
     correlations : array of shape (k, k)
         Of the logarithms of the estimates (of positions and frictions themselves).
     ripple : float
@@ -133,8 +100,6 @@ class Identification:
     >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
     >>> [one.name for one in found.estimates if not one.known]
     []
-    >>> abs(found.drive.gap / 0.08 - 1.0) < 0.05
-    True
 
     References
     ----------
@@ -149,9 +114,7 @@ class Identification:
     ripple: float
     searches: int
     agreed: int
-    notes: tuple[
-        str, ...
-    ]  # what was done to the logs, what they show that the model has not, what is unknown
+    notes: tuple[str, ...]
     residuals: tuple[Vector, ...]
 
     def __getitem__(self, name: str) -> Estimate:
@@ -165,7 +128,7 @@ class Identification:
 
     @property
     def stated(self) -> bool:
-        """Whether intervals are stated: not where the drive does not explain the logs, or time was short."""
+        """Whether intervals are stated: not where the drive does not explain the logs."""
         return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
 
     def draws(self, count: int = 200, seed: int = 0) -> Records:
@@ -179,26 +142,8 @@ class Identification:
         values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
         normal = np.random.default_rng(seed).standard_normal((count, len(which)))
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
-        return records(
-            self.drive,
-            **{
-                self.estimates[i].name: self.estimates[i].moved(move)
-                for i, move in zip(which, moves.T, strict=True)
-            },
-        )
-
-    def k_dyn(
-        self, controllers: Sequence[str], count: int = 200, seed: int = 0
-    ) -> dict[str, tuple[float, float, float]]:
-        """K_dyn of each strategy with its interval of 95 %: of the drive found, lower end, upper end.
-
-        Each strategy is set up for the drive found and started on `draws`. Ends are NaN without intervals.
-        """
-        runs = {name: simulate(self.drive, name) for name in controllers}
-        if not self.stated:
-            return {name: (float(run.k_dyn), math.nan, math.nan) for name, run in runs.items()}
-        drawn = self.draws(count, seed)
-        return {name: (float(run.k_dyn), *intervals(run, drawn, name)["k_dyn"]) for name, run in runs.items()}
+        moved = {one.name: one.moved(move) for one, move in zip(self.shared, moves.T, strict=True)}
+        return records(self.drive, **moved)
 
     def with_settings(self, settings: Iterable[str]) -> Self:
         """The identification with other parameters of its drive, as typed at a command line.
@@ -219,19 +164,12 @@ class Identification:
                     f"{DRIVE_FILE} alone, as a drive without intervals."
                 )
 
-    def rounded(self) -> Self:
-        """The identification as it is written, without digits that the logs do not tell."""
-        estimates = tuple(one.rounded() for one in self.estimates)
-        values = {one.name: one.value for one in estimates if one.name in PARAMETERS}
-        return replace(self, drive=self.drive.replace(**values), estimates=estimates)
-
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder: `rounded`."""
+        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder."""
         Path(folder).mkdir(parents=True, exist_ok=True)
-        kept = self.rounded()
-        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | kept.summary(), indent=2)
-        for name, content in ((DRIVE_FILE, kept.drive.to_toml()), (FILE, text + "\n")):
-            write_whole(Path(folder) / name, lambda stream, content=content: stream.write(content))  # type: ignore[misc]
+        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | self.summary(), indent=2)
+        write_whole(Path(folder) / DRIVE_FILE, lambda stream: stream.write(self.drive.to_toml()))
+        write_whole(Path(folder) / FILE, lambda stream: stream.write(text + "\n"))
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> Self:
@@ -254,13 +192,11 @@ class Identification:
                 Estimate(**{f.name: _or_nan(one[f.name]) for f in fields(Estimate)})
                 for one in kept["estimates"]
             )
-            correlations = np.array(kept["correlations"], dtype=np.float64)
-            _check_kept(estimates, correlations)
             guess = Drive.from_toml(kept["guess"], where=f"{path}, guess")
             found = cls(
                 drive=Drive.load(Path(folder) / DRIVE_FILE), guess=guess, logs=(), estimates=estimates,
-                correlations=correlations, ripple=float(kept["ripple"]), searches=int(kept["searches"]),
-                agreed=int(kept["agreed"]),
+                correlations=np.array(kept["correlations"], dtype=np.float64), ripple=float(kept["ripple"]),
+                searches=int(kept["searches"]), agreed=int(kept["agreed"]),
                 notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
@@ -277,16 +213,14 @@ class Identification:
 
     def summary(self) -> dict[str, Any]:
         """Everything as numbers and words, for JSON."""
+        estimates = []
+        for one in self.estimates:
+            ends = {} if self.stated else {"lower": None, "upper": None}
+            percent = 100.0 * one.half_width if one.value and self.stated else None
+            estimates.append(plain_fields(one) | ends | {"half_width_percent": percent})
         return {
             "drive": self.drive.given() | {"name": self.drive.name},
-            "estimates": [
-                {
-                    **plain_fields(one),
-                    **({} if self.stated else {"lower": None, "upper": None}),
-                    "half_width_percent": 100.0 * one.half_width if one.value and self.stated else None,
-                }
-                for one in self.estimates
-            ],
+            "estimates": estimates,
             "correlations": self.correlations.tolist(),
             "ripple": self.ripple,
             "searches": self.searches,
@@ -314,15 +248,4 @@ class Identification:
 
 
 def _or_nan(value: Any) -> Any:
-    """What a file has, NaN in place of null."""
     return math.nan if value is None else value
-
-
-def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
-    """That estimates and correlations of a file fit together."""
-    for one in estimates:
-        if not (-math.inf < one.lower <= one.value <= one.upper < math.inf or math.isnan(one.lower)):
-            raise ValueError(f"{one.name}: {one.value} in {one.lower} to {one.upper}")
-    size = len(estimates)
-    if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):
-        raise ValueError(f"the correlations of {size} estimates are a symmetric table")

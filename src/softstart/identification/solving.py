@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+from scipy.linalg import orth
 from scipy.stats import chi2
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, listed
-from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Progress, agreeing
-from softstart.identification.logs import TURN, Log, TorqueIs
+from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Sizes, Spot, agreeing
+from softstart.identification.logs import TURN, Log
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.result import AT_LIMIT, Estimate, Identification
-from softstart.identification.unknowns import FREE, Unknown, chosen, unknowns_of, usual, values_of
+from softstart.identification.unknowns import (
+    FREE,
+    Unknown,
+    chosen,
+    position_is_unknown,
+    unknowns_of,
+    usual,
+    values_of,
+)
 from softstart.parallel import on_one_thread
 from softstart.quantities import show
 from softstart.vibration import reduce_chain
@@ -32,38 +40,30 @@ UNSETTLED: Final = 4.0  # gain of the likelihood by another step, from which the
 CHANCE, INDEPENDENT = 1e-5, 1e-4  # that errors alone leave such a slow torque, such correlations
 WAVES: Final = 20  # torques that change slowly, of which none must be left
 LAGS: Final = 20  # samples over which what is left must not be correlated
-TOO_NOISY: Final = 5.0  # standard deviations of a variance that is larger than the encoder explains
 DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
 
 @on_one_thread
 def identify(
-    logs: Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]],
+    logs: Log | Sequence[Log],
     drive: Drive | Chain | str,
     *,
     free: Iterable[str] | None = None,
-    torque_is: TorqueIs = "measured",
-    columns: dict[str, str] | None = None,
-    torque_constant: float | str | None = None,
-    rated_torque: float | str | None = None,
     searches: int = 12,
-    seed: int = 0,
-    progress: Progress | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Identification:
     """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
 
-    The exact plant under the torque of the log is fitted to the angle or speed of the motor. A search follows
-    each log from its beginning over longer and longer parts, from the guess and from points up to a factor of
-    4 around it, until two searches end at the same minimum. Then the squares are weighted by the covariance
-    of what the encoder rounds and of a torque error that the plant integrates, both of a size that restricted
-    maximum likelihood finds. The ends of intervals are where the likelihood, with all else and that size
-    fitted again, has dropped.
+    The exact plant under the torque of the log is fitted to the angle or speed of the motor: by searches from
+    the guess and from points up to a factor of 4 around it, then by maximum likelihood, with the covariance
+    of what the encoder rounds and of a torque error that the plant integrates. The ends of an interval are
+    where the likelihood, with all else and the size of the errors fitted again, has dropped.
 
     Parameters
     ----------
-    logs : Log, path, or sequence of them
-        Logs of one drive, each beginning at standstill, or their CSV files (`Log.load`).
+    logs : Log or sequence of Log
+        Logs of one drive, each beginning at standstill; `Log.load` reads them from CSV files.
     drive : Drive, Chain or str
         The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
         dominant gap the two masses that stand for it are found. The
@@ -72,19 +72,8 @@ def identify(
         What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping, load
         torque, with a torque demand the lag, and each friction that the guess has; a name after a plus, as
         "+motor_friction", is found beside these.
-    torque_is : {"measured", "demand"}
-        What the torque of files is, see `Log`.
-    columns : dict, optional
-        What files call the columns, see `Log.load`.
-    torque_constant : float or str, optional
-        N m/A: files hold the current in place of the torque, see `Log.load`.
-    rated_torque : float or str, optional
-        N m: the torque at 100 % of files that have it in %; by default that of the drive, or its rated
-        power over its rated speed.
     searches : int
-        At most so many searches.
-    seed : int
-        Of the points at which searches begin.
+        At most so many searches; fewer if two of them end at the best minimum.
     progress : callable, optional
         Called with a text that says what is being done.
 
@@ -115,44 +104,40 @@ def identify(
     """
     drive = load_machine(drive) if isinstance(drive, str) else drive
     machine, drive = drive, reduced_drive(drive)
-    given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
-    if not given:
-        raise InputError("logs: there is none; give a log, or the path of its CSV file.")
-    files: dict[str, Any] = {
-        "columns": columns, "torque_is": torque_is, "torque_constant": torque_constant,
-        "rated_torque": drive.rated if rated_torque is None else rated_torque,
-    }  # fmt: skip
-    read = [one if isinstance(one, Log) else Log.load(one, **files) for one in given]
-    read = [one.summed(float(drive.encoder_lines)) for one in read]
-    if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
-        raise InputError(f"searches = {searches}: give a whole number of 1 or more.")
+    read = [one.summed(float(drive.encoder_lines)) for one in ([logs] if isinstance(logs, Log) else logs)]
+    if not read or searches < 1:
+        raise InputError("logs, searches: there is none; give a log and a whole number of 1 or more.")
     asked, moving = _free(free, drive, read)
     for one in read:
         _check_inertia(one, drive)
-    base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
+    base = drive if moving else drive.design_drive
+    base = base.replace(**({"start_position": "mid-gap"} if moving else {"initial_speed": 0.0}))
     unknowns = unknowns_of(asked, drive, read, [moving for _ in read])
-    fitter = Fitter.of([LogModel.of(one, base) for one in read], unknowns, progress)
-    minima = fitter.search(searches, seed)
-    best = fitter.refined(minima[0][0])
-    doubts, estimates = misfits(fitter, best), list[Estimate]()
+    fitter = Fitter([LogModel.of(one, base) for one in read], unknowns, progress or (lambda _: None))
+    minima = fitter.search(searches)
+    fitter.progress("weights and fit")
+    best, others = fitter.refined(minima[0][0]), list[Point]()
+    doubts = misfits(fitter, best)
     if not doubts:
-        fitter.progress("other explanations")
-        best, others = fitter.explanations(fitter.valued(best, best), bool(_untold(fitter, best)))
+        seek, best = _untold(fitter, best), fitter.valued(best, best)
+        if seek:
+            fitter.progress("other explanations")
+            best, others = fitter.explanations(best)
         doubts = misfits(fitter, best)
-        estimates = [] if doubts else _estimates(fitter, best, others)
-    estimates = estimates or _without_intervals(unknowns, best.x)
+    estimates = _without_intervals(unknowns, best.x) if doubts else _estimates(fitter, best, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
+    source = f"identified from {', '.join(one.name for one in read)}"
+    found = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *_left_out(machine),
-        *doubts,
-        *([] if doubts else _unknown(estimates)),
-        *_other_scale(drive, drive.replace(**changes)),
+        *(doubts or _unknown(estimates)),
+        *_other_scale(drive, found),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
     ]
     return Identification(
-        drive=drive.replace(**changes, source=_source(drive, read)),
+        drive=found,
         guess=drive,
         logs=tuple(read),
         estimates=tuple(estimates),
@@ -196,41 +181,29 @@ def _left_out(chain: Any) -> list[str]:
     ]
 
 
-def _source(drive: Drive, logs: Sequence[Log]) -> str:
-    names = ", ".join(one.name for one in logs)
-    return f"identified from {names}" + (f"; else: {drive.source}" if drive.source else "")
-
-
-def _standing(drive: Drive) -> Drive:
-    """The drive at one position: that of the file."""
-    return drive.design_drive.replace(initial_speed=0.0) if drive.initial_speed else drive.design_drive
-
-
-def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[tuple[str, ...], bool]:
+def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[list[str], bool]:
     """The parameters to find, and whether the position of each log is among them."""
     demand = any(one.torque_is == "demand" for one in logs)
-    moving = (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
-    names = usual(drive, lag=demand)
-    asked = chosen(free, [*names, *([POSITION] if moving else [])], (*FREE, POSITION), "logs")
-    for name in asked if free is not None else ():
-        if name == FILTER and any(one.kind == "angle" for one in logs):
-            raise InputError(f"free = {show(name)}: an angle has no filter of the speed; leave it out.")
-        if name in FREE[6:8] and not demand:
-            raise InputError(
-                f"free = {show(name)}: with a measured torque it is in the samples already; leave it "
-                "out, or log the "
-                'demand (torque_is = "demand").'
-            )
-        if name == "load_torque" and not float(drive.load_torque):
-            raise InputError(f"free = {show(name)}: the guess is 0; give one that has the right sign.")
+    names = usual(drive, lag=demand) + ([POSITION] if position_is_unknown(drive) else [])
+    asked = chosen(free, names, (*FREE, POSITION), "logs")
+    reasons = {}
+    if any(one.kind == "angle" for one in logs):
+        reasons[FILTER] = "an angle has no filter of the speed; leave it out."
+    if not demand:
+        already = "with a measured torque it is in the samples already; leave it out, or log the demand "
+        reasons |= dict.fromkeys(("torque_lag", "computing_delay"), already + '(torque_is = "demand").')
+    if not float(drive.load_torque):
+        reasons["load_torque"] = "the guess is 0; give one that has the right sign."
+    if wrong := [name for name in asked if name in reasons and free is not None]:
+        raise InputError(f"free = {show(wrong[0])}: {reasons[wrong[0]]}")
     if asked in ([], [POSITION]):
         raise InputError("free: there is nothing to find; name parameters, as gap and stiffness.")
     # the filter, which is not the drive's, last
-    return tuple(name for name in FREE if name in asked), POSITION in asked
+    return [name for name in FREE if name in asked], POSITION in asked
 
 
 def _check_inertia(log: Log, drive: Drive) -> None:
-    """Refuse a log whose units cannot be right: torque over acceleration is not near the inertia guessed."""
+    """Refuse a log whose units cannot be right: torque over acceleration is far from the inertia guessed."""
     speed, impulse = log.moved
     inertia = float(np.max(np.abs(impulse))) / max(float(np.max(np.abs(speed))), 1e-300)
     low, high = float(drive.J1), float(drive.J1 + drive.J2)
@@ -244,16 +217,16 @@ def _check_inertia(log: Log, drive: Drive) -> None:
     )
 
 
-def _untold(fitter: Fitter, best: Point) -> list[int]:
-    """The numbers that the logs do not tell, were all intervals symmetric."""
-    each = enumerate(zip(fitter.unknowns, best.x, fitter.halves(best), strict=True))
-    return [i for i, (one, x, half) in each if one.kind != "offset" and not one.known(x, half, one.guess)]
+def _untold(fitter: Fitter, best: Point) -> bool:
+    """Whether there is a number that the logs do not tell, were all intervals symmetric."""
+    each = zip(fitter.unknowns, best.x.tolist(), fitter.halves(best).tolist(), strict=True)
+    return any(one.kind != "offset" and not one.known(x, half, one.guess) for one, x, half in each)
 
 
 def _without_intervals(unknowns: Sequence[Unknown], x: Vector) -> list[Estimate]:
     """The best fit, of which no number is called known."""
     return [
-        Estimate(one.title, one.value(number), math.nan, math.nan, False, reason="no interval is stated")
+        Estimate(one.title, one.value(number), math.nan, math.nan, False, "no interval is stated")
         for one, number in zip(unknowns, x.tolist(), strict=True)
         if one.kind != "offset"
     ]
@@ -271,13 +244,13 @@ def _correlations(fitter: Fitter, best: Point) -> Matrix:
 def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
     found, lost = [], set[str]()
-    halves, untold, covariance = fitter.halves(best), _untold(fitter, best), fitter.covariance(best)
+    halves, covariance = fitter.halves(best), fitter.covariance(best)
     for i, (one, x, half) in enumerate(zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)):
         if one.kind == "offset":
             continue
         fitter.progress(f"interval of {one.title}")
         ends = [fitter.end(i, sign, half, best, others) for sign in (-1.0, 1.0)]
-        known = i not in untold and one.known(x, 0.5 * (ends[1] - ends[0]))
+        known = one.known(x, half, one.guess) and one.known(x, 0.5 * (ends[1] - ends[0]))
         known = known and not (one.kind == "position" and "gap" in lost)  # a share of the gap
         limited = one.limited(x) or (known and any(map(one.limited, ends)))
         reason = AT_LIMIT if limited else "" if known else _why(i, covariance, fitter.unknowns)
@@ -321,34 +294,21 @@ def _other_scale(guess: Drive, found: Drive) -> list[str]:
     if 1.0 / DOUBTFUL < ratio < DOUBTFUL:
         return []
     return [
-        f"The inertias found are {ratio:.2g} times those of the guess. If that is not off so far, "
-        "look at the "
-        "units of the log: rpm called rad/s makes inertias and stiffness 9.5 times too small and the gap as "
-        "much too wide, and fits as well."
+        f"The inertias found are {ratio:.2g} times those of the guess. If that is not off so far, look at "
+        "the units of the log: rpm called rad/s makes inertias and stiffness 9.5 times too small and the gap "
+        "as much too wide, and fits as well."
     ]
 
 
 def misfits(fitter: Fitter, best: Point) -> list[str]:
     """What the logs show that the model has not."""
-    sizes, shown = best.sizes, list[str]()
-    largest = fitter.largest_torque
-    usual = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
-    if sizes.ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * largest):
+    sizes, largest, shown = best.sizes, fitter.largest_torque, list[str]()
+    usual_torque = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
+    if sizes.ripple > min(LARGE_RIPPLE * usual_torque, MOST_RIPPLE * largest):
         share = 100.0 * sizes.ripple / largest
         shown.append(f"a torque error of {sizes.ripple:.3g} N m in each sample, {share:.0f} % of the largest")
-    slow = min(
-        _slow_torque(
-            one.rotation @ one.response / root[:, None], one.jacobian / root[:, None], one.residual / root
-        )
-        for one in best.spots
-        for root in [np.sqrt(one.variance(sizes))]
-    )
-    if slow < CHANCE:
+    if (slow := min(_slow_torque(one, sizes) for one in best.spots)) < CHANCE:
         shown.append(f"a torque that changes slowly (chance {slow:.1g})")
-    counted = all(one.log.kind == "angle" and one.log.count for one in fitter.models)
-    samples = sum(one.residual.size for one in best.spots)
-    if counted and sizes.noise**2 - 1.0 > TOO_NOISY * math.sqrt(2.0 / samples):
-        shown.append(f"an angle {sizes.noise:.3g} times as far off as the encoder rounds")
     for model, spot in zip(fitter.models, best.spots, strict=True):
         left = spot.innovations(sizes)
         if (chance := _whiteness(left)) < INDEPENDENT:
@@ -368,7 +328,7 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
         else one
         for one in fitter.unknowns
     ]
-    if replace(fitter, unknowns=tuple(wider)).step(best)[1] > UNSETTLED:
+    if replace(fitter, unknowns=wider).step(best)[1] > UNSETTLED:
         ends = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
         where = f"beyond the limit of the search for {listed(ends)}" if ends else "elsewhere"
         notes.append(f"The fit would be better {where}: begin from another guess (--set).")
@@ -383,25 +343,19 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     """The friction, or the offset of the torque, that explains most of what is left, if it is sure."""
     residual, jacobian = best.white
     names, drive = {one.name for one in fitter.unknowns}, fitter.models[0].guess
-    steps = {
-        one.name: STEP * one.scale
-        for one in unknowns_of([name for name in FRICTIONS if name not in names], drive, (), ())
-    }
+    missing = unknowns_of([name for name in FRICTIONS if name not in names], drive, (), ())
+    steps = {one.name: STEP * one.scale for one in missing}
     had = {name: float(getattr(drive, name)) for name in steps}
-    columns: dict[str, list[Vector]] = {name: [] for name in (*steps, "offset")}
-    for i, (model, data, spot) in enumerate(zip(fitter.models, fitter.data, best.spots, strict=True)):
+    logs = []  # of each the shape of each effect in what is left
+    for i, (model, spot) in enumerate(zip(fitter.models, best.spots, strict=True)):
         values = values_of(fitter.unknowns, best.x, i) | had
         each = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
-        signals = model.signals(each, spot.error)[:, data.rows] / data.root
-        shapes = [
-            (signal - signals[0]) / step for signal, step in zip(signals[1:], steps.values(), strict=True)
-        ]
+        signals = model.signals(each, spot.error)[:, model.rows] / model.root
+        shapes = [(one - signals[0]) / step for one, step in zip(signals[1:], steps.values(), strict=True)]
         shapes.append(math.sqrt(model.block) * spot.response.sum(axis=1))
-        for shape, column in zip(shapes, columns.values(), strict=True):
-            column.append(spot.rotation @ shape / np.sqrt(spot.variance(best.sizes)))
+        logs.append(np.array(shapes) @ spot.rotation.T / np.sqrt(spot.variance(best.sizes)))
     sure = [(SURE, "", 0.0, 0.0)]
-    for name, parts in columns.items():
-        shape = np.concatenate(parts)
+    for name, shape in zip((*steps, "offset"), np.hstack(logs), strict=True):
         alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
         strength = float(alone @ alone)
         if strength < 1e-6 * float(shape @ shape):
@@ -425,18 +379,18 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     ]
 
 
-def _slow_torque(response: Matrix, jacobian: Matrix, residual: Vector) -> float:
+def _slow_torque(spot: Spot, sizes: Sizes) -> float:
     """Chance that no torque that changes slowly is left: the share of it in what is left is chi-square.
 
-    Of the torques cos(k pi t/T), of which the parameters explain a part. All are whitened.
+    Of the torques cos(k pi t/T), of which the parameters explain a part.
     """
-    count = response.shape[1]
+    root = np.sqrt(spot.variance(sizes))
+    count, known = spot.response.shape[1], spot.jacobian.shape[1]
     waves = np.cos(math.pi * np.outer(np.arange(count) + 0.5, np.arange(min(WAVES, count))) / count)
-    both = np.column_stack([jacobian, response @ waves])
+    both = np.column_stack([spot.jacobian, spot.rotation @ spot.response @ waves]) / root[:, None]
     both /= np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-    of_all, values, _ = np.linalg.svd(both, full_matrices=False)
-    of_model, known, _ = np.linalg.svd(both[:, : jacobian.shape[1]], full_matrices=False)
-    of_all, of_model = of_all[:, values > 1e-6 * values[0]], of_model[:, known > 1e-6 * known[0]]
+    of_all, of_model = orth(both, rcond=1e-6), orth(both[:, :known], rcond=1e-6)
+    residual = spot.residual / root
     gained = float(np.sum((of_all.T @ residual) ** 2) - np.sum((of_model.T @ residual) ** 2))
     return float(chi2.sf(max(gained, 0.0), max(of_all.shape[1] - of_model.shape[1], 1)))
 

@@ -17,13 +17,11 @@ from softstart.identification.model import FILTER, POSITION
 from softstart.identification.result import WIDEST
 from softstart.quantities import nearest, show
 
-FREE: Final = (
-    "motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque",
-    "torque_lag", "computing_delay", *FRICTIONS, FILTER,
-)  # fmt: skip
+USUAL: Final = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
+FREE: Final = (*USUAL, "load_torque", "torque_lag", "computing_delay", *FRICTIONS, FILTER)
 FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 times as far
 LESS_KNOWN: Final = ("damping", "torque_lag", "computing_delay", FILTER)  # and these a factor of 100
-MOST_LOAD: Final = 0.99  # of the starting torque
+MOST_LOAD: Final = 0.99  # of the starting torque: with more the drive could not start
 MOST_FRICTION: Final = 3.0  # units; as far as a search goes
 LEAST_FRICTION: Final = 1e-8  # units; less is none, which the plant's events could not tell from rounding
 # a power where a logarithm would stretch what is small until no derivative is left of it, and the interval of
@@ -36,9 +34,8 @@ POWERS: Final = {"gap": 0.5, "load_torque": 1.0} | dict.fromkeys(FRICTIONS, 1.0)
 class Unknown:
     """One number x of a fit, and the value that it stands for.
 
-    x = ln(value/scale), or (value/scale)^power. A position in the gap is 1 - 2 x^2, so that x is the root of
-    the share of the gap before the driving flank: with the root of the gap it makes the time to that flank.
-    An offset of an angle is x itself. What is of one log only has its number in `log`.
+    x = ln(value/scale), or (value/scale)^power. A position in the gap is 1 - 2 x^2: with the root of the gap
+    x makes the time to the driving flank. An offset of an angle is x itself.
     """
 
     name: str
@@ -48,7 +45,7 @@ class Unknown:
     upper: float
     scale: float = 1.0
     power: float = 1.0
-    log: int | None = None
+    log: int | None = None  # the only one that it is of
 
     @property
     def title(self) -> str:
@@ -63,8 +60,7 @@ class Unknown:
     @property
     def weight(self) -> float:
         """1/variance of x beforehand: e^3, 3 units of a power, a quarter of a position."""
-        known = {"position": 16.0, "offset": 0.0}
-        return known.get(self.kind, 1.0 / 9.0) + 1e-12
+        return {"position": 16.0, "offset": 0.0}.get(self.kind, 1.0 / 9.0) + 1e-12
 
     def value(self, x: float) -> float:
         """The value at this x.
@@ -90,6 +86,15 @@ class Unknown:
             return math.log(value / self.scale)
         return float((value / self.scale) ** self.power)
 
+    def drawn(self, draw: float) -> float:
+        """The x at which a search begins, for a number drawn from 0 to 1."""
+        factor = FACTOR ** (2.0 * draw - 1.0)
+        if self.kind == "position":
+            return math.sqrt(draw)
+        if self.is_friction:
+            return self.guess + math.log(factor)
+        return self.number(self.value(self.guess) * factor)
+
     def share(self, x: float, half: float) -> float:
         """Half an interval of x as a share of the value, to first order."""
         return half if self.kind == "logarithm" else half / max(self.power * x, 1e-300)
@@ -98,9 +103,8 @@ class Unknown:
         """Whether half an interval of x tells what the value is.
 
         Within a factor of 3; a friction within a tenth of the torque that accelerates, a position within half
-        the gap. The value found must not decide: the log tells a small load torque in N m, and where it comes
-        out too large by chance, its relative interval is narrow. So where x is above its guess, the interval
-        is compared with the guess (at most by the factor of 3 that a guess may be off).
+        the gap. A small load torque that comes out too large by chance has a narrow relative interval: where
+        x is above its guess, the interval is compared with the guess, at most by that factor of 3.
 
         >>> load, position = unknowns_of(["load_torque"], Drive.load("crane-4amtkf"), (), [True])
         >>> load.known(1.0, 0.5), load.known(1.5, 0.6, guess=1.0), position.known(0.7, 0.2)
@@ -123,18 +127,14 @@ class Unknown:
 def unknowns_of(
     names: Sequence[str], drive: Drive, logs: Sequence[Log], moving: Sequence[bool]
 ) -> tuple[Unknown, ...]:
-    """The parameters that all logs share, then the position of each log that is `moving`, then offsets.
-
-    The unit of a friction is the one that takes a tenth of the torque that accelerates, at the target speed
-    if it is viscous; that of gap and load torque is the drive's own.
-    """
+    """The parameters that all logs share, then the position of each log that is `moving`, then offsets."""
+    # the unit of a friction takes a tenth of the torque that accelerates, if viscous at the target speed
     torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
-    units = {"motor_friction": torque} | dict.fromkeys(FRICTIONS[1:], torque / float(drive.target_speed))
     found = []
     for name in names:
         value, power = float(getattr(drive, name, 0.0)), POWERS.get(name)
         if name in FRICTIONS:
-            unit = units[name]
+            unit = torque if name == FRICTIONS[0] else torque / float(drive.target_speed)
             found.append(Unknown(name, "power", value / unit, 0.0, MOST_FRICTION, unit))
             continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
@@ -142,23 +142,18 @@ def unknowns_of(
         value = value or float(np.median(np.diff(logs[0].time)))
         reach = 100.0 if name in LESS_KNOWN else 3.0 * FACTOR
         if power is None:
-            end = math.log(reach)
-            scale = math.copysign(1.0, value)
-            middle = math.log(abs(value))
-            found.append(Unknown(name, "logarithm", middle, middle - end, middle + end, scale))
-            continue
-        most = reach
-        if name == "load_torque":  # more is no drive: it could not start
-            most = min(reach, MOST_LOAD * float(drive.Ms) / abs(value))
-        found.append(Unknown(name, "power", 1.0, reach**-power, most**power, value, power))
-    for i in range(len(moving)):
-        if moving[i]:
-            found.append(Unknown(POSITION, "position", math.sqrt(0.5), 0.0, 1.0, log=i))
+            middle, end, sign = math.log(abs(value)), math.log(reach), math.copysign(1.0, value)
+            found.append(Unknown(name, "logarithm", middle, middle - end, middle + end, sign))
+        else:
+            most = MOST_LOAD * float(drive.Ms) / abs(value) if name == "load_torque" else reach
+            found.append(Unknown(name, "power", 1.0, reach**-power, min(reach, most) ** power, value, power))
+    half = math.sqrt(0.5)
+    found += [Unknown(POSITION, "position", half, 0.0, 1.0, log=i) for i, one in enumerate(moving) if one]
     for i, log in enumerate(logs):
         if log.kind == "angle":
             first = -float(log.values[np.isfinite(log.values)][0])
-            reach = max(20.0 * log.count, 100.0 * log.scale)
-            found.append(Unknown("offset", "offset", first, first - reach, first + reach, log=i))
+            room = max(20.0 * log.count, 100.0 * log.scale)
+            found.append(Unknown("offset", "offset", first, first - room, first + room, log=i))
     return tuple(found)
 
 
@@ -171,15 +166,20 @@ def values_of(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, flo
     }
 
 
+def position_is_unknown(drive: Drive) -> bool:
+    """Whether a log may begin anywhere in the gap."""
+    return (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
+
+
 def usual(drive: Drive, *, lag: bool) -> list[str]:
     """What is found where nothing is said: what the drive has, and the lag of its torque if that shows.
 
     >>> usual(Drive.load("crane-4amtkf").replace(motor_friction=1.5), lag=True)[-2:]
     ['load_torque', 'motor_friction']
     """
-    others = ("gap", "load_torque", *(["torque_lag"] if lag else []), *FRICTIONS)
-    missing = {name for name in others if float(getattr(drive, name)) == 0.0}
-    return [name for name in (*FREE[:5], *others[1:]) if name not in missing]
+    others = ["load_torque", *(["torque_lag"] if lag else []), *FRICTIONS]
+    needed = {"gap", *others}
+    return [one for one in (*USUAL, *others) if one not in needed or float(getattr(drive, one))]
 
 
 def chosen(

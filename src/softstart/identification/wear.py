@@ -42,16 +42,15 @@ class Line:
         >>> round(line.slope, 6), round(math.sqrt(line.covariance[1, 1]), 6)
         (0.01, 0.005)
         """
-        rows = np.column_stack([np.ones_like(years), years]) / deviations[:, None]
-        covariance = np.linalg.inv(rows.T @ rows)
-        start, slope = (covariance @ rows.T @ (gaps / deviations)).tolist()
+        (slope, start), covariance = np.polyfit(years, gaps, 1, w=1.0 / deviations, cov="unscaled")
         squares = float(np.sum(((start + slope * years - gaps) / deviations) ** 2))
-        freedom = gaps.size - 2
-        chance = float(chi2.sf(squares, freedom)) if freedom else 1.0
-        if squares <= freedom or not freedom:
-            return Line(start, slope, np.asarray(covariance), chance, INTERVAL.quantile)
-        quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
-        return Line(start, slope, np.asarray(squares / freedom * covariance), chance, quantile)
+        chance, quantile, freedom = 1.0, INTERVAL.quantile, gaps.size - 2
+        if freedom:
+            chance = float(chi2.sf(squares, freedom))
+        if freedom and squares > freedom:
+            covariance = squares / freedom * covariance
+            quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
+        return Line(float(start), float(slope), covariance[::-1, ::-1], chance, quantile)
 
     @property
     def growth(self) -> tuple[float, float, float]:
@@ -77,59 +76,28 @@ class Line:
         """
         (v00, v01), (_, v11) = (self.quantile**2 * self.covariance).tolist()
         off = self.start - gap
-        middle = -off / self.slope if self.slope > 0.0 else math.nan
         # (off + slope t)^2 <= v00 + 2 v01 t + v11 t^2
         a, b, c = self.slope**2 - v11, off * self.slope - v01, off**2 - v00
-        root = b * b - a * c
-        if a > 0.0 and self.slope > 0.0:
-            ends = sorted(((-b - math.sqrt(max(root, 0.0))) / a, (-b + math.sqrt(max(root, 0.0))) / a))
-            return middle, ends[0], ends[1]
+        middle = -off / self.slope if self.slope > 0.0 else math.nan
+        if a > 0.0 and self.slope <= 0.0:  # it shrinks
+            return math.nan, math.inf, math.inf
+        root = math.sqrt(max(b * b - a * c, 0.0))
+        low, high = sorted(((-b - root) / a, (-b + root) / a))
         if a > 0.0:
-            return math.nan, math.inf, math.inf  # it shrinks
-        earliest = max((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if root > 0.0 else -math.inf
-        return middle, earliest, math.inf
+            return middle, low, high
+        return middle, high if b * b > a * c else -math.inf, math.inf
 
 
 @dataclass(frozen=True, eq=False)
 class Wear:
-    """How the gap of a drive grows, and when it reaches its limit.
+    """How the gap of a drive grows, and when it reaches its limit."""
 
-    Attributes
-    ----------
-    found, names, dates : tuple
-        The identifications, the oldest first; what they are called, and when their logs were taken.
-    line : Line
-        The growth of the gap.
-    limit : float or None
-        The gap at which the drive is worn, rad.
-    notes : tuple of str
-        What else has changed, and what the line cannot tell.
-
-    Examples
-    --------
-    >>> from softstart import Drive, identify
-    >>> from softstart.identification.planning import made_up_log
-    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-    >>> worn = crane.replace(gap=0.1)
-    >>> plan = {"log_period": 8e-3, "ripple": 1.0}
-    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
-    ...     for one in (crane, worn)]
-    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
-    >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
-    True
-
-    References
-    ----------
-    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
-    docs/identification.md.
-    """
-
-    found: tuple[Identification, ...]
+    found: tuple[Identification, ...]  # the oldest first
     names: tuple[str, ...]
-    dates: tuple[date, ...]
+    dates: tuple[date, ...]  # when their logs were taken
     line: Line
-    limit: float | None
-    notes: tuple[str, ...]
+    limit: float | None  # the gap at which the drive is worn, rad
+    notes: tuple[str, ...]  # what else has changed, and what the line cannot tell
 
     @property
     def gaps(self) -> tuple[Estimate, ...]:
@@ -146,24 +114,21 @@ class Wear:
     def summary(self) -> dict[str, Any]:
         """Everything as plain data."""
         growth = dict(zip(("growth", "growth_lower", "growth_upper"), self.line.growth, strict=True))
-        worn = ("worn", "worn_earliest", "worn_latest")
+        worn = zip(("worn", "worn_earliest", "worn_latest"), self.worn or (), strict=False)
+        gaps = [
+            {
+                "name": name,
+                "date": str(when),
+                "gap": gap.value,
+                "gap_lower": gap.lower,
+                "gap_upper": gap.upper,
+            }
+            for name, when, gap in zip(self.names, self.dates, self.gaps, strict=True)
+        ]
         return {
-            "drive": self.found[-1].drive.name,
-            "gaps": [
-                {
-                    "name": name,
-                    "date": str(when),
-                    "gap": gap.value,
-                    "gap_lower": gap.lower,
-                    "gap_upper": gap.upper,
-                }
-                for name, when, gap in zip(self.names, self.dates, self.gaps, strict=True)
-            ],
-            **growth,
-            "limit": self.limit,
-            **({} if self.worn is None else {k: v and str(v) for k, v in zip(worn, self.worn, strict=True)}),
-            "notes": list(self.notes),
-        }
+            "drive": self.found[-1].drive.name, "gaps": gaps, **growth, "limit": self.limit,
+            **{key: when and str(when) for key, when in worn}, "notes": list(self.notes),
+        }  # fmt: skip
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
@@ -198,7 +163,7 @@ def follow_wear(
     Returns
     -------
     Wear
-        Growth of the gap with its interval, and the date of the limit.
+        `line.growth`, rad a year, with its interval; `worn`, the date of the limit with its interval; notes.
 
     Raises
     ------
@@ -207,45 +172,56 @@ def follow_wear(
 
     Examples
     --------
-    >>> follow_wear(["nowhere"], ["2026"])
-    Traceback (most recent call last):
-    softstart.errors.InputError: wear: one identification shows no growth; name two or more, of other dates.
+    >>> from softstart import Drive, identify
+    >>> from softstart.identification.planning import made_up_log
+    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
+    >>> plan = {"log_period": 8e-3, "ripple": 1.0}
+    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
+    ...     for one in (crane, crane.replace(gap=0.1))]
+    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
+    >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
+    True
 
     References
     ----------
-    Fieller's theorem: `Wear`; docs/identification.md.
+    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
+    docs/identification.md.
     """
-    given = [found] if isinstance(found, Identification | str | os.PathLike) else list(found)
-    if len(given) < 2:
+    if isinstance(found, Identification | str | os.PathLike) or len(found) < 2:
         raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
-    names = [f"log {i}" if isinstance(one, Identification) else str(one) for i, one in enumerate(given, 1)]
-    if len(dates) != len(given):
+    if len(dates) != len(found):
         raise InputError(
-            f"dates: there are {len(dates)} for {len(given)} identifications; give the date of each, as "
+            f"dates: there are {len(dates)} for {len(found)} identifications; give the date of each, as "
             "2026-05-31."
         )
     rows = []
-    for when, name, one in zip(dates, names, given, strict=True):
+    for i, (when, one) in enumerate(zip(dates, found, strict=True), 1):
+        name = f"log {i}" if isinstance(one, Identification) else str(one)
         read = one if isinstance(one, Identification) else Identification.load(one)
         gap = next((estimate for estimate in read.estimates if estimate.name == "gap"), None)
         if gap is None or not gap.known:
-            reason = gap.reason if gap else "it was not free"
-            raise InputError(f"wear: {name} does not know the gap; {reason}.")
-        rows.append((_date_of(when), name, read))
+            raise InputError(
+                f"wear: {name} does not know the gap; {gap.reason if gap else 'it was not free'}."
+            )
+        rows.append((_date_of(when), name, read, gap))
     rows.sort(key=lambda row: row[0])
-    days, names, each = map(list, zip(*rows, strict=True))
+    days, names, each, gaps = zip(*rows, strict=True)
     if days[0] == days[-1]:
         raise InputError(f"dates: all identifications are of {days[0]}; growth takes two dates.")
-    gaps = [one["gap"] for one in each]
     line = Line.through(
         np.array([(one - days[0]).days / YEAR for one in days]),
         np.array([one.value for one in gaps]),
-        np.array([0.5 * (one.upper - one.lower) / INTERVAL.quantile for one in gaps]),
+        np.array([_deviation(one) for one in gaps]),
     )
     worn = None if limit is None else float(to_si(limit, "rad", name="limit"))
     if worn is not None and not worn > 0.0:
         raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
-    return Wear(tuple(each), tuple(names), tuple(days), line, worn, tuple(_notes(each, line)))
+    return Wear(each, names, days, line, worn, tuple(_notes(each, line)))
+
+
+def _deviation(one: Estimate) -> float:
+    """The standard deviation of an estimate."""
+    return 0.5 * (one.upper - one.lower) / INTERVAL.quantile
 
 
 def _date_of(given: str | date) -> date:
@@ -266,12 +242,6 @@ def _date_after(first: date, years: float) -> date | None:
 def _notes(each: Sequence[Identification], line: Line) -> list[str]:
     """What else has changed, and what the line cannot tell."""
     notes = []
-    growth, lower, _ = line.growth
-    if lower <= 0.0:
-        notes.append(
-            f"The growth of the gap, {growth:.2g} rad a year, is not told apart from none; an identification "
-            "later on, or with narrower intervals, will tell."
-        )
     if line.chance < CROOKED:
         notes.append(
             f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
@@ -280,8 +250,7 @@ def _notes(each: Sequence[Identification], line: Line) -> list[str]:
     first, last = ({one.name: one for one in found.shared if one.known} for found in (each[0], each[-1]))
     for name in (name for name in first if name in last and name != "gap"):
         both = first[name], last[name]
-        spread = math.hypot(*(0.5 * (one.upper - one.lower) / INTERVAL.quantile for one in both))
-        if abs(both[1].value - both[0].value) > NOT_BY_CHANCE * spread:
+        if abs(both[1].value - both[0].value) > NOT_BY_CHANCE * math.hypot(*map(_deviation, both)):
             notes.append(
                 f"{name} has changed from {both[0].value:.4g} to {both[1].value:.4g}, by more than its "
                 "intervals: another load or temperature, wear of more than the gap, or, if it is an inertia, "

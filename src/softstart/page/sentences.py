@@ -50,8 +50,8 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
 def plain(sentence: str) -> str:
     """A sentence without the words of the command line, which a page does not have.
 
-    >>> plain("minimise = life: it is below 0; leave out --torque-constant (softstart plan).")
-    'it is below 0; leave out torque constant.'
+    >>> plain("minimise = life: it is below 0; leave out --max-torque (softstart plan).")
+    'it is below 0; leave out max torque.'
     """
     text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)
     return re.sub(r"--([a-z][\w-]*)", lambda option: option[1].replace("-", " "), text)

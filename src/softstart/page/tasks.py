@@ -242,13 +242,12 @@ def identified(
         path = Path(folder, file_name(Path(name).stem, suffix=".csv"))
         path.write_bytes(content)
         try:
-            rated = getattr(guess, "rated", None)  # not of a chain
-            log = Log.load(path, columns=columns, torque_is=torque_is, rated_torque=rated)
+            log = Log.load(path, columns=columns, torque_is=torque_is)
         except InputError as error:
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
     found = identify(log, guess, progress=lambda doing: progress(None, doing))
-    drive = found.rounded().drive
-    return Answer(shown(identification_sheet(found)), {"identified-drive.toml": drive.to_toml()}, drive=drive)
+    files = {"identified-drive.toml": found.drive.to_toml()}
+    return Answer(shown(identification_sheet(found)), files, drive=found.drive)
 
 
 def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress: Progress) -> Answer:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.drive import PARAMETERS
-from softstart.identification.model import FILTER, POSITION, LogModel
+from softstart.identification.model import FILTER
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
@@ -101,32 +101,25 @@ def identification_sheet(
         notes=found.notes,
         figures={"logs": found.plot} if found.logs else {},
         files=files,
-        machine=found.rounded().drive,
+        machine=found.drive,
     )
 
 
 def figure(found: Identification) -> Any:
     """Each log beside the start of the drive found, and below what is left."""
     count = len(found.logs)
-    estimates = {one.name: one.value for one in found.estimates}
-    values = {name: value for name, value in estimates.items() if not name.startswith(POSITION)}
     with drawing():
         made, axes = new_figure(3, count, (4.5 + 3.5 * count, 6.0), squeeze=False, sharex="col")
         entitle(made, f"{found.drive.name}: what was logged, and the start of the drive found")
         for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
-            own = f"{POSITION} {i + 1}"
-            position = {POSITION: estimates[own]} if own in estimates else {}
-            base = found.guess.replace(start_position="mid-gap") if position else found.guess.design_drive
-            model = LogModel.of(log, base).signals([values | position])[0]
             seen, unit = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
             time, steps = log.time - log.time[0], "steps-post" if log.torque_is == "demand" else "default"
-            offset = float(np.median(log.values[seen] - model[seen])) if log.kind == "angle" else 0.0
             torque, motion, rest = axes[:, i]
             head(torque, log.name, "torque, N m")
             torque.plot(time, log.torque, color=COLOURS[0], drawstyle=steps)
             head(motion, "", f"{log.kind}, {unit}")
             motion.plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
-            motion.plot(time, model + offset, color=COLOURS[1], lw=1.0, label="drive found")
+            motion.plot(time[seen], log.values[seen] + left, color=COLOURS[1], lw=1.0, label="drive found")
             motion.legend(loc="best")
             head(rest, "", f"drive - log, {unit}", "time, s")
             rest.plot(time[seen], left, color=COLOURS[2], lw=0.8)

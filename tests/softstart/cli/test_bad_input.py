@@ -88,7 +88,10 @@ ONE_SENTENCE = {
     "too long output": ([*START, "direct", "--out", "x" * 300], ["--out"]),
     # the rest
     "exposed without a token": (["serve", "--expose"], ["--host ADDRESS and --token TOKEN"]),
-    "no folder of an identification": (["wear", "NOFOLDER"], ['"NOFOLDER"', "identification.json"]),
+    "no folder of an identification": (
+        ["wear", "NOFOLDER", "ALSO", "--dates", "2025-01-01,2026-01-01"],
+        ["NOFOLDER/identification.json: there is no such file"],
+    ),
     "unknown shipped drive": (["drives", "crane"], ["did you mean crane-4amtkf?"]),
     "unknown controller to describe": (["controllers", "rmp"], ["did you mean ramp?"]),
     "unknown study": (["study", "papr-g"], ['did you mean "paper-g"?']),

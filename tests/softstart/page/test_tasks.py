@@ -21,6 +21,7 @@ from softstart import (
     Chain,
     Drive,
     InputError,
+    Log,
     SimulationError,
     compare,
     fatigue,
@@ -112,8 +113,8 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     log.to_csv(tmp_path / "rig.csv")
     content = (tmp_path / "rig.csv").read_bytes()
     found, text, _ = done(tasks.identified, content, "rig.csv", drive, "demand", {})
-    alone = identify(tmp_path / "rig.csv", drive, torque_is="demand")
-    assert found.drive == alone.rounded().drive
+    alone = identify(Log.load(tmp_path / "rig.csv", torque_is="demand"), drive)
+    assert found.drive == alone.drive
     assert Drive.from_toml(found.files["identified-drive.toml"]).gap == found.drive.gap
     assert all(plain(note) in text for note in alone.notes)
     with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none is called time"):
@@ -127,7 +128,7 @@ def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path)
     played = made_up_log(reduced_drive(chain), "two levels, then reverse", log_period=4e-3, ripple=1.0)
     chain_log(chain, played).to_csv(tmp_path / "rig.csv")
     found, _, _ = done(tasks.identified, (tmp_path / "rig.csv").read_bytes(), "rig.csv", chain, "demand", {})
-    written = identify(tmp_path / "rig.csv", chain, torque_is="demand").rounded().drive
+    written = identify(Log.load(tmp_path / "rig.csv", torque_is="demand"), chain).drive
     assert (found.drive.gap, found.drive.stiffness) == (written.gap, written.stiffness)
     assert found.drive.units == chain.units
 
