@@ -49,8 +49,9 @@ def test_killed_at_random_instants_it_goes_on(sweeping, uninterrupted, tmp_path)
         before = after
     told = []
     found = sweep(
-        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=folder, workers=1, progress=told.append
-    )
+        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=folder, workers=1, chunk=sweeping.chunk,
+        progress=told.append,
+    )  # fmt: skip
     assert told[0].done == told[0].before >= sweeping.chunk * len(before)
     assert [now.done for now in told[1:]] == sorted({now.done for now in told[1:]})
     assert told[-1].done == told[-1].starts == 12_000
@@ -64,7 +65,7 @@ def test_a_finished_sweep_is_opened_and_not_computed_again(tmp_path):
     first = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")}
     told = []
-    again = sweep(CRANE, "ramp", GRID, to=str(tmp_path / "a"), progress=told.append, chunk=4)
+    again = sweep(CRANE, "ramp", GRID, to=str(tmp_path / "a"), progress=told.append, chunk=2)
     assert again.identical(first)
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")} == before
     assert [(now.done, now.before) for now in told] == [(6, 6)]
@@ -84,7 +85,7 @@ def test_it_is_a_zarr_folder_that_says_what_is_missing(tmp_path):
     assert begun.status.values.tolist() == [[0, 0], [-1, -1], [-1, -1]]
     assert np.isnan(begun.k_dyn.values[1:]).all()
     assert begun.k_dyn.chunks == ((1, 1, 1), (2,))
-    whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a")
+    whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
     memory = sweep(CRANE, "ramp", GRID, **OPTIONS)
     assert whole.drop_attrs().identical(memory.drop_attrs())
     assert (
@@ -145,14 +146,14 @@ def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, n
     lost = 2 if damage is swap else 1
     told = []
     with warnings.catch_warnings(record=True, action="always") as sentences:
-        again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+        again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
     assert (told[0].before, told[-1].done) == (6 - 2 * lost, 6)
     assert again.identical(xarray.open_zarr(pristine, chunks=None))
     assert len(sentences) == 1
     assert sentences[0].category is DamagedWarning
     assert name in str(sentences[0].message)
     told.clear()
-    sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+    sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
     assert [now.before for now in told] == [6]
     assert {p.relative_to(folder) for p in folder.rglob("*")} == {
         p.relative_to(pristine) for p in pristine.rglob("*")
@@ -210,6 +211,7 @@ def test_a_folder_that_was_deleted_leaves_no_memory(tmp_path):
         ({"grid": dict(reversed(GRID.items()))}, "another order of the axes;"),
         ({"grid": {**GRID, "stiffness": [300.0]}}, "another order of the axes and axis stiffness;"),
         ({"until": 0.5}, "another until;"),
+        ({"chunk": 1}, "another chunk;"),
         ({"figures": ["k_dyn"], "fitted_to": CRANE}, "another figures and fitted_to;"),
     ],
 )  # fmt: skip
