@@ -37,7 +37,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A chunk: its place among the chunks, how many starts it has, and the values that vary, see `values_of`."""
+    """A chunk: its place among the chunks, its number of starts, and what varies, see `values_of`."""
 
     index: tuple[int, ...]
     question: Question

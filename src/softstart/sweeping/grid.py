@@ -39,9 +39,10 @@ def sizes_of(grid: Grid) -> dict[str, int]:
 def values_of(grid: Grid) -> dict[str, Any]:
     """Each coordinate with its value for every start of a grid; the one text of a coordinate of texts."""
     sizes = sizes_of(grid)
+    spread = {name: one.set_dims(sizes) for name, one in grid.items()}  # type: ignore[no-untyped-call]
     return {
-        name: one.set_dims(sizes).values.ravel() if one.dtype.kind == "f" else str(one.values[0])
-        for name, one in grid.items()
+        name: one.values.ravel() if one.dtype.kind == "f" else str(one.values.flat[0])
+        for name, one in spread.items()
     }
 
 

@@ -111,8 +111,9 @@ class Store:
                 "most); give to=FOLDER (--out DIR), where a sweep may have any size."
             )
         with ExitStack() as stack:
-            if self._target is not None and not (self._target.path / LIST).exists():
-                if any(not one.is_dir() for one in self._target.path.rglob("*")):
+            if self.path is not None and self._target is not None:
+                others = (one for one in self.path.rglob("*") if not one.is_dir())
+                if not (self.path / LIST).exists() and any(others):
                     raise self._target.foreign()
             stack.enter_context(self._list)
             if self._target is None:

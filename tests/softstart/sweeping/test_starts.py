@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from softstart import Command, Drive, InputError, PlainController, Status, records, simulate, sweep
 from softstart.controller import make_controller, parameter, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
-from softstart.start.recommendation import Row
 from softstart.start.batch import named
+from softstart.start.recommendation import Row
 from softstart.sweeping.summary import summarise
 from softstart.views.sweeps import conclusion, sweep_figure
 
