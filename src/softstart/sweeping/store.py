@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import filecmp
 import hashlib
-import json
 import math
-import shutil
 import warnings
 import zlib
 from collections.abc import Sequence
@@ -79,6 +77,7 @@ def inputs_of(plan: Plan, grid: Grid, question: Question) -> dict[str, Any]:
         "until": question.until,
         "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
         "softstart": __version__,
+        "chunk": math.prod(plan.chunk),
     }
     for name, one in grid.items():
         found[f"axis {name}"] = (
@@ -86,8 +85,7 @@ def inputs_of(plan: Plan, grid: Grid, question: Question) -> dict[str, Any]:
             if one.dtype.kind == "U"
             else [one.size, hashlib.sha256(one.values.tobytes()).hexdigest()]
         )
-    plain: dict[str, Any] = json.loads(json.dumps(found | {"chunk": math.prod(plan.chunk)}))
-    return plain
+    return found
 
 
 class Store:
@@ -137,7 +135,7 @@ class Store:
                 stack.enter_context(self._target.errors())
             for name, values in block.items():
                 if self.path is not None:  # Zarr reads a chunk at the edge before it writes it
-                    _free(self.path, _file(name, index))
+                    (self.path / _file(name, index)).unlink(missing_ok=True)
                 self._arrays[name][place] = values.reshape([part.stop - part.start for part in place])
         self._list.add({"part": list(index), "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
 
@@ -160,7 +158,6 @@ class Store:
             names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
             damaged = [name for name in names if not _same(folder / name, fresh / name)]
             for name in damaged:
-                _free(folder, name)
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (fresh / name).replace(folder / name)
         opened = dict(zarr.open_group(folder, mode="r+").arrays())
@@ -201,16 +198,6 @@ def _file(name: str, index: Sequence[int]) -> Path:
 
 def _same(file: Path, other: Path) -> bool:
     return file.is_file() and filecmp.cmp(file, other, shallow=False)
-
-
-def _free(home: Path, file: Path) -> None:
-    """Remove what stands at the place of a file of the sweep, or in the way to it."""
-    for folder in reversed(file.parents):
-        if not (home / folder).is_dir():
-            (home / folder).unlink(missing_ok=True)
-    if (home / file).is_dir() and not (home / file).is_symlink():
-        shutil.rmtree(home / file)
-    (home / file).unlink(missing_ok=True)
 
 
 def _describe(folder: Path, empty: xarray.Dataset, plan: Plan) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -229,6 +230,8 @@ def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Ga
 def _rows(dataset: xarray.Dataset) -> dict[str, Any]:
     """A dataset over the grid as nested lists, one row per gap; what is not finite is None."""
     return {
-        str(name): np.where(np.isfinite(one), one.values.astype(object), None).tolist()
-        for name, one in dataset.items()
+        str(name): [
+            [one if math.isfinite(one) else None for one in row] for row in values.to_numpy().tolist()
+        ]
+        for name, values in dataset.items()
     }

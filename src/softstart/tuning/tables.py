@@ -119,23 +119,18 @@ def _by_cell(trials: Trials, values: Any) -> Any:
 def _figures(trials: Trials, found: Judged) -> Columns:
     """Metric and start time, tuned and with the defaults, of each cell."""
     question, bound = trials.question, _by_cell(trials, trials.bound)
-    tuned, default = (Judged(*(_by_cell(trials, part) for part in one)) for one in (found, trials.default))
-    name, share = question.metric_name, question.quantile
+    name, share, columns = question.metric_name, question.quantile, Columns()
     over = "" if len(question.scenarios) == 1 else f", quantile {share:g} over the tolerances"
-    columns: Columns = {
-        name: (_over_scenarios(tuned.metric, share), "", f"{name}, tuned{over}"),
-        f"{name}_default": (_over_scenarios(default.metric, share), "", f"{name} of the defaults{over}"),
-    }
-    if over:
-        columns[f"{name}_as_is"] = (tuned.metric[:, 0], "", f"{name}, tuned, nothing off")
-    if name != "start_time":
-        for end, what, one in (("", "tuned", tuned), ("_default", "of the defaults", default)):
-            columns[f"start_time{end}"] = (one.start_time[:, 0], "s", f"start time, {what}, nothing off")
+    for end, what, one in (("", "tuned", found), ("_default", "of the defaults", trials.default)):
+        metric, start_time = (_by_cell(trials, part) for part in one)
+        columns[f"start_time{end}"] = (start_time[:, 0], "s", f"start time, {what}, nothing off")
+        columns[f"{name}{end}"] = (_over_scenarios(metric, share), "", f"{name}, {what}{over}")
+        if over and not end:
+            columns[f"{name}_as_is"] = (metric[:, 0], "", f"{name}, tuned, nothing off")
+        late = excess(start_time, bound, share)
+        columns[f"excess{end}"] = (late, "1", f"share by which the start time, {what}, is beyond its bound")
     columns["start_time_bound"] = (bound[:, 0], "s", "bound on the start time, nothing off")
-    late = excess(tuned.start_time, bound, share)
-    columns["excess"] = (late, "1", "share by which the start time is beyond its bound, 0 if not")
-    columns["excess_default"] = (excess(default.start_time, bound, share), "1", "the same of the defaults")
-    columns["in_time"] = (late == 0.0, "", "whether the bound is kept")
+    columns["in_time"] = (columns["excess"][0] == 0.0, "", "whether the bound is kept")
     return columns
 
 
@@ -148,20 +143,17 @@ def _over_scenarios(values: Any, share: float) -> Any:
 def _dataset(question: Question, columns: Columns) -> xarray.Dataset:
     import xarray
 
-    shape = (len(question.gaps), len(question.load_inertias))
-    dims = ("gap", "load_inertia")
-
-    def about(unit: str, meaning: str) -> dict[str, str]:
-        return {"units": unit, "long_name": meaning}
-
+    shape, dims = (len(question.gaps), len(question.load_inertias)), ("gap", "load_inertia")
     data = {
-        name: (dims, np.asarray(values).reshape(shape), about(unit, meaning))
+        name: (dims, np.asarray(values).reshape(shape), {"units": unit, "long_name": meaning})
         for name, (values, unit, meaning) in columns.items()
     }
     coordinates = {
-        "gap": ("gap", np.array(question.gaps), about("rad", "total gap")),
-        "load_inertia": ("load_inertia", np.array(question.load_inertias), about("kg*m^2", "inertia J2")),
-    }
+        "gap": ("gap", np.array(question.gaps), {"units": "rad", "long_name": "total gap"}),
+        "load_inertia": (
+            "load_inertia", np.array(question.load_inertias), {"units": "kg*m^2", "long_name": "inertia J2"}
+        ),
+    }  # fmt: skip
     return xarray.Dataset(data, coords=coordinates)
 
 

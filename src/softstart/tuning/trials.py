@@ -88,26 +88,23 @@ class Trials:
             )
         return found
 
-    def values(self, jobs: Any, places: Vector) -> dict[str, Vector]:
+    def values(self, jobs: Indices, places: Vector) -> dict[str, Vector]:
         """Values of the tuned parameters at places in their ranges; the last axis are the parameters."""
-        chosen = np.asarray(jobs)
         return {
-            one.name: one.value(places[..., k], self.defaults[one.name][chosen])
+            one.name: one.value(places[..., k], self.defaults[one.name][jobs])
             for k, one in enumerate(self.question.ranges)
         }
 
-    def places(self, jobs: Any, values: Values) -> Vector:
+    def places(self, jobs: Indices, values: Values) -> Vector:
         """The places of values; the last axis are the parameters."""
-        chosen = np.asarray(jobs)
-        each = [one.place(values[one.name], self.defaults[one.name][chosen]) for one in self.question.ranges]
+        each = [one.place(values[one.name], self.defaults[one.name][jobs]) for one in self.question.ranges]
         return np.stack(each, axis=-1)
 
-    def costs(self, jobs: Any, places: Vector) -> Vector:
+    def costs(self, jobs: Indices, places: Vector) -> Vector:
         """The cost of each place, one a row, for a job of its own."""
-        chosen = np.asarray(jobs)
-        return self.cost(chosen, self.judged(chosen, self.values(chosen, places)))
+        return self.cost(jobs, self.judged(jobs, self.values(jobs, places)))
 
-    def cost(self, jobs: Any, judged: Judged) -> Vector:
+    def cost(self, jobs: Indices, judged: Judged) -> Vector:
         """The cost of what candidates reach."""
         return cost(judged.metric, judged.start_time, self.bound[jobs], self.question.quantile)
 

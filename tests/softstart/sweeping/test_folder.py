@@ -129,7 +129,7 @@ def as_pipe(path):
     os.mkfifo(path)
 
 
-DAMAGES = [flip, swap, in_the_way, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
+DAMAGES = [flip, swap, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
            lambda path: path.write_bytes(path.read_bytes() + b"more")]  # fmt: skip
 
 
@@ -160,7 +160,7 @@ def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, n
     }
 
 
-@pytest.mark.parametrize("damage", [flip, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
+@pytest.mark.parametrize("damage", [flip, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
 def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
     files = ("zarr.json", "k_dyn/zarr.json", "status/zarr.json", "gap/c/0")
     for number, name in enumerate(files):
@@ -174,6 +174,16 @@ def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
         assert {
             path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
         } == {path.relative_to(pristine): path.read_bytes() for path in pristine.rglob("*") if path.is_file()}
+
+
+@pytest.mark.filterwarnings("ignore::softstart.errors.DamagedWarning")  # it is named, too
+@pytest.mark.parametrize(("name", "damage"), [("k_dyn/c/0/0", in_the_way), ("status/c/0/0", as_folder),
+                                               ("gap/zarr.json", as_folder)])  # fmt: skip
+def test_what_is_no_file_of_a_sweep_is_not_removed(pristine, tmp_path, name, damage):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    damage(folder / name)
+    with pytest.raises(InputError, match=r"to = .*: nothing can be written there"):
+        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, as_folder, lambda path: path.write_bytes(bytes(4096))])
