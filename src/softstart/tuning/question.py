@@ -77,12 +77,6 @@ class Question:
         """The drive or chain of a cell, as it is."""
         return self.drive.moved(*self.cells[cell])
 
-    def value_in(self, cell: int, name: str) -> float:
-        """A quantity that has a tolerance, in a cell; of a chain each gap goes with all others."""
-        found = self.drive_of(cell).knob(name)
-        assert found is not None
-        return float(found.value)
-
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""
         rows = [self.drive.moved(gap, self.load_inertias[0]).design_drive for gap in self.gaps]

@@ -30,15 +30,15 @@ from softstart.tuning.question import (
 )
 from softstart.tuning.ranges import Free, ranges_of
 from softstart.tuning.tables import (
+    Asked,
     between_table,
     optima,
     price_table,
     robust_outcome,
     schedule_table,
 )
-from softstart.tuning.trials import Trials
+from softstart.tuning.trials import Part, Trials
 
-WORTH_SHARING = 20_000  # starts of a plain controller from which on processes are started
 GENERATIONS = 60
 DRAWN = 100  # drives that stand for an identification
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
@@ -196,17 +196,15 @@ def tune(
     found: dict[str, tuple[Trials, Found]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
     with Records(target, question.inputs(), ["part"]) as kept:
-        with _pool_for(*sides.values(), workers=workers, scheduler=scheduler) as pool:
+        threads = next(iter(sides.values())).compiled
+        count = sharing(question, "the controller", workers, scheduler, threads)
+        with Pool(count, threads=threads, scheduler=scheduler, describe=_described) as pool:
             for name, trials in sides.items():
                 before = found.get("schedule")
                 found[name] = trials, best_gains(trials, pool, kept, log, before and before[1])
         best = {}
         if certified and metric == "k_dyn":
-            with Pool(
-                checked_workers(workers, scheduler),
-                scheduler=scheduler,
-                describe=lambda one: f"the optimum of cell {one.cell + 1}",
-            ) as pool:
+            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
                 best = optima(pool, sides.values(), kept, log)
     scheduled = found.get("schedule")
     return Tuning(
@@ -220,17 +218,7 @@ def tune(
     )
 
 
-def _pool_for(first: Trials, *_: Trials, workers: int | None, scheduler: str | None) -> Pool:
-    """Where candidates are started: threads for compiled controllers, else processes, or a cluster."""
-    question = first.question
-    starts = len(question.cells) * len(question.scenarios) * question.restarts
-    small = starts * question.population * question.generations < WORTH_SHARING
-    if small and not first.compiled and scheduler is None:
-        return Pool(1)
-    count = sharing(question, "the controller", workers, scheduler, first.compiled)
-    return Pool(
-        count,
-        threads=first.compiled,
-        scheduler=scheduler,
-        describe=lambda part: f"candidates from number {part.first + 1} on",
-    )
+def _described(task: Part | Asked) -> str:
+    if isinstance(task, Asked):
+        return f"the optimum of cell {task.cell + 1}"
+    return f"candidates from number {task.first + 1} on"

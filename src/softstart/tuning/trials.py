@@ -146,13 +146,12 @@ class Trials:
 
 def _starts_of_cells(question: Question) -> Batch:
     """The machines that start: of each cell, one after another, those of all scenarios."""
-    gaps, inertias = np.array(question.cells).T
-    own: dict[str, Any] = {"gap": gaps, "load_inertia": inertias}
+    own: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(question.cells).T, strict=True))
+    drives: list[Any] = [question.drive_of(cell) for cell in range(len(question.cells))]
     found = {}
     for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
-        value = own.get(name)
-        if value is None:
-            value = np.array([question.value_in(cell, name) for cell in range(gaps.size)])
+        # of a chain each gap goes with all others
+        value = own[name] if name in own else np.array([float(one.knob(name).value) for one in drives])
         columns = [one[name].of(value) if name in one else value for one in question.scenarios]
         found[name] = np.stack(columns, axis=1).ravel()
     return prepared(varied(question.drive, found))

@@ -173,7 +173,7 @@ def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
 
     monkeypatch.setattr(Pool, "results", noted)
     if not threads:
-        monkeypatch.setattr("softstart.tuning.solving._pool_for", lambda *trials, **asked: Pool(2))
+        monkeypatch.setattr("softstart.tuning.solving.Pool", lambda *count, **asked: Pool(2))
     shared = tune(CRANE, "ramp", **GRID, **(SMALL | {"workers": 2}), **SURE)
     assert told(shared) == told(alone)
     assert len(parts) > 10
