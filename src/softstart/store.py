@@ -164,10 +164,6 @@ class Records:
         """All records."""
         return list(self._parts.values())
 
-    def forget(self, *part: Any) -> None:
-        """Take a part for one that is not finished."""
-        self._parts.pop(json.dumps(part), None)
-
     def add(self, record: Record) -> None:
         """Keep a part, on disk too."""
         key = json.dumps([record[name] for name in self.keys])

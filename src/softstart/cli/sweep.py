@@ -128,7 +128,7 @@ def read_axes(texts: Sequence[str], recipe: Recipe, machine: Machine) -> dict[st
     >>> from softstart.controller.recipe import Recipe
     >>> texts = ["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"]
     >>> grid = read_axes(texts, Recipe("direct"), Drive.load("crane-4amtkf"))
-    >>> grid["gap"], grid["load_inertia"].tolist()
+    >>> grid["gap"], grid["load_inertia"]
     ([0.5, 1.0, 1.5, 2.0], [0.07, 0.175])
     """
     from softstart.sweeping.grid import Subject
@@ -152,16 +152,15 @@ def _read(key: str, text: str, subject: Subject) -> tuple[str, Any]:
     """The name and the values of an axis."""
 
     def end(part: str) -> tuple[float, str]:
-        column = subject.column(key, [part])
-        if not column.numeric:
+        read = subject.coordinate(key, [part])
+        if read.dtype.kind == "U":
             raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
-        return float(column.values[0]), column.name
+        return float(read.values[0]), str(read.name)
 
-    owner, _ = subject.target(key)
-    if text.count(":") not in (2, 3) or owner == "controller" or ".py" in text:
+    name = subject.name_of(key)
+    if text.count(":") not in (2, 3) or name == "controller" or ".py" in text:
         knob = subject.machine.knob(key)
-        counts = owner == "drive" and knob is not None and knob.parameter.limit.startswith("a whole")
-        column = subject.column(key, values_in(text, key, whole=counts or owner == "controller"))
-        return column.name, column.values
-    found = options.read_values(text, key, end, MOST_VALUES)
-    return found[0][1], [value for value, _ in found]
+        counts = name == "controller" or (knob and knob.parameter.limit.startswith("a whole"))
+        read = subject.coordinate(key, values_in(text, key, whole=bool(counts)))
+        return name, read.values.tolist()
+    return name, [value for value, _ in options.read_values(text, key, end, MOST_VALUES)]

@@ -12,22 +12,21 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine
-from softstart.chain.model import load_machine
+from softstart.chain.machines import Machine, one_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole, nearest, show
-from softstart.start.batch import has_margin
-from softstart.sweeping.compute import Question, Task, check_corners, compute, first_start, known_figures
-from softstart.sweeping.grid import Axis, Plan, read_grid
-from softstart.sweeping.store import Store
+from softstart.start.batch import has_margin, named
+from softstart.start.engine import check_limits
+from softstart.sweeping.compute import Question, Task, check_corners, compute, first_start
+from softstart.sweeping.grid import Grid, Plan, read_grid, sizes_of, values_of
+from softstart.sweeping.store import STATUS, Store
 
 if TYPE_CHECKING:
     import xarray
@@ -83,7 +82,7 @@ def sweep(
         of a drive with limits also `margin`, the least share left of the limits of shaft torque and start
         time (below 0 where one is exceeded, NaN without a start), and `keeps_limits`, 1 or 0.
     chunk : int, optional
-        Most starts of a chunk; memory and what an interruption loses go with it. A folder keeps its own.
+        Most starts of a chunk; memory and what an interruption loses go with it.
     workers : int, optional
         How many chunks are computed at once on this machine, by default one for each processor: by threads
         where the controllers are compiled, else by processes. 1 computes in this thread.
@@ -119,37 +118,53 @@ def sweep(
     ----------
     docs/sweeps.md; each start: see `simulate`.
     """
-    if isinstance(drive, str):
-        drive = load_machine(drive)
-    question, axes = _question(drive, controller, parameters, allow_code, grid, figures, until, fitted_to)
+    drive, recipe, axes, kept, wrong = one_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
+    if fitted_to is not None and not is_machine(fitted_to):
+        wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
+    with wrong.noted():
+        check_limits(until, None, 1, drive.KIND)
+    with wrong.noted():
+        if isinstance(controller, str | None):
+            recipe = Recipe(with_whole_path(controller or ""), dict(parameters or {}), allow_code)
+        else:
+            recipe = Recipe(make_controller(controller, parameters))
+        axes = read_grid(grid, recipe, drive)
+    with wrong.noted():
+        kept = _figures(drive, figures)
+    wrong.settle()
     if chunk is not None:
         check_whole(chunk, "chunk")
     checked_workers(workers, scheduler)
+    question = Question(drive, recipe, kept, until, fitted_to)
     check_corners(question, axes)
-    plan = Plan.of([axis.size for axis in axes], [not axis.numeric for axis in axes], chunk)
+    shape = tuple(sizes_of(axes).values())
+    texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in sizes_of(axes)]
+    plan = Plan.of(shape, texts, chunk)
     threads = first_start(question, axes)
-    count = sharing(question.recipe.given, "the controller", workers, scheduler, threads)
+    count = sharing(recipe.given, "the controller", workers, scheduler, threads)
     with Store(None if to is None else Path(to), plan, axes, question) as store:
-        begin, before = time.monotonic(), store.finished_starts()
+        begin, before = time.monotonic(), sum(map(plan.size, store.finished))
         done = before
 
         def tell() -> None:
             if progress is not None:
                 progress(Progress(done, plan.starts, before, time.monotonic() - begin))
 
+        def task(index: tuple[int, ...]) -> Task:
+            place = dict(zip(sizes_of(axes), plan.place(index), strict=True))
+            part = {name: one.isel({one.dims[0]: place[str(one.dims[0])]}) for name, one in axes.items()}
+            return Task(index, question, plan.size(index), values_of(part))
+
         tell()
-        tasks = (
-            Task(index, question, tuple(map(Axis.part, axes, store.plan.place(index))))
-            for index in (store.plan.indices() if done < plan.starts else ())
-            if not store.finished(index)
-        )
+        left = plan.indices() if done < plan.starts else iter(())
         with Pool(
-            min(count, store.plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
+            min(count, math.prod(plan.counts)), threads=threads, scheduler=scheduler, describe=_described,
             advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
         ) as pool:  # fmt: skip
-            for task, block in pool.results(compute, tasks):
-                store.keep(task.index, block)
-                done += store.plan.size(task.index)
+            tasks = (task(index) for index in left if index not in store.finished)
+            for one, block in pool.results(compute, tasks):
+                store.keep(one.index, block)
+                done += one.starts
                 tell()
         return store.results()
 
@@ -158,45 +173,9 @@ def _described(task: Task) -> str:
     return f"chunk {', '.join(map(str, task.index))} of the sweep"
 
 
-def _question(
-    drive: Any,
-    controller: Any,
-    parameters: Mapping[str, object] | None,
-    allow_code: bool,
-    grid: object,
-    figures: object,
-    until: Any,
-    fitted_to: Any,
-) -> tuple[Question, tuple[Axis, ...]]:
-    """The question and the axes, if all input is right in itself; all mistakes at once."""
-    wrong, axes, recipe, kept = Mistakes(), tuple[Axis, ...](), Recipe(), tuple[str, ...]()
-    for name, other in (("drive", drive), ("fitted_to", fitted_to)):
-        if not is_machine(other) and not (other is None and name == "fitted_to"):
-            wrong.sentences.append(
-                f"{name} = {show(other)}: give one Drive or Chain; what varies goes into the grid."
-            )
-    good = isinstance(until, Real) and not isinstance(until, bool) and 0.0 < float(until) < math.inf
-    if until is not None and not good:
-        wrong.sentences.append(f"until = {show(until)}: give a time above 0 s as a number, or leave it out.")
-    with wrong.noted():
-        if isinstance(controller, str):
-            recipe = Recipe(with_whole_path(controller), dict(parameters or {}), allow_code)
-        elif controller is None:
-            recipe = Recipe("", dict(parameters or {}), allow_code)
-        else:
-            recipe = Recipe(make_controller(controller, parameters))
-        if is_machine(drive):
-            axes = read_grid(grid, recipe, drive)
-    with wrong.noted():
-        if is_machine(drive):
-            kept = _figures(drive, figures)
-    wrong.settle()
-    return Question(drive, recipe, kept, until, fitted_to), axes
-
-
 def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:
     """The figures asked for, or the usual ones; InputError for those that starts of this machine lack."""
-    limited, known = has_margin(drive.limits), list(known_figures(drive.shaft_names))
+    limited, known = has_margin(drive.limits), list(named(drive.shaft_names))
     if figures is None:
         usual: tuple[str, ...] = FIGURES
         if (count := len(drive.shaft_names)) > 1:
@@ -214,7 +193,7 @@ def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:
                 f"figures = {name}: the {drive.KIND} has no limits that it could refer to; give "
                 f"{drive.LIMITS_GIVEN}."
             )
-    return tuple(dict.fromkeys(figures))
+    return tuple(name for name in dict.fromkeys(figures) if name != STATUS)
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,15 @@
-"""The grid of a sweep: its axes, and the chunks into which it is cut.
+"""The grid of a sweep: the coordinates of its axes, and the chunks into which it is cut.
 
-Chunks are never listed: a chunk is a number, and its place on the grid follows from it.
+Chunks are never listed: the place of each follows from its indices.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import Field, dataclass, fields, replace
+from dataclasses import Field, dataclass, fields
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,69 +19,31 @@ from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.errors import InputError, Mistakes
-from softstart.input.parameters import Wording, meant_by, read_value
+from softstart.input.parameters import Parameter, Wording, meant_by, read_value
 from softstart.quantities import RefusedError, multiplied, nearest, show
 
-Owner = Literal["drive", "parameter", "controller"]
+if TYPE_CHECKING:
+    from xarray import DataArray, Variable
+
+# By name: a field of the machine, `controller_NAME` for a parameter of the controller, `controller` for its
+# name. Numbers are float64, with their unit as an attribute; several along one dimension are samples.
+Grid = dict[str, "Variable"]
 PREFIX = "controller"
-ONE_OF_TWO = "controller: name one, or make several an axis of the grid; one of the two."
 
 
-@dataclass(frozen=True, eq=False)
-class Column:
-    """The values that one parameter takes: float64 numbers in `unit`, or texts.
-
-    `owner` "drive": the field `field` of the drive; "parameter": a parameter of the controller;
-    "controller": the controller itself, by name.
-    """
-
-    name: str
-    owner: Owner
-    field: str
-    unit: str
-    meaning: str
-    values: Any
-
-    @property
-    def numeric(self) -> bool:
-        """Whether the values are numbers."""
-        return isinstance(self.values, np.ndarray)
-
-    @property
-    def size(self) -> int:
-        """How many values there are."""
-        return len(self.values)
-
-    def part(self, place: slice) -> Column:
-        """The column with some of its values."""
-        return replace(self, values=self.values[place])
+def sizes_of(grid: Grid) -> dict[str, int]:
+    """The axes in order, with their lengths."""
+    return {str(one.dims[0]): one.size for one in grid.values()}
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """A dimension of the grid: one column, or several whose values belong together (samples)."""
-
-    name: str
-    columns: tuple[Column, ...]
-
-    @property
-    def size(self) -> int:
-        """Length of the axis."""
-        return self.columns[0].size
-
-    def part(self, place: slice) -> Axis:
-        """A piece of the axis."""
-        return Axis(self.name, tuple(column.part(place) for column in self.columns))
-
-    @property
-    def paired(self) -> bool:
-        """Whether the axis numbers samples of several parameters."""
-        return any(column.name != self.name for column in self.columns)
-
-    @property
-    def numeric(self) -> bool:
-        """Whether all values along it are numbers."""
-        return all(column.numeric for column in self.columns)
+def values_of(grid: Grid) -> dict[str, Any]:
+    """Each coordinate with its value for every start of a grid; the one text of a coordinate of texts."""
+    sizes = sizes_of(grid)
+    spread = {name: one.set_dims(sizes) for name, one in grid.items()}  # type: ignore[no-untyped-call]
+    return {
+        name: one.values.ravel() if one.dtype.kind == "f" else str(one.values.flat[0])
+        for name, one in spread.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -90,10 +52,10 @@ class Subject:
 
     >>> from softstart.chain import Chain
     >>> crane = Subject(Chain.load("crane-4-mass"), Recipe("ramp"))
-    >>> crane.column("shaft[2].gap", ["0.5x", "2x"]).values.tolist()
+    >>> crane.coordinate("shaft[2].gap", ["0.5x", "2x"]).values.tolist()
     [0.1, 0.4]
-    >>> crane.target("load.inertia"), crane.target("controller.time"), crane.target("controller")
-    (('drive', 'load_inertia'), ('parameter', 'time'), ('controller', ''))
+    >>> crane.name_of("load.inertia"), crane.name_of("controller.time")
+    ('load_inertia', 'controller_time')
     """
 
     machine: Machine
@@ -116,14 +78,12 @@ class Subject:
             if all(name in other and _kind(other[name]) == _kind(one) for other in tables)
         }
 
-    def target(self, key: str) -> tuple[Owner, str]:
-        """Whose parameter a key of the grid names, and which; InputError for an unknown one."""
-        if key == PREFIX:
-            return "controller", ""
-        if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
-            return "parameter", key[len(PREFIX) + 1 :]
+    def name_of(self, key: str) -> str:
+        """The coordinate that a key of the grid names; InputError for an unknown one."""
+        if key == PREFIX or key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
+            return key.replace(".", "_", 1)
         if (found := self.machine.knob(key)) is not None:
-            return "drive", found.name
+            return found.name
         own = {name: f"{PREFIX}.{name}" for name in self.parameters}
         words = {word: word for word in (*self.machine.knobs(), PREFIX, *own.values())} | own
         like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
@@ -134,19 +94,31 @@ class Subject:
         hint = f"did you mean {' or '.join(meant)}?" if meant else other
         raise InputError(f"{key}: there is no such axis; {hint}")
 
-    def column(self, key: str, values: Any) -> Column:
+    def coordinate(self, key: str, values: Any) -> DataArray:
         """The values of a parameter, read and checked; InputError in one sentence."""
-        owner, name = self.target(key)
+        from xarray import DataArray
+
+        name = self.name_of(key)
         if isinstance(values, str | bytes) or not (
             isinstance(values, Sequence) or hasattr(values, "__array__")
         ):
             raise InputError(
                 f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2]."
             )
-        if owner == "controller":
-            return Column(PREFIX, owner, "", "", "controller", _texts(key, values))
-        if owner == "drive":
-            return self._of_machine(key, name, values)
+        unit, meaning = "", PREFIX
+        if name == PREFIX:
+            read: Any = _texts(key, values)
+        elif name.startswith(f"{PREFIX}_"):
+            read, unit, meaning = self._of_controller(key, name.removeprefix(f"{PREFIX}_"), values)
+        else:
+            read, unit, meaning = self._of_machine(key, name, values)
+        found = np.array(read)
+        if found.ndim != 1:
+            raise InputError(f"{key}: its values have shape {found.shape}; give them in one row.")
+        about = {} if found.dtype.kind == "U" else {"units": unit}
+        return DataArray(found, dims=name, name=name, attrs=about | {"long_name": meaning})
+
+    def _of_controller(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
         if name not in self.parameters:
             close, several = nearest(name, self.parameters), ", ".join(self.controllers)
             lacking = f"not all of {several} have this" if several else f"{self.recipe.label} has no such"
@@ -159,86 +131,32 @@ class Subject:
             raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
         meaning = self.parameters[name].metadata.get("meaning") or name
         listed = list(values)
-        read = _texts(key, listed) if kind == "text" else _flat(key, quantity(key, listed, unit))
-        return Column(f"{PREFIX}_{name}", owner, name, unit, meaning, read)
+        read = _texts(key, listed) if kind == "text" else np.float64(quantity(key, listed, unit))
+        return read, unit, meaning
 
-    def _of_machine(self, key: str, name: str, values: Any) -> Column:
+    def _of_machine(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
         found = self.machine.knob(name)
         assert found is not None
-        parameter, wording = found.parameter, Wording(written={name: key})
+        parameter: Parameter = found.parameter
         if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
             raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
-        words = any(isinstance(value, str) and value in parameter.choices for value in values)
         given: Any = values
         try:
-            if words or not parameter.unit:
+            if not parameter.unit or any(isinstance(one, str) and one in parameter.choices for one in values):
                 texts = _texts(key, values)
                 for given in texts:
                     read_value(parameter, given)
-                return Column(name, "drive", name, "", parameter.meaning, texts)
+                return texts, "", parameter.meaning
             own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
             given = [multiplied(value, key, own) for value in values]
-            read = read_value(parameter, given, batch=True)
+            read = np.float64(read_value(parameter, given, batch=True))
         except RefusedError as reason:
-            raise InputError(wording.refused(parameter, given, reason)) from None
-        return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
+            raise InputError(Wording(written={name: key}).refused(parameter, given, reason)) from None
+        return read, parameter.unit, parameter.meaning
 
 
 def _kind(field: Field[Any]) -> tuple[str, str]:
     return field.metadata.get("unit", ""), field.metadata.get("kind", "quantity")
-
-
-def read_grid(grid: object, recipe: Recipe, machine: Machine) -> tuple[Axis, ...]:
-    """The axes in the order of the grid, or one InputError for all that is wrong with them.
-
-    >>> from softstart import Drive
-    >>> grid = {"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, "4x"]}
-    >>> axes = read_grid(grid, Recipe("direct"), Drive.load("crane-4amtkf"))
-    >>> [(axis.name, axis.columns[0].values.tolist()) for axis in axes]
-    [('load_inertia', [0.07, 0.175]), ('gap', [0.5, 1.0, 2.0])]
-    """
-    if not isinstance(grid, Mapping) or not grid:
-        raise InputError(
-            f'grid = {show(grid)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
-        )
-    wrong, axes, first = Mistakes(), list[Axis](), dict[str, str]()
-    if (PREFIX in grid) == bool(recipe.given):
-        wrong.sentences.append(ONE_OF_TWO)
-    if PREFIX in grid and recipe.values:
-        wrong.sentences.append(
-            f"parameters = {show(dict(recipe.values))}: with several controllers give each parameter as "
-            "an axis, of one value if need be."
-        )
-    wrong.settle()
-    names = grid.get(PREFIX, ())
-    listed = () if isinstance(names, str) or not isinstance(names, Sequence) else names
-    subject = Subject(machine, recipe, tuple(name for name in listed if isinstance(name, str)))
-    _ = subject.parameters  # wrong controllers are told first
-    for key, values in grid.items():
-        paired, columns = isinstance(values, Mapping), list[Column]()
-        for name, given in values.items() if paired else [(key, values)]:
-            with wrong.noted():
-                column = subject.column(str(name), given)
-                columns.append(column)
-                if column.name in first:
-                    same = first[column.name]
-                    wrong.sentences.append(f"{name}: this is the same as {same}; name each parameter once.")
-                first[column.name] = str(name)
-        if paired:
-            wrong.sentences += _wrong_samples(str(key), columns, len(values))
-        elif columns:
-            wrong.sentences += _repeated(columns[0])
-        if columns:
-            axes.append(Axis(str(key) if paired else columns[0].name, tuple(columns)))
-    wrong.settle()
-    return tuple(axes)
-
-
-def _flat(key: str, values: object) -> Any:
-    found = np.array(values, dtype=np.float64)
-    if found.ndim != 1:
-        raise InputError(f"{key}: its values have shape {found.shape}; give them in one row.")
-    return found
 
 
 def _texts(key: str, values: Any) -> tuple[str, ...]:
@@ -249,17 +167,56 @@ def _texts(key: str, values: Any) -> tuple[str, ...]:
     return listed
 
 
-def _repeated(column: Column) -> list[str]:
+def read_grid(given: object, recipe: Recipe, machine: Machine) -> Grid:
+    """The coordinates in the order of the grid, or one InputError for all that is wrong with them.
+
+    >>> from softstart import Drive
+    >>> given = {"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, "4x"]}
+    >>> grid = read_grid(given, Recipe("direct"), Drive.load("crane-4amtkf"))
+    >>> {name: one.values.tolist() for name, one in grid.items()}
+    {'load_inertia': [0.07, 0.175], 'gap': [0.5, 1.0, 2.0]}
+    """
+    from xarray import DataArray, Variable
+
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(
+            f'grid = {show(given)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
+        )
+    if (PREFIX in given) == bool(recipe.given):
+        raise InputError("controller: name one, or make several an axis of the grid; one of the two.")
+    if PREFIX in given and recipe.values:
+        raise InputError(
+            f"parameters = {show(dict(recipe.values))}: with several controllers give each parameter as "
+            "an axis, of one value if need be."
+        )
+    names = given.get(PREFIX, ())
+    listed = () if isinstance(names, str) or not isinstance(names, Sequence) else names
+    subject = Subject(machine, recipe, tuple(name for name in listed if isinstance(name, str)))
+    _ = subject.parameters  # wrong controllers are told first
+    wrong, grid = Mistakes(), Grid()
+    for key, values in given.items():
+        paired, read = isinstance(values, Mapping), list[DataArray]()
+        for name, own in values.items() if paired else [(key, values)]:
+            with wrong.noted():
+                read.append(one := subject.coordinate(str(name), own))
+                if one.name in grid:
+                    wrong.sentences.append(f"{name}: {one.name} is an axis already; name each once.")
+                grid[str(one.name)] = Variable(str(key) if paired else one.dims, one.values, one.attrs)
+        wrong.sentences += _wrong_samples(str(key), read, len(values)) if paired else _repeated(read)
+    wrong.settle()
+    return grid
+
+
+def _repeated(read: list[DataArray]) -> Iterator[str]:
     """An axis names each place once, so that results can be looked up by value."""
-    if not column.numeric:
-        twice = [value for index, value in enumerate(column.values) if value in column.values[:index]]
-    else:
-        ordered = np.sort(column.values)
-        twice = ordered[1:][ordered[1:] == ordered[:-1]].tolist()
-    return [f"{column.name} = {show(twice[0])}: this value is given twice; give each once."] if twice else []
+    for one in read:
+        found, counts = np.unique(one.values, return_counts=True)
+        if counts.max() > 1:
+            twice = show(found[counts.argmax()].item())
+            yield f"{one.name} = {twice}: this value is given twice; give each once."
 
 
-def _wrong_samples(name: str, columns: list[Column], count: int) -> Iterator[str]:
+def _wrong_samples(name: str, columns: list[DataArray], count: int) -> Iterator[str]:
     """What is wrong with parameters that vary together."""
     if not name.isidentifier() or any(column.name == name for column in columns):
         yield f"{show(name)}: name the samples by one word that is none of their parameters, as sample."
@@ -269,7 +226,7 @@ def _wrong_samples(name: str, columns: list[Column], count: int) -> Iterator[str
         sizes = ", ".join(f"{column.name} has {column.size}" for column in columns)
         yield f"{name}: all parameters of samples need equally many values; {sizes}."
     for column in columns:
-        if not column.numeric:
+        if column.dtype.kind == "U":
             yield f"{column.name}: samples are numbers; make an axis of its own of these names."
 
 
@@ -283,8 +240,8 @@ class Plan:
     """A grid of `shape` in chunks of shape `chunk`, the last index fastest; those at the edge are smaller.
 
     >>> plan = Plan((3, 5), (1, 2))
-    >>> plan.chunks, plan.index(5), plan.place((1, 2)), plan.size((1, 2))
-    (9, (1, 2), (slice(1, 2, None), slice(4, 5, None)), 1)
+    >>> plan.counts, plan.place((1, 2))
+    ((3, 3), (slice(1, 2, None), slice(4, 5, None)))
     """
 
     shape: tuple[int, ...]
@@ -317,14 +274,9 @@ class Plan:
         """How many chunks there are along each axis."""
         return tuple(-(-size // step) for size, step in zip(self.shape, self.chunk, strict=True))
 
-    @property
-    def chunks(self) -> int:
-        """How many chunks there are."""
-        return math.prod(self.counts)
-
-    def index(self, number: int) -> tuple[int, ...]:
-        """Where a chunk stands among the chunks of each axis."""
-        return tuple(map(int, np.unravel_index(number, self.counts)))
+    def indices(self) -> Iterator[tuple[int, ...]]:
+        """Where each chunk stands among the chunks of each axis, one after another."""
+        return iter(np.ndindex(self.counts))
 
     def place(self, index: Sequence[int]) -> tuple[slice, ...]:
         """The part of the grid that is a chunk's."""
@@ -334,7 +286,3 @@ class Plan:
     def size(self, index: Sequence[int]) -> int:
         """How many starts a chunk has."""
         return math.prod(part.stop - part.start for part in self.place(index))
-
-    def indices(self) -> Iterator[tuple[int, ...]]:
-        """Where each chunk stands, one after another."""
-        return map(self.index, range(self.chunks))

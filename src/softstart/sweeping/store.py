@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import filecmp
 import hashlib
-import json
+import math
 import warnings
 import zlib
 from collections.abc import Sequence
@@ -23,11 +23,12 @@ import numpy as np
 from softstart import __version__
 from softstart.controller.recipe import about_name
 from softstart.errors import InputError
+from softstart.start.batch import named
 from softstart.start.status import Status
 from softstart.stopping import at_stop
 from softstart.store import Records, Target, fresh_folder, warn_of_damage
-from softstart.sweeping.compute import Block, Question, known_figures
-from softstart.sweeping.grid import Axis, Plan
+from softstart.sweeping.compute import Block, Question
+from softstart.sweeping.grid import Grid, Plan, sizes_of
 
 if TYPE_CHECKING:
     import xarray
@@ -38,120 +39,93 @@ LIST = f"{STATUS}/softstart.sqlite"  # beside the chunks of `status`, where Zarr
 MOST_IN_MEMORY = 10_000_000  # starts
 
 
-def empty_results(plan: Plan, axes: tuple[Axis, ...], question: Question) -> xarray.Dataset:
+def empty_results(plan: Plan, grid: Grid, question: Question) -> xarray.Dataset:
     """The results before anything is computed; their figures take no memory, however large the grid."""
     import xarray
 
-    dims = tuple(axis.name for axis in axes)
-    known = known_figures(question.drive.shaft_names)
+    sizes, known, machine = sizes_of(grid), named(question.drive.shaft_names), question.drive
     data: dict[str, Any] = {
-        name: (
-            dims,
-            np.broadcast_to(np.nan, plan.shape),
-            {"units": known[name][0], "long_name": known[name][1]},
-        )
-        for name in question.figures
-        if name != STATUS
+        name: (list(sizes), np.broadcast_to(np.nan, plan.shape), {"units": unit, "long_name": meaning})
+        for name, (_, unit, meaning) in ((name, known[name]) for name in question.figures)
     }
-    data[STATUS] = dims, np.broadcast_to(np.int8(NOT_COMPUTED), plan.shape), {
+    data[STATUS] = list(sizes), np.broadcast_to(np.int8(NOT_COMPUTED), plan.shape), {
         "long_name": "how the start ended",
         "flag_values": [NOT_COMPUTED, *range(len(Status))],
         "flag_meanings": " ".join(["not_computed", *(status.name.lower() for status in Status)]),
     }  # fmt: skip
-    coords: dict[str, Any] = {}
-    for axis in axes:
-        if axis.paired:
-            about = {"units": "1", "long_name": "number of the sample"}
-            coords[axis.name] = axis.name, np.arange(axis.size, dtype=np.int64), about
-        for column in axis.columns:
-            about = {"units": column.unit} if column.numeric else {}
-            coords[column.name] = axis.name, np.array(column.values), about | {"long_name": column.meaning}
+    numbers = {
+        dim: (dim, np.arange(size, dtype=np.int64), {"units": "1", "long_name": "number of the sample"})
+        for dim, size in sizes.items() if dim not in grid
+    }  # fmt: skip
     shown, fitted_to = question.recipe.label, question.fitted_to
     attributes = {
         **({} if fitted_to is None else {"softstart_fitted_to": fitted_to.to_toml()}),
-        "title": f"{question.drive.name}, {shown}" if shown else question.drive.name,
+        "title": f"{machine.name}, {shown}" if shown else machine.name,
         "source": f"softstart {__version__}",
-        "softstart_drive": question.drive.to_toml(),
-        "softstart_chunk": list(plan.chunk),
+        "softstart_drive": machine.to_toml(),
     }
-    return xarray.Dataset(data, coords, attributes)
+    return xarray.Dataset(data, {**numbers, **grid}, attributes)
 
 
-def inputs_of(question: Question, axes: tuple[Axis, ...]) -> dict[str, Any]:
+def inputs_of(plan: Plan, grid: Grid, question: Question) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
     found: dict[str, Any] = {
         "drive": question.drive.to_toml(),
         "controller": question.recipe.about(),
-        "order of the axes": [axis.name for axis in axes],
+        "order of the axes": list(sizes_of(grid)),
         "figures": list(question.figures),
         "until": question.until,
         "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
         "softstart": __version__,
+        "chunk": math.prod(plan.chunk),
     }
-    for column in (column for axis in axes for column in axis.columns):
-        found[f"axis {column.name}"] = (
-            [column.size, hashlib.sha256(column.values.tobytes()).hexdigest()]
-            if column.numeric
-            else [about_name(text) for text in column.values]
+    for name, one in grid.items():
+        found[f"axis {name}"] = (
+            [about_name(text) for text in one.values.tolist()]
+            if one.dtype.kind == "U"
+            else [one.size, hashlib.sha256(one.values.tobytes()).hexdigest()]
         )
-    plain: dict[str, Any] = json.loads(json.dumps(found))
-    return plain
+    return found
 
 
 class Store:
     """The figures of a sweep, in memory or in a folder, new or with the same inputs. Use it in a `with`.
 
-    A folder keeps the chunks that it was begun with.
+    `finished` holds the chunks that are finished and as they were written.
     """
 
-    def __init__(self, path: Path | None, plan: Plan, axes: tuple[Axis, ...], question: Question) -> None:
-        self.path, self.plan, self._axes, self._question = path, plan, axes, question
+    def __init__(self, path: Path | None, plan: Plan, grid: Grid, question: Question) -> None:
+        self.path, self.plan, self.finished = path, plan, set[tuple[int, ...]]()
+        self._empty = empty_results(plan, grid, question)
         self._target = None if path is None else Target("to", path, "sweep", LIST)
+        self._list = Records(self._target, inputs_of(plan, grid, question), ["part"])
+        self._arrays: dict[str, Any] = {}
+        self._exit = ExitStack()
 
     def __enter__(self) -> Self:
-        if self.path is None and self.plan.starts > MOST_IN_MEMORY:
+        if self._target is None and self.plan.starts > MOST_IN_MEMORY:
             raise InputError(
                 f"grid: {self.plan.starts:,} starts are too many to keep in memory ({MOST_IN_MEMORY:,} at "
                 "most); give to=FOLDER (--out DIR), where a sweep may have any size."
             )
         with ExitStack() as stack:
-            if self._target is not None:
-                others = (one for one in self._target.path.rglob("*") if not one.is_dir())
-                if not (self._target.path / LIST).exists() and any(others):
+            if self.path is not None and self._target is not None:
+                others = (one for one in self.path.rglob("*") if not one.is_dir())
+                if not (self.path / LIST).exists() and any(others):
                     raise self._target.foreign()
-            inputs = inputs_of(self._question, self._axes)
-            self._list = stack.enter_context(Records(self._target, inputs, ["part"]))
+            stack.enter_context(self._list)
             if self._target is None:
-                self._empty = empty_results(self.plan, self._axes, self._question)
-                self._arrays: Any = {name: np.array(one) for name, one in self._empty.data_vars.items()}
+                self._arrays = {str(name): np.array(one) for name, one in self._empty.data_vars.items()}
             else:
-                self._open_folder(self._target)
-                self._sweep_up()
                 stack.callback(self._sweep_up)
                 stack.enter_context(at_stop(self._sweep_up))
+                with self._target.errors():
+                    self._open(self._target.path)
             self._exit = stack.pop_all()
         return self
 
     def __exit__(self, *error: object) -> None:
         self._exit.close()
-
-    def finished(self, index: Sequence[int]) -> bool:
-        """Whether a chunk is finished."""
-        return self._list.find(index) is not None
-
-    def finished_starts(self) -> int:
-        """How many starts are finished and as they were written; the chunks that are not are given up."""
-        found, damaged = 0, list[str]()
-        for record in self._list.parts():
-            if (index := record["part"]) != "chunk":
-                if changed := self._changed(index, record["checksums"]):
-                    damaged += changed[:1]
-                    self._list.forget(index)
-                else:
-                    found += self.plan.size(index)
-        if self.path is not None:
-            warn_of_damage(self.path, damaged)
-        return found
 
     def keep(self, index: Sequence[int], block: Block) -> None:
         """Take in a finished chunk and list it."""
@@ -160,11 +134,9 @@ class Store:
             if self._target is not None:
                 stack.enter_context(self._target.errors())
             for name, values in block.items():
-                if self.path is not None:
-                    _free(
-                        self.path, self._file(name, index)
-                    )  # Zarr reads a chunk at the edge before it writes it
-                self._arrays[name][place] = values
+                if self.path is not None:  # Zarr reads a chunk at the edge before it writes it
+                    (self.path / _file(name, index)).unlink(missing_ok=True)
+                self._arrays[name][place] = values.reshape([part.stop - part.start for part in place])
         self._list.add({"part": list(index), "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
 
     def results(self) -> xarray.Dataset:
@@ -176,45 +148,41 @@ class Store:
         found: xarray.Dataset = xarray.open_zarr(self.path, chunks=None)[list(self._arrays)]
         return found
 
-    def _file(self, name: str, index: Sequence[int]) -> Path:
-        """The file of a chunk, as Zarr names it."""
-        return Path(name, "c", *map(str, index))
+    def _open(self, folder: Path) -> None:
+        """The arrays to write to, and what is finished; what is damaged is named, and made again."""
+        import zarr
 
-    def _changed(self, index: Sequence[int], checksums: dict[str, int]) -> list[str]:
-        """The files of a finished chunk that do not hold what was written."""
+        self._sweep_up()
+        with fresh_folder(folder.parent) as fresh:
+            _describe(fresh, self._empty, self.plan)
+            names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
+            damaged = [name for name in names if not _same(folder / name, fresh / name)]
+            for name in damaged:
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                (fresh / name).replace(folder / name)
+        opened = dict(zarr.open_group(folder, mode="r+").arrays())
+        self._arrays = {str(name): opened[str(name)] for name in self._empty.data_vars}
+        for record in self._list.parts():
+            index = tuple(record["part"])
+            if changed := self._changed(index, record["checksums"]):
+                damaged.append(changed)
+            else:
+                self.finished.add(index)
+        if self._list.parts():
+            warn_of_damage(folder, [name.as_posix() for name in damaged])
+
+    def _changed(self, index: tuple[int, ...], checksums: dict[str, int]) -> Path | None:
+        """A file of a finished chunk that does not hold what was written."""
         assert self.path is not None
-        found = []
         for name, checksum in checksums.items():
-            file = self._file(name, index)
+            file = _file(name, index)
             try:
                 values = self._arrays[name][self.plan.place(index)] if (self.path / file).is_file() else b""
             except (ValueError, RuntimeError, OSError):  # what Zarr and its codecs say of a damaged file
                 values = b""
             if zlib.crc32(bytes(values)) != checksum:
-                found.append(file.as_posix())
-        return found
-
-    def _open_folder(self, target: Target) -> None:
-        """The arrays to write to; descriptions that are missing or damaged are written again."""
-        import zarr
-
-        begun = self._list.find("chunk")
-        if begun is not None:
-            self.plan = Plan(self.plan.shape, tuple(begun["shape"]))
-        with target.errors(), fresh_folder(target.path.parent) as fresh:
-            _describe(fresh, empty_results(self.plan, self._axes, self._question), self.plan)
-            names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
-            damaged = [name for name in names if not _same(target.path / name, fresh / name)]
-            for name in damaged:
-                _free(target.path, name)
-                (target.path / name).parent.mkdir(parents=True, exist_ok=True)
-                (fresh / name).replace(target.path / name)
-            self._arrays = dict(zarr.open_group(target.path, mode="r+").arrays())
-        if begun is None:
-            self._list.add({"part": "chunk", "shape": list(self.plan.chunk)})
-        else:
-            warn_of_damage(target.path, [name.as_posix() for name in damaged])
-        self._arrays = {name: self._arrays[name] for name in (*self._question.figures, STATUS)}
+                return file
+        return None
 
     def _sweep_up(self) -> None:
         """Remove what a process that was killed left beside the place it was writing to."""
@@ -223,19 +191,13 @@ class Store:
             file.unlink(missing_ok=True)
 
 
+def _file(name: str, index: Sequence[int]) -> Path:
+    """The file of a chunk, as Zarr names it."""
+    return Path(name, "c", *map(str, index))
+
+
 def _same(file: Path, other: Path) -> bool:
     return file.is_file() and filecmp.cmp(file, other, shallow=False)
-
-
-def _free(home: Path, file: Path) -> None:
-    """Remove what stands at the place of a file of the sweep, or in the way to it."""
-    for folder in reversed(file.parents):
-        if not (home / folder).is_dir():
-            (home / folder).unlink(missing_ok=True)
-    if (home / file).is_dir() and not (home / file).is_symlink():
-        (home / file).rmdir()
-    else:
-        (home / file).unlink(missing_ok=True)
 
 
 def _describe(folder: Path, empty: xarray.Dataset, plan: Plan) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,25 +15,9 @@ from softstart.sweeping.grid import Plan
 if TYPE_CHECKING:
     import xarray
 
-SHARES = (0.05, 0.5, 0.95)
+SHARES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 READ_AT_ONCE = 1 << 20  # starts: of so many a figure takes 8 MiB of memory
 KEPT = 1 << 27  # values of a figure from which quantiles are taken: 1 GiB
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A figure over all starts that have one: least, mean, most, and what shares of them do not exceed."""
-
-    count: int
-    least: float
-    quantiles: Mapping[float, float]
-    mean: float
-    most: float
-
-    def summary(self) -> dict[str, Any]:
-        """Everything as plain data, for JSON."""
-        named = {f"q{round(100 * share):02d}": value for share, value in self.quantiles.items()}
-        return {"count": self.count, "min": self.least, **named, "mean": self.mean, "max": self.most}
 
 
 @dataclass(frozen=True)
@@ -42,7 +26,7 @@ class Summary:
 
     starts: int
     statuses: Mapping[str, int]
-    spreads: Mapping[str, Spread]
+    spreads: Mapping[str, Mapping[str, float]]
     judged: str
     worst: Mapping[str, float | str]
 
@@ -55,7 +39,9 @@ class Summary:
     def share_kept(self) -> float | None:
         """Share of the starts that keep the limits; None where that was not computed."""
         kept = self.spreads.get("keeps_limits")
-        return None if kept is None else (kept.mean * kept.count if kept.count else 0.0) / self.starts
+        return (
+            None if kept is None else (kept["mean"] * kept["count"] if kept["count"] else 0.0) / self.starts
+        )
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
@@ -64,7 +50,7 @@ class Summary:
             "status": dict(self.statuses),
             "share_reached": self.share_reached,
             **({} if self.share_kept is None else {"share_keeping_limits": self.share_kept}),
-            "figures": {name: spread.summary() for name, spread in self.spreads.items()},
+            "figures": dict(self.spreads),
             "worst": {"figure": self.judged, "at": dict(self.worst)},
         }
 
@@ -74,47 +60,38 @@ def summarise(results: xarray.Dataset) -> Summary:
 
     >>> from softstart import Drive, sweep
     >>> found = summarise(sweep(Drive.load("crane-4amtkf"), "direct", {"gap": [0.5, 2.0]}))
-    >>> found.share_reached, found.worst, round(found.spreads["k_dyn"].most, 4)
+    >>> found.share_reached, found.worst, round(found.spreads["k_dyn"]["max"], 4)
     (1.0, {'gap': 2.0}, 4.8654)
     """
-    plan = plan_of(results)
+    starts = results["status"].size
     codes = np.zeros(len(Status) + 1, dtype=np.int64)
     for _, piece in pieces(results, "status"):
         codes += np.bincount(1 + piece.ravel(), minlength=codes.size)
     names = ["NOT_COMPUTED", *(status.name for status in Status)]
     statuses = {name: int(count) for name, count in zip(names, codes, strict=True) if count}
     figures = [str(name) for name in results.data_vars if name != "status"]
-    thin = -(-plan.starts // KEPT)
-    spreads = {name: spread((piece for _, piece in pieces(results, name)), thin=thin) for name in figures}
+    thin = -(-starts // KEPT)
+    spreads = {name: spread((piece for _, piece in pieces(results, name)), thin) for name in figures}
     judged = "k_dyn" if "k_dyn" in figures else next(iter(figures), "")
-    return Summary(plan.starts, statuses, spreads, judged, _worst(results, judged) if judged else {})
-
-
-def plan_of(results: xarray.Dataset) -> Plan:
-    """The chunks of the results."""
-    shape = tuple(results["status"].shape)
-    chunk = results.attrs.get("softstart_chunk", ())
-    return (
-        Plan(shape, tuple(map(int, chunk)))
-        if len(chunk) == len(shape)
-        else Plan.of(shape, [False] * len(shape))
-    )
+    return Summary(starts, statuses, spreads, judged, _worst(results, judged) if judged else {})
 
 
 def pieces(results: xarray.Dataset, name: str) -> Iterator[tuple[tuple[slice, ...], Any]]:
     """A figure in pieces that fit into memory: places on the grid, and the values there."""
-    plan = plan_of(results)
-    plan = replace(plan, chunk=plan.shape) if plan.starts <= READ_AT_ONCE else plan
+    shape = results[name].shape
+    plan = Plan(shape, results[name].encoding.get("chunks") or Plan.of(shape, [False] * len(shape)).chunk)
+    plan = replace(plan, chunk=shape) if plan.starts <= READ_AT_ONCE else plan
     return ((place, results[name][place].values) for place in map(plan.place, plan.indices()))
 
 
-def spread(parts: Iterable[Any], shares: Sequence[float] = SHARES, thin: int = 1) -> Spread:
-    """Of values in parts, NaN left out. A quantile is a value that occurs.
+def spread(parts: Iterable[Any], thin: int = 1) -> dict[str, float]:
+    """Of values in parts, NaN left out: how many, least, 5 %, 50 % and 95 % quantile, mean and most.
 
-    Of more values than memory holds, each `thin`-th in the order of each part stands for its neighbours.
+    A quantile is a value that occurs. Of more values than memory holds, each `thin`-th in the order of each
+    part stands for its neighbours.
 
-    >>> spread([np.array([3.0, 1.0]), np.array([2.0, np.nan])], [0.5]).quantiles
-    {0.5: 2.0}
+    >>> spread([np.array([3.0, 1.0]), np.array([2.0, np.nan])])["q50"]
+    2.0
     """
     count, total, least, most, kept = 0, [0.0], math.inf, -math.inf, [np.empty(0)]
     for part in parts:
@@ -123,12 +100,12 @@ def spread(parts: Iterable[Any], shares: Sequence[float] = SHARES, thin: int = 1
             count += good.size
             total.append(float(good.sum()))
             least, most = min(least, float(good.min())), max(most, float(good.max()))
-            kept.append(good if thin == 1 else np.sort(good)[thin // 2 :: thin])
-    values = np.concatenate(kept)
-    if not values.size:
-        return Spread(0, math.nan, dict.fromkeys(shares, math.nan), math.nan, math.nan)
-    found = np.quantile(values, shares, method="inverted_cdf", overwrite_input=True).tolist()
-    return Spread(count, least, dict(zip(shares, found, strict=True)), math.fsum(total) / count, most)
+            kept.append(good if thin == 1 else np.sort(good)[min(thin // 2, good.size - 1) :: thin])
+    if not count:
+        return {"count": 0} | dict.fromkeys(("min", *SHARES, "mean", "max"), math.nan)
+    found = np.quantile(np.concatenate(kept), list(SHARES.values()), method="inverted_cdf").tolist()
+    quantiles = dict(zip(SHARES, found, strict=True))
+    return {"count": count, "min": least, **quantiles, "mean": math.fsum(total) / count, "max": most}
 
 
 def _worst(results: xarray.Dataset, name: str) -> dict[str, float | str]:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Indices, Vector
+from softstart.errors import InputError
 from softstart.parallel import Pool
 from softstart.store import Records
-from softstart.tuning.ranges import inside
-from softstart.tuning.search import Populations, evolve, populations
-from softstart.tuning.trials import Judged, SharedCosts, Trials, in_time
+from softstart.tuning.search import CONVERGED, Costs, Populations, evolve, populations
+from softstart.tuning.trials import TIE, Judged, Trials, in_time, shared_costs
 
 SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
@@ -61,7 +62,12 @@ class Log:
 
 def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Found | None = None) -> Found:
     """The best gains of every job; those of some cells of a `schedule` begin the first search of one set."""
-    question, costs = trials.question, SharedCosts(trials, pool)
+    question, costs = trials.question, partial(shared_costs, trials, pool)
+    if not np.any(np.isfinite(trials.default.metric)):
+        raise InputError(
+            f"metric = {question.metric_name}: no start of {question.recipe.label} with its defaults has "
+            "this figure; choose another metric, or give parameters with which it starts."
+        )
     jobs, restarts = len(trials.drives), question.restarts
     last = _searched(trials, costs, kept, log, schedule)
     restart_costs = last.best[1].reshape(jobs, restarts)
@@ -72,38 +78,41 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
     return _settled(trials, places, restart_costs)
 
 
-def _searched(
-    trials: Trials, costs: SharedCosts, kept: Records, log: Log, schedule: Found | None
-) -> Populations:
+def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None) -> Populations:
     """All searches to their end: the restarts of each job in a row. What is kept is gone on from."""
     question = trials.question
     title = "robust set" if trials.robust else "schedule"
     part, random = [title, schedule is not None], (question.seed, 2 + trials.robust)
     searches = np.repeat(np.arange(len(trials.drives)), question.restarts)
     size = question.population * (WIDER if trials.robust else 1)
-    record = kept.find(part)
-    if record is None:
-        begin: Any = populations(_seeds(trials, schedule, searches, size // 2), size, random)
+    several = trials.starts_of.shape[1]
+
+    def tried(which: Indices, places: Vector) -> Vector:
+        log.starts += len(places) * several
+        return costs(searches[which], places)
+
+    if record := kept.find(part):
+        now = Populations(np.array(record["places"]), np.array(record["costs"]), record["generation"])
     else:
-        begin = Populations(np.array(record["places"]), np.array(record["costs"]), *record["done"])
-    now: Any = begin
-    tried, written = 0 if record is None else begin.tried, time.monotonic()
+        now = populations(tried, _seeds(trials, schedule, searches, size // 2), size, random)
+    written, unkept = time.monotonic(), record is None
 
     def keep() -> None:
-        done = [now.generation, now.tried]
-        kept.add({"part": part, "places": now.places.tolist(), "costs": now.costs.tolist(), "done": done})
+        nonlocal written, unkept
+        places, found, generation = now
+        kept.add({"part": part, "places": places.tolist(), "costs": found.tolist(), "generation": generation})
+        written, unkept = time.monotonic(), False
 
-    for now in evolve(lambda which, x: costs(searches[which], x), begin, random, question.generations):
-        log.starts += (now.tried - tried) * trials.starts_of.shape[1]
-        tried = now.tried
+    # of several starts the mean is still to become small where the worst one is the same
+    converged = CONVERGED * (TIE if several > 1 else 1.0)
+    for later in evolve(tried, now, random, question.generations, converged):
+        now, unkept = later, True
         if time.monotonic() > written + KEPT_EACH:
             keep()
-            written = time.monotonic()
         log.tell(title, now.generation, question.generations)
-    if now is not begin:
+    if unkept:
         keep()
-    last: Populations = now
-    return last
+    return now
 
 
 def _seeds(trials: Trials, schedule: Found | None, searches: Any, most: int) -> Vector:
@@ -124,7 +133,7 @@ def _seeds(trials: Trials, schedule: Found | None, searches: Any, most: int) -> 
     return np.concatenate([own[:, None], others], axis=1)
 
 
-def _smooth(trials: Trials, costs: SharedCosts, places: Vector, found: Vector) -> Vector:
+def _smooth(trials: Trials, costs: Costs, places: Vector, found: Vector) -> Vector:
     """Places nearer to the median of their neighbours, where that is equally good within 0.1 %.
 
     First all parameters move together, then each by itself: one that hardly matters is often far off.
@@ -151,7 +160,9 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
     values, defaults = trials.values(jobs, places), trials.defaults
     tuned, default = trials.judged(jobs, values, to_the_end=True), trials.default
     ours, before = trials.cost(jobs, tuned), trials.cost(jobs, default)
-    back = np.asarray((before < ours) & inside(trials.question.ranges, defaults, defaults))
+    nearest = trials.values(jobs, trials.places(jobs, defaults))  # within the ranges
+    allowed = [np.isclose(nearest[name], defaults[name], rtol=1e-9) for name in defaults]
+    back = (before < ours) & np.all(allowed, axis=0)
     values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
     judged = Judged(*(np.where(back[:, None], *both) for both in zip(default, tuned, strict=True)))
     return Found(values, judged, np.where(back, before, ours), restart_costs)

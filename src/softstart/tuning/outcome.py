@@ -43,7 +43,7 @@ class RobustSet:
     tuned, `defaults` what these were. `worst` is the metric at the quantile over all starts, `worst_default`
     that of the defaults; `excess` by which share the start times are beyond their bounds at the same
     quantile (0: in time). `cells` has the figures of each cell. `agreement` of `restarts` searches came
-    within 1 % of the best; `spread` is how far apart they are.
+    within 1 % of the best.
     """
 
     parameters: dict[str, Any]
@@ -54,7 +54,6 @@ class RobustSet:
     excess: float
     agreement: int
     restarts: int
-    spread: float
     cells: xarray.Dataset
     controller: RobustGains
 
@@ -66,7 +65,7 @@ class RobustSet:
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
         found = plain_fields(self, "cells", "controller")
-        return {**found, "feasible": self.feasible, "cells": table_of(self.cells)}
+        return {**found, "feasible": self.feasible, "cells": _rows(self.cells)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +134,14 @@ class Tuning:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
+        tables = {name: getattr(self, name) for name in ("schedule", "price", "between")}
         return {
             **self._asked(),
             "controller": self.controller,
             "given": given_to(self.question.recipe.make()),
             "free": {one.name: one.text() for one in self.question.ranges},
-            "schedule": None if self.schedule is None else table_of(self.schedule),
+            **{name: None if table is None else _rows(table) for name, table in tables.items()},
             "robust": None if self.robust is None else self.robust.summary(),
-            "price": None if self.price is None else table_of(self.price),
-            "between": None if self.between is None else table_of(self.between),
             "starts": self.starts,
             "seconds": self.seconds,
         }
@@ -170,13 +168,14 @@ class Tuning:
         By default the schedule, or the robust set if there is no schedule.
         """
         about = {"softstart": __version__, **self._asked(), "free": list(self.question.names)}
-        if what == "robust" or (what is None and self.schedule is None):
-            one = self._robust()
+        if what == "schedule" or (what is None and self.schedule is not None):
+            text = schedule_text(self._schedule_file(), about)
+        elif (one := self.robust) is None:
+            raise InputError("robust: no robust set was tuned; call tune with robust=True.")
+        else:
             saved = RobustFile(self._name(), one.parameters, one.controller.nominal)
             told = {"worst": one.worst, "worst_default": one.worst_default, "in_time": one.feasible}
             text = robust_text(saved, about | told)
-        else:
-            text = schedule_text(self._schedule_file(), about)
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def to_csv(self, path: str | Path) -> None:
@@ -184,7 +183,7 @@ class Tuning:
         saved = self._schedule_file()
         assert self.schedule is not None
         columns = {
-            str(name): np.asarray(values) for name, values in self.schedule.items() if name not in saved.gains
+            str(name): one.to_numpy() for name, one in self.schedule.items() if name not in saved.gains
         }
         text = schedule_csv(saved, columns)
         write_whole(Path(path), lambda stream: stream.write(text))
@@ -198,15 +197,8 @@ class Tuning:
             "gaps": list(q.gaps),
             "load_inertias": list(q.load_inertias),
             "scenarios": len(q.scenarios),
-            "quantile": q.quantile,
-            "seed": q.seed,
-            "restarts": q.restarts,
+            **{name: getattr(q, name) for name in ("quantile", "seed", "restarts")},
         }
-
-    def _robust(self) -> RobustSet:
-        if self.robust is None:
-            raise InputError("robust: no robust set was tuned; call tune with robust=True.")
-        return self.robust
 
     def _schedule_file(self) -> ScheduleFile:
         if self.schedule is None:
@@ -217,13 +209,12 @@ class Tuning:
         return ScheduleFile(q.recipe.name, *q.declared(), gains, given)
 
     def _name(self) -> str:
-        name = self.question.recipe.name
-        if not name:
-            raise InputError(
-                f"controller = {self.controller}: it has no name under which a file could call it; give tune "
-                "its name or path/to/file.py:ClassName instead of the object."
-            )
-        return name
+        if name := self.question.recipe.name:
+            return name
+        raise InputError(
+            f"controller = {self.controller}: it has no name under which a file could call it; give tune "
+            "its name or path/to/file.py:ClassName instead of the object."
+        )
 
 
 def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Gain]:
@@ -236,12 +227,11 @@ def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Ga
     return found
 
 
-def table_of(dataset: xarray.Dataset) -> dict[str, Any]:
+def _rows(dataset: xarray.Dataset) -> dict[str, Any]:
     """A dataset over the grid as nested lists, one row per gap; what is not finite is None."""
-
-    def plain(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
     return {
-        str(name): [list(map(plain, row)) for row in one.values.tolist()] for name, one in dataset.items()
+        str(name): [
+            [one if math.isfinite(one) else None for one in row] for row in values.to_numpy().tolist()
+        ]
+        for name, values in dataset.items()
     }

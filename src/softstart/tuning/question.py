@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from numbers import Real
 from typing import Any, NamedTuple
@@ -25,7 +25,6 @@ from softstart.quantities import multiplied, nearest, to_si
 from softstart.tuning.ranges import Range
 from softstart.tuning.search import latin
 
-Metric = str | Callable[[Mapping[str, Any]], Any]
 MARGIN = "margin"  # a metric that is made large
 
 
@@ -39,7 +38,7 @@ class Question:
     load_inertias: tuple[float, ...]
     ranges: tuple[Range, ...]
     scenarios: tuple[Scenario, ...]
-    metric: Metric
+    metric: str
     start_time: StartTime | None
     quantile: float
     seed: int
@@ -60,9 +59,7 @@ class Question:
     @property
     def metric_name(self) -> str:
         """Name of the figure that is made small; for the margin, which is made large, what is not left."""
-        if self.metric == MARGIN:
-            return "limit_share"
-        return self.metric if isinstance(self.metric, str) else getattr(self.metric, "__name__", "metric")
+        return "limit_share" if self.metric == MARGIN else self.metric
 
     @property
     def limited(self) -> bool:
@@ -80,12 +77,6 @@ class Question:
         """The drive or chain of a cell, as it is."""
         return self.drive.moved(*self.cells[cell])
 
-    def value_in(self, cell: int, name: str) -> float:
-        """A quantity that has a tolerance, in a cell; of a chain each gap goes with all others."""
-        found = self.drive_of(cell).knob(name)
-        assert found is not None
-        return float(found.value)
-
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""
         rows = [self.drive.moved(gap, self.load_inertias[0]).design_drive for gap in self.gaps]
@@ -101,24 +92,18 @@ class Question:
 
     def inputs(self) -> dict[str, Any]:
         """All of it as plain data: what saved parts belong to."""
-        plain = "gaps", "load_inertias", "quantile", "seed", "restarts", "population", "generations"
+        plain = (
+            "gaps", "load_inertias", "metric", "quantile", "seed", "restarts", "population", "generations"
+        )  # fmt: skip
         return {
             "version of softstart": __version__,
             "drive": self.drive.to_toml(),
             "controller": self.recipe.about(),
             "free parameters": [repr(one) for one in self.ranges],
             "tolerances": [repr(sorted(one.items())) for one in self.scenarios],
-            "metric": self.metric if isinstance(self.metric, str) else _code_of(self.metric),
             "start time": self.bound,
             **{name: getattr(self, name) for name in plain},
         }
-
-
-def _code_of(metric: Callable[..., Any]) -> str:
-    """A function's name and what it does, so that another one of the same name is told apart."""
-    code = getattr(metric, "__code__", None)
-    told = "" if code is None else f" {code.co_code.hex()} {code.co_consts!r} {code.co_names!r}"
-    return f"{getattr(metric, '__module__', '')}.{getattr(metric, '__qualname__', repr(metric))}{told}"
 
 
 def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
@@ -144,7 +129,7 @@ GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
 INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia
 
 
-def gaps_of(drive: Machine, given: Iterable[Any] | Any | None, name: str = "gaps") -> tuple[float, ...]:
+def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[float, ...]:
     """Gaps in rad, rising: numbers, texts with a unit, or multiples of the drive's own as "2x".
 
     Those of a chain are the sum of all its gaps at the motor shaft, widened alike.
@@ -152,46 +137,41 @@ def gaps_of(drive: Machine, given: Iterable[Any] | Any | None, name: str = "gaps
     >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
     (0.5, 0.5235987755982988, 1.0)
     """
-    own = drive.gap_and_inertia[0]
+    own, inertia = drive.gap_and_inertia
     if given is None:
         if not own > 0.0:
             raise InputError(
                 f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
             )
-        given = [f"{multiple}x" for multiple in GAP_MULTIPLES]
-    return _axis(given, name, "rad", drive, {"x": own})
+        given = [f"{factor}x" for factor in GAP_MULTIPLES]
+    return _axis(given, name, "rad", {"x": own}, lambda gap: drive.moved(gap, inertia))
 
 
-def inertias_of(
-    drive: Machine, given: Iterable[Any] | Any | None, name: str = "inertias"
-) -> tuple[float, ...]:
+def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tuple[float, ...]:
     """Load inertias in kg m2, rising; also multiples of the drive's own ("2x") or of the motor's ("5 J1").
 
     >>> [round(inertia, 3) for inertia in inertias_of(Drive.load("crane-4amtkf"), ["2 J1", "1x", 0.1])]
     [0.07, 0.1, 0.175]
     """
-    if given is None:
-        given = [f"{multiple}x" for multiple in INERTIA_MULTIPLES]
-    units = {"x": drive.gap_and_inertia[1], "J1": drive.motor_at_load}
-    return _axis(given, name, "kg*m^2", drive, units)
+    gap, own = drive.gap_and_inertia
+    given = [f"{factor}x" for factor in INERTIA_MULTIPLES] if given is None else given
+    units = {"x": own, "J1": drive.motor_at_load}
+    return _axis(given, name, "kg*m^2", units, lambda inertia: drive.moved(gap, inertia))
 
 
 def _axis(
-    given: Iterable[Any] | Any, name: str, unit: str, drive: Machine, units: dict[str, float]
+    given: Any, name: str, unit: str, units: dict[str, float], check: Callable[[float], object]
 ) -> tuple[float, ...]:
     """Values in SI, each once, rising."""
     listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
     if not listed:
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
-    gap, inertia = drive.gap_and_inertia
     found, wrong = set[float](), Mistakes()
     for one in listed:
         with wrong.noted():
             found.add(value := float(to_si(multiplied(one, name, units), unit, name=name)))
-            try:
-                drive.moved(*((value, inertia) if unit == "rad" else (gap, value)))
-            except InputError as error:
-                raise InputError(f"{name}: {sentence}" for sentence in error.sentences) from None
+            with wrong.noted(f"{name}: "):
+                check(value)
     wrong.settle()
     return tuple(sorted(found))
 
@@ -229,25 +209,22 @@ def scenarios_of(
     >>> len(scenarios_of(crane, {"stiffness": "10 %", "load_torque": "20 %", "torque_lag": [0, "2 ms"]}))
     9
     """
-    levels: dict[str, list[Level]] = {}
-    wrong: list[str] = []
+    levels, wrong = dict[str, list[Level]](), Mistakes()
     for name, given in (tolerances or {}).items():
-        try:
-            varied = _varied(drive, name)
-            levels[varied.name] = _levels(varied, given)
-            for level in levels[varied.name]:
-                drive.with_values({varied.name: level.of(varied.value)})
-        except InputError as error:
-            wrong += [s if s.startswith("tolerances") else f"tolerances: {s}" for s in error.sentences]
-    if wrong:
-        raise InputError(wrong)
+        with wrong.noted("tolerances: "):
+            knob = _knob(drive, name)
+            levels[knob.name] = _levels(knob, given)
+            for level in levels[knob.name]:
+                drive.with_values({knob.name: level.of(knob.value)})
+    wrong.settle()
     if not levels:
         return ({},)
     if math.prod(map(len, levels.values())) <= most:
-        combined = [dict(zip(levels, one, strict=True)) for one in itertools.product(*levels.values())]
+        combined = list(itertools.product(*levels.values()))
     else:
-        combined = _sampled(levels, seed, most)
-    return ({}, *combined)
+        places = latin(np.random.default_rng([seed, 1]), most, len(levels))
+        combined = [tuple(map(_within, levels.values(), place)) for place in places]
+    return ({}, *(dict(zip(levels, one, strict=True)) for one in combined))
 
 
 def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
@@ -269,7 +246,7 @@ def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario])
     return tuple(found)
 
 
-def _varied(drive: Machine, name: str) -> Knob:
+def _knob(drive: Machine, name: str) -> Knob:
     """The quantity of a drive or chain that has a tolerance."""
     found = drive.knob(name)
     if found is not None and found.parameter.unit:
@@ -277,43 +254,27 @@ def _varied(drive: Machine, name: str) -> Knob:
     known = {path: one for path in drive.knobs() if (one := drive.knob(path)) and one.parameter.unit}
     near = nearest(name, [*known, *(one.name for one in known.values())])
     hint = f"did you mean {near}?" if near else f"name one of its file, as {next(iter(known))}."
-    raise InputError(f"tolerances: {name} is not a quantity of a {drive.KIND}; {hint}")
+    raise InputError(f"{name} is not a quantity of a {drive.KIND}; {hint}")
 
 
-def _levels(varied: Knob, given: Any) -> list[Level]:
-    name, parameter = varied.name, varied.parameter
+def _levels(knob: Knob, given: Any) -> list[Level]:
+    name, unit = knob.name, knob.parameter.unit
     if isinstance(given, list | tuple | np.ndarray):
-        values = np.atleast_1d(to_si(list(given), parameter.unit, name=f"tolerances {name}"))
-        return [Level(0.0, float(value)) for value in values]
+        return [Level(0.0, float(value)) for value in np.atleast_1d(to_si(list(given), unit, name=name))]
     if isinstance(given, str) and given.strip().endswith("%"):
-        share = 0.01 * float(to_si(given.strip()[:-1], "1", name=f"tolerances {name}"))
+        share = 0.01 * float(to_si(given.strip()[:-1], "1", name=name))
         if not 0.0 < share < 1.0:
-            raise InputError(f'tolerances: {name} = "{given}": give a share above 0 % and below 100 %.')
+            raise InputError(f'{name} = "{given}": give a share above 0 % and below 100 %.')
         return [Level(1.0 - share, 0.0), Level(1.0 + share, 0.0)]
-    if isinstance(given, bool) or not isinstance(given, str | Real):
-        raise InputError(
-            f'tolerances: {name} = {given!r}: give a share as "10 %", a quantity, or a list of values.'
-        )
-    spread = float(to_si(given, parameter.unit, name=f"tolerances {name}"))
+    spread = float(to_si(given, unit, name=name))
     if not spread > 0.0:
-        raise InputError(f"tolerances: {name} = {given}: give how far it may be off, above 0.")
+        raise InputError(f"{name} = {given}: give how far it may be off, above 0.")
     return [Level(1.0, -spread), Level(1.0, spread)]
 
 
-def _sampled(levels: dict[str, list[Level]], seed: int, count: int) -> list[Scenario]:
-    """A Latin hypercube between the levels of each parameter; lists of values are drawn from."""
-    rng = np.random.default_rng([seed, 1])
-    found = []
-    for point in latin(rng, count, len(levels)):
-        scenario = {}
-        for (name, ends), share in zip(levels.items(), point, strict=True):
-            if ends[0].factor == 0.0:
-                scenario[name] = ends[int(share * len(ends))]
-            else:
-                low, high = ends
-                scenario[name] = Level(
-                    low.factor + share * (high.factor - low.factor),
-                    low.offset + share * (high.offset - low.offset),
-                )
-        found.append(scenario)
-    return found
+def _within(levels: list[Level], share: float) -> Level:
+    """A level between two, or one of a list of values."""
+    low, high = levels[0], levels[-1]
+    if low.factor == 0.0:
+        return levels[int(share * len(levels))]
+    return Level(*(one + share * (other - one) for one, other in zip(low, high, strict=True)))

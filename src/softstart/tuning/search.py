@@ -21,12 +21,11 @@ AGREES = 0.01  # of the best: within this share of it searches agree
 
 
 class Populations(NamedTuple):
-    """Places (axes: search, member, parameter), their costs, the generation, and how many were tried."""
+    """Places (axes: search, member, parameter), their costs, and the generation."""
 
     places: Vector
     costs: Vector
-    generation: int
-    tried: int
+    generation: int = 0
 
     @property
     def best(self) -> tuple[Vector, Vector]:
@@ -35,17 +34,19 @@ class Populations(NamedTuple):
         return self.places[rows, k], self.costs[rows, k]
 
 
-def populations(seeds: Vector, size: int, random: tuple[int, ...]) -> Vector:
-    """First places: the seeds (axes: search, seed, parameter), and a Latin hypercube of at least `size`."""
+def populations(costs: Costs, seeds: Vector, size: int, random: tuple[int, ...]) -> Populations:
+    """The first ones: the seeds (axes: search, seed, parameter), and a Latin hypercube of at least `size`."""
     rng = np.random.default_rng(random)
     fresh = max(size - seeds.shape[1], size // 2, 5)
-    return np.concatenate([seeds, [latin(rng, fresh, seeds.shape[2]) for _ in seeds]], axis=1)
+    places = np.concatenate([seeds, [latin(rng, fresh, seeds.shape[2]) for _ in seeds]], axis=1)
+    found = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
+    return Populations(places, found.reshape(places.shape[:2]))
 
 
 def evolve(
-    costs: Costs, first: Vector | Populations, random: tuple[int, ...], generations: int
+    costs: Costs, first: Populations, random: tuple[int, ...], generations: int, converged: float = CONVERGED
 ) -> Iterator[Populations]:
-    """The populations after each generation, the first ones included; DE/best/1/bin.
+    """The populations after each further generation; DE/best/1/bin.
 
     v = x_best + F (x_a - x_b), F drawn from 0.5 to 1, at random where it leaves the box; 70 % of its
     parameters replace those of a member. The candidate stays if it is no worse. A search whose costs are
@@ -54,20 +55,15 @@ def evolve(
 
     R. Storn, K. Price, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
 
-    >>> first = populations(np.full((1, 1, 2), 0.9), 16, (0,))
-    >>> *_, last = evolve(lambda which, x: np.sum((x - 0.3) ** 2, axis=1), first, (0,), 40)
+    >>> bowl = lambda which, x: np.sum((x - 0.3) ** 2, axis=1)
+    >>> first = populations(bowl, np.full((1, 1, 2), 0.9), 16, (0,))
+    >>> *_, last = evolve(bowl, first, (0,), 40)
     >>> last.best[0].round(2).tolist()
     [[0.3, 0.3]]
     """
-    if isinstance(first, Populations):
-        places, cost, begin, tried = first
-    else:
-        places, begin, tried = first, 0, first.shape[0] * first.shape[1]
-        cost = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
-        cost = cost.reshape(places.shape[:2])
-        yield Populations(places, cost, 0, tried)
+    places, cost, begin = first
     for number in range(begin + 1, generations + 1):
-        active = np.flatnonzero(cost.std(axis=1) > CONVERGED * np.abs(cost.mean(axis=1)))
+        active = np.flatnonzero(cost.std(axis=1) > converged * np.abs(cost.mean(axis=1)))
         if not active.size:
             return
         candidates = _candidates(places, cost, np.random.default_rng((*random, number)))[active]
@@ -77,8 +73,7 @@ def evolve(
         places, cost = places.copy(), cost.copy()
         places[active] = np.where(better[..., None], candidates, places[active])
         cost[active] = np.where(better, found, cost[active])
-        tried += found.size
-        yield Populations(places, cost, number, tried)
+        yield Populations(places, cost, number)
 
 
 def _candidates(places: Vector, costs: Vector, rng: np.random.Generator) -> Vector:
@@ -104,13 +99,11 @@ def latin(rng: np.random.Generator, count: int, size: int) -> Vector:
     return places
 
 
-def agreement(costs: Any, best: float) -> tuple[int, float]:
-    """How many of several searches came within 1 % of the best, and how far apart they are over the best.
+def agreement(costs: Any, settled: float) -> int:
+    """How many of several searches came within 1 % of the best of them and of what was settled on.
 
-    >>> agreement([1.0, 1.005, 1.2], 1.0)
-    (2, 0.2)
+    >>> agreement([1.0, 1.005, 1.2], 1.1)
+    2
     """
-    values = np.asarray(costs, dtype=np.float64)
-    scale = abs(best) or 1.0
-    near = int(np.sum(values <= best + AGREES * scale))
-    return near, float(f"{(values.max() - min(best, values.min())) / scale:.12g}")
+    best = min(settled, *costs)
+    return int(np.sum(np.asarray(costs) <= best + AGREES * (abs(best) or 1.0)))

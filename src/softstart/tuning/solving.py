@@ -21,7 +21,6 @@ from softstart.tuning.gains import Found, Log, Progress, best_gains
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.question import (
     MARGIN,
-    Metric,
     Question,
     gaps_of,
     inertias_of,
@@ -31,16 +30,15 @@ from softstart.tuning.question import (
 )
 from softstart.tuning.ranges import Free, ranges_of
 from softstart.tuning.tables import (
+    Asked,
     between_table,
-    check_metric,
     optima,
     price_table,
     robust_outcome,
     schedule_table,
 )
-from softstart.tuning.trials import Trials
+from softstart.tuning.trials import Part, Trials
 
-WORTH_SHARING = 20_000  # starts of a plain controller from which on processes are started
 GENERATIONS = 60
 DRAWN = 100  # drives that stand for an identification
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
@@ -54,7 +52,7 @@ def tune(
     *,
     parameters: Mapping[str, object] | None = None,
     free: Free = None,
-    metric: Metric = "k_dyn",
+    metric: str = "k_dyn",
     start_time: float | str | None = None,
     tolerances: Mapping[str, Any] | None = None,
     quantile: float = 1.0,
@@ -74,9 +72,9 @@ def tune(
 
     *Schedule*: the best gains of each cell of the grid, the controller set up for that cell's drive. *Robust
     set*: one set of gains, set up for the nominal drive, that is best over all cells. Candidates are ranked
-    by feasibility (start time within its bound), then excess, then metric. The defaults are a candidate
-    everywhere, so that no cell becomes worse by this rule, unless the user's own range in `free` leaves
-    them out.
+    by feasibility (start time within its bound), then excess, then metric; where the worst start is the same
+    (within 1e-6), by the mean over the starts. The defaults are a candidate everywhere, so that no cell
+    becomes worse by this rule, unless the range of a gain leaves them out.
 
     Parameters
     ----------
@@ -97,9 +95,8 @@ def tune(
         Names of the parameters to tune, or name -> (low, high) with ends in SI, with a unit, or as multiples
         of the default ("0.5x", "2x"). By default all that the controller says may be tuned, within the ranges
         that it names.
-    metric : str or callable
-        What is minimised: a figure of a start (of a chain also `k_dyn_2`, that of its second shaft), or a
-        function of the mapping of all figures (arrays, one value a start) that returns one number a start.
+    metric : str
+        The figure of a start that is minimised (of a chain also `k_dyn_2`, that of its second shaft).
         "margin" is made large: the least share left of the limits of shaft torque and start time (of a chain
         the permissible torque of each shaft); the tables have its complement `limit_share`.
     start_time : float or str, optional
@@ -107,9 +104,8 @@ def tune(
         default each start is to be no slower than with the controller's own defaults; for the margin to a
         permissible start time there is no other bound.
     tolerances : mapping, optional
-        What drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity, or a
-        list of values; of a chain also one mass or shaft ("shaft[2].gap"). Every candidate is judged by all
-        of these scenarios.
+        What drives may be off by, unknown to the controller, see `scenarios_of`: a parameter -> "10 %", a
+        quantity, or a list of values; of a chain also one mass or shaft ("shaft[2].gap").
     quantile : float
         Share of the starts that metric and bound are judged by; 1 is the worst case.
     schedule, robust : bool
@@ -119,15 +115,10 @@ def tune(
         By default that of drives; that of a chain takes longer.
     seed, restarts, population, generations : int
         Of the search. The same ones give the same bits, whoever computes.
-    workers : int, optional
-        How many parts of the work are done at once on this machine, by default one for each processor: by
-        threads where the controller is compiled, else by processes. 1 computes in this thread.
-    scheduler : str, optional
-        Address of a dask scheduler whose workers compute instead.
+    workers, scheduler, progress : optional
+        As in `sweep`; `progress` is called with a text.
     save_to : str or Path, optional
-        A file in which each finished part is kept at once, from which the same call goes on.
-    progress : callable, optional
-        Called with a text: what is being done, how many starts were made, and how many a second.
+        A file in which the searches are kept while they run, from which the same call goes on.
 
     Returns
     -------
@@ -137,8 +128,7 @@ def tune(
     Raises
     ------
     InputError
-        For bad input, for a file in `save_to` that holds something else, and for a controller or metric that
-        other processes cannot load where these are asked for.
+        For bad input, and for a file in `save_to` that holds something else.
     SimulationError
         For workers that cannot go on; finished parts are kept.
 
@@ -188,10 +178,8 @@ def tune(
     share: Any = quantile
     if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
         wrong.sentences.append(f"quantile = {share!r}: give a share of the starts above 0, at most 1.")
-    if not isinstance(metric, str) and not callable(metric):
-        wrong.sentences.append(
-            f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures."
-        )
+    if not isinstance(metric, str):
+        wrong.sentences.append(f"metric = {metric!r}: name a figure of a start, as k_dyn.")
     if metric == MARGIN and not has_margin(drive.limits):
         wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
     wrong.settle()
@@ -208,14 +196,15 @@ def tune(
     found: dict[str, tuple[Trials, Found]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
     with Records(target, question.inputs(), ["part"]) as kept:
-        with _pool_for(*sides.values(), workers=workers, scheduler=scheduler) as pool:
+        threads = next(iter(sides.values())).compiled
+        count = sharing(question, "the controller", workers, scheduler, threads)
+        with Pool(count, threads=threads, scheduler=scheduler, describe=_described) as pool:
             for name, trials in sides.items():
-                check_metric(trials)
                 before = found.get("schedule")
                 found[name] = trials, best_gains(trials, pool, kept, log, before and before[1])
         best = {}
         if certified and metric == "k_dyn":
-            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_optimum) as pool:
+            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
                 best = optima(pool, sides.values(), kept, log)
     scheduled = found.get("schedule")
     return Tuning(
@@ -229,20 +218,7 @@ def tune(
     )
 
 
-def _pool_for(first: Trials, *_: Trials, workers: int | None, scheduler: str | None) -> Pool:
-    """Where candidates are started: threads for compiled controllers, else processes, or a cluster."""
-    question = first.question
-    starts = len(question.cells) * len(question.scenarios) * question.restarts
-    small = starts * question.population * question.generations < WORTH_SHARING
-    if small and not first.compiled and scheduler is None:
-        return Pool(1)
-    count = sharing(question, "the controller or the metric", workers, scheduler, first.compiled)
-    return Pool(count, threads=first.compiled, scheduler=scheduler, describe=_candidates)
-
-
-def _candidates(part: Any) -> str:
-    return f"candidates from number {part.first + 1} on"
-
-
-def _optimum(asked: Any) -> str:
-    return f"the optimum of cell {asked.cell + 1}"
+def _described(task: Part | Asked) -> str:
+    if isinstance(task, Asked):
+        return f"the optimum of cell {task.cell + 1}"
+    return f"candidates from number {task.first + 1} on"

@@ -21,21 +21,12 @@ from softstart.tuning.gains import Found, Log
 from softstart.tuning.outcome import RobustSet, gains_on_grid
 from softstart.tuning.question import Question
 from softstart.tuning.search import agreement
-from softstart.tuning.trials import Judged, Trials, excess, in_time, upper
+from softstart.tuning.trials import Judged, Trials, excess, upper
 
 if TYPE_CHECKING:
     import xarray
 
 Columns = dict[str, tuple[Any, str, str]]  # name -> values of the cells, unit, meaning
-
-
-def check_metric(trials: Trials) -> None:
-    """Refuse a metric that no start has. Raises InputError."""
-    if not np.any(np.isfinite(trials.default.metric)):
-        raise InputError(
-            f"metric = {trials.question.metric_name}: no start of {trials.question.recipe.label} with its "
-            "defaults has this figure; choose another metric, or give parameters with which it starts."
-        )
 
 
 def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
@@ -47,15 +38,9 @@ def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
     columns |= {f"{one.name}_default": (trials.defaults[one.name], one.unit, "default")
                 for one in trials.question.ranges}  # fmt: skip
     columns |= _figures(trials, found.judged)
-    near, apart = zip(*map(_agreement, found.restart_costs, found.costs), strict=True)
-    columns["agreement"] = (np.array(near), "1", "searches within 1 % of the best")
-    columns["spread"] = (np.array(apart), "1", "how far apart the searches end")
+    near = np.array(list(map(agreement, found.restart_costs, found.costs)))
+    columns["agreement"] = (near, "1", "searches within 1 % of the best")
     return _dataset(trials.question, columns)
-
-
-def _agreement(restarts: Any, best: float) -> tuple[int, float]:
-    near, apart = agreement(restarts, min(best, restarts.min()))
-    return near, apart if bool(in_time(restarts).all()) else math.nan
 
 
 def robust_outcome(trials: Trials, found: Found) -> RobustSet:
@@ -63,7 +48,6 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     quantile = trials.question.quantile
     gains = {name: float(value[0]) for name, value in found.values.items()}
     ready, own = replace(trials.controller, **gains).set_up(trials.drives[0])
-    near, apart = _agreement(found.restart_costs[0], float(found.costs[0]))
     both = found.judged, trials.default
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
     return RobustSet(
@@ -73,9 +57,8 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
         worst=worst,
         worst_default=worst_default,
         excess=float(excess(found.judged.start_time, trials.bound, quantile)[0]),
-        agreement=near,
+        agreement=agreement(found.restart_costs[0], float(found.costs[0])),
         restarts=trials.question.restarts,
-        spread=apart,
         cells=_dataset(trials.question, _figures(trials, found.judged)),
         controller=RobustGains("robust", ready, own),
     )
@@ -116,19 +99,16 @@ def price_table(sides: dict[str, tuple[Trials, Found]], best: Optima) -> xarray.
         columns[side] = (values, "1", f"{question.metric_name} of the {side}")
         columns[f"{side}_bound"] = (bounds, "s", "bound on the start time")
         if best:
-            records = [best.get((cell, float(bound)), {}) for cell, bound in enumerate(bounds)]
-            least = _column(records, "k_dyn")
+            nothing = None, None
+            each = [best.get((cell, float(bound)), nothing) for cell, bound in enumerate(bounds)]
+            least, low = np.array(each, dtype=np.float64).T  # None becomes NaN
             columns[f"{side}_optimum"] = (least, "1", "least K_dyn of any start within the bound")
-            columns[f"{side}_lower_bound"] = (_column(records, "k_dyn_lower_bound"), "1", "its lower bound")
+            columns[f"{side}_lower_bound"] = (low, "1", "its lower bound")
             columns[f"{side}_over_optimum"] = (values / least, "1", f"{side} over optimum")
     if both:
         ratio = columns["robust"][0] / columns["schedule"][0]
         columns["robust_over_schedule"] = (ratio, "1", "what one set for all costs")
     return _dataset(question, columns)
-
-
-def _column(records: list[dict[str, Any]], key: str) -> Any:
-    return np.array([np.nan if record.get(key) is None else record[key] for record in records])
 
 
 def _by_cell(trials: Trials, values: Any) -> Any:
@@ -139,23 +119,18 @@ def _by_cell(trials: Trials, values: Any) -> Any:
 def _figures(trials: Trials, found: Judged) -> Columns:
     """Metric and start time, tuned and with the defaults, of each cell."""
     question, bound = trials.question, _by_cell(trials, trials.bound)
-    tuned, default = (Judged(*(_by_cell(trials, part) for part in one)) for one in (found, trials.default))
-    name, share = question.metric_name, question.quantile
+    name, share, columns = question.metric_name, question.quantile, Columns()
     over = "" if len(question.scenarios) == 1 else f", quantile {share:g} over the tolerances"
-    columns: Columns = {
-        name: (_over_scenarios(tuned.metric, share), "", f"{name}, tuned{over}"),
-        f"{name}_default": (_over_scenarios(default.metric, share), "", f"{name} of the defaults{over}"),
-    }
-    if over:
-        columns[f"{name}_as_is"] = (tuned.metric[:, 0], "", f"{name}, tuned, nothing off")
-    if name != "start_time":
-        for end, what, one in (("", "tuned", tuned), ("_default", "of the defaults", default)):
-            columns[f"start_time{end}"] = (one.start_time[:, 0], "s", f"start time, {what}, nothing off")
+    for end, what, one in (("", "tuned", found), ("_default", "of the defaults", trials.default)):
+        metric, start_time = (_by_cell(trials, part) for part in one)
+        columns[f"start_time{end}"] = (start_time[:, 0], "s", f"start time, {what}, nothing off")
+        columns[f"{name}{end}"] = (_over_scenarios(metric, share), "", f"{name}, {what}{over}")
+        if over and not end:
+            columns[f"{name}_as_is"] = (metric[:, 0], "", f"{name}, tuned, nothing off")
+        late = excess(start_time, bound, share)
+        columns[f"excess{end}"] = (late, "1", f"share by which the start time, {what}, is beyond its bound")
     columns["start_time_bound"] = (bound[:, 0], "s", "bound on the start time, nothing off")
-    late = excess(tuned.start_time, bound, share)
-    columns["excess"] = (late, "1", "share by which the start time is beyond its bound, 0 if not")
-    columns["excess_default"] = (excess(default.start_time, bound, share), "1", "the same of the defaults")
-    columns["in_time"] = (late == 0.0, "", "whether the bound is kept")
+    columns["in_time"] = (columns["excess"][0] == 0.0, "", "whether the bound is kept")
     return columns
 
 
@@ -168,24 +143,22 @@ def _over_scenarios(values: Any, share: float) -> Any:
 def _dataset(question: Question, columns: Columns) -> xarray.Dataset:
     import xarray
 
-    shape = (len(question.gaps), len(question.load_inertias))
-    dims = ("gap", "load_inertia")
-
-    def about(unit: str, meaning: str) -> dict[str, str]:
-        return {"units": unit, "long_name": meaning}
-
+    shape, dims = (len(question.gaps), len(question.load_inertias)), ("gap", "load_inertia")
     data = {
-        name: (dims, np.asarray(values).reshape(shape), about(unit, meaning))
+        name: (dims, np.asarray(values).reshape(shape), {"units": unit, "long_name": meaning})
         for name, (values, unit, meaning) in columns.items()
     }
     coordinates = {
-        "gap": ("gap", np.array(question.gaps), about("rad", "total gap")),
-        "load_inertia": ("load_inertia", np.array(question.load_inertias), about("kg*m^2", "inertia J2")),
-    }
+        "gap": ("gap", np.array(question.gaps), {"units": "rad", "long_name": "total gap"}),
+        "load_inertia": (
+            "load_inertia", np.array(question.load_inertias), {"units": "kg*m^2", "long_name": "inertia J2"}
+        ),
+    }  # fmt: skip
     return xarray.Dataset(data, coords=coordinates)
 
 
-Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
+# least K_dyn and its lower bound by cell and bound in s; None where there is none
+Optima = dict[tuple[int, float], tuple[float | None, float | None]]
 
 
 class Asked(NamedTuple):
@@ -201,35 +174,30 @@ def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Opt
     found: Optima = {}
     missing: dict[tuple[int, float], Asked] = {}
     for trials in sides:
-        question = trials.question
         for cell, bound in enumerate(_by_cell(trials, trials.bound)[:, 0].tolist()):
-            record = saved.find(("optimum", cell, bound))
-            if record is not None:
-                found[cell, bound] = record
+            if record := saved.find(("optimum", cell, bound)):
+                found[cell, bound] = record["k_dyn"], record["lower_bound"]
             elif math.isfinite(bound):
-                missing[cell, bound] = Asked(cell, bound, question.drive_of(cell))
-    for done, (one, record) in enumerate(pool.results(optimum_of, missing.values())):
+                missing[cell, bound] = Asked(cell, bound, trials.question.drive_of(cell))
+    for done, (one, best) in enumerate(pool.results(optimum_of, missing.values())):
         log.tell("optima", done, len(missing), "cell")
-        found[one.cell, one.bound] = record
-        if record["status"] != "NOT_FOUND":  # another attempt may find it
-            saved.add({"part": ("optimum", one.cell, one.bound), **record})
+        found[one.cell, one.bound] = best
+        if best[0] is not None:  # else another attempt may find it
+            part = ("optimum", one.cell, one.bound)
+            saved.add({"part": part, "k_dyn": best[0], "lower_bound": best[1]})
     return found
 
 
-def optimum_of(asked: Asked) -> dict[str, Any]:
+def optimum_of(asked: Asked) -> tuple[float | None, float | None]:
     """The optimum of a drive or chain, its motor without torque lag and rate limit: the harder yardstick.
 
     Where the start position is unknown, that of the hardest one as if it were known: no gains beat it.
     """
     names = {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0, "torque_noise": 0.0}
     ideal = asked.drive.with_values(names)
-    nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
         each = [optimize(one, asked.bound, terminal="reached") for one in ideal.positions.values()]
-    except InfeasibleError:
-        return {**nothing, "status": "INFEASIBLE"}
-    except (OptimumError, InputError):
-        return {**nothing, "status": "NOT_FOUND"}
+    except (InfeasibleError, OptimumError, InputError):
+        return None, None
     best = max(each, key=lambda one: one.k_dyn)
-    low = None if best.bound.kind == "none" else best.bound.k_dyn
-    return {"k_dyn": best.k_dyn, "k_dyn_lower_bound": low, "method": best.method, "status": "OPTIMAL"}
+    return best.k_dyn, None if best.bound.kind == "none" else best.bound.k_dyn

@@ -9,10 +9,8 @@ the larger, the later they are.
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +21,7 @@ from softstart.controller import CompiledController, make_controller
 from softstart.errors import InputError
 from softstart.parallel import Pool
 from softstart.quantities import nearest
-from softstart.start.batch import Batch, Figures, prepared
+from softstart.start.batch import Batch, prepared
 from softstart.tuning.question import MARGIN, Question
 
 Values = Mapping[str, Vector]  # parameter -> one value a candidate
@@ -65,6 +63,9 @@ class Trials:
         if np.isfinite(longest := float(self.bound.max())):
             self.time_limit = PATIENCE * longest
 
+    def __reduce__(self) -> Any:  # made again in another process
+        return Trials, (self.question, self.robust, (self.default, self.bound))
+
     def _measured(self) -> tuple[Judged, Vector]:
         """What the defaults reach, and the bounds that follow."""
         asked, default = self.question.start_time, self.judged(np.arange(len(self.drives)), {})
@@ -87,26 +88,23 @@ class Trials:
             )
         return found
 
-    def values(self, jobs: Any, places: Vector) -> dict[str, Vector]:
+    def values(self, jobs: Indices, places: Vector) -> dict[str, Vector]:
         """Values of the tuned parameters at places in their ranges; the last axis are the parameters."""
-        chosen = np.asarray(jobs)
         return {
-            one.name: one.value(places[..., k], self.defaults[one.name][chosen])
+            one.name: one.value(places[..., k], self.defaults[one.name][jobs])
             for k, one in enumerate(self.question.ranges)
         }
 
-    def places(self, jobs: Any, values: Values) -> Vector:
+    def places(self, jobs: Indices, values: Values) -> Vector:
         """The places of values; the last axis are the parameters."""
-        chosen = np.asarray(jobs)
-        each = [one.place(values[one.name], self.defaults[one.name][chosen]) for one in self.question.ranges]
+        each = [one.place(values[one.name], self.defaults[one.name][jobs]) for one in self.question.ranges]
         return np.stack(each, axis=-1)
 
-    def costs(self, jobs: Any, places: Vector) -> Vector:
+    def costs(self, jobs: Indices, places: Vector) -> Vector:
         """The cost of each place, one a row, for a job of its own."""
-        chosen = np.asarray(jobs)
-        return self.cost(chosen, self.judged(chosen, self.values(chosen, places)))
+        return self.cost(jobs, self.judged(jobs, self.values(jobs, places)))
 
-    def cost(self, jobs: Any, judged: Judged) -> Vector:
+    def cost(self, jobs: Indices, judged: Judged) -> Vector:
         """The cost of what candidates reach."""
         return cost(judged.metric, judged.start_time, self.bound[jobs], self.question.quantile)
 
@@ -137,39 +135,23 @@ class Trials:
                 for k in range(len(jobs))
             ]
             return Judged(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
-        return self._read(figured, starts.shape)
-
-    def _read(self, figured: Figures, shape: tuple[int, ...]) -> Judged:
-        found = {name: values for name, (values, _, _) in figured.items()}
         metric = self.question.metric
-        if metric == MARGIN:
-            value = 1.0 - found[MARGIN]
-        elif isinstance(metric, str):
-            if metric not in found:
-                near = nearest(metric, found)
-                hint = f"did you mean {near}?" if near else f"choose one of {', '.join(found)}."
-                raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
-            value = found[metric]
-        else:
-            value = np.asarray(metric(found))
-        count = math.prod(shape)
-        if value.shape != (count,) or value.dtype.kind not in "fiu":
-            raise InputError(
-                f"metric = {self.question.metric_name}: for {count} starts it gives {value.dtype} "
-                f"of shape {value.shape}; it has to be one number a start."
-            )
-        return Judged(value.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
+        if metric not in figured:
+            near = nearest(metric, figured)
+            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figured)}."
+            raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
+        found, time = (figured[name][0].reshape(starts.shape) for name in (metric, "start_time"))
+        return Judged(1.0 - found if metric == MARGIN else found.astype(np.float64), time)
 
 
 def _starts_of_cells(question: Question) -> Batch:
     """The machines that start: of each cell, one after another, those of all scenarios."""
-    gaps, inertias = np.array(question.cells).T
-    own: dict[str, Any] = {"gap": gaps, "load_inertia": inertias}
+    own: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(question.cells).T, strict=True))
+    drives: list[Any] = [question.drive_of(cell) for cell in range(len(question.cells))]
     found = {}
     for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
-        value = own.get(name)
-        if value is None:
-            value = np.array([question.value_in(cell, name) for cell in range(gaps.size)])
+        # of a chain each gap goes with all others
+        value = own[name] if name in own else np.array([float(one.knob(name).value) for one in drives])
         columns = [one[name].of(value) if name in one else value for one in question.scenarios]
         found[name] = np.stack(columns, axis=1).ravel()
     return prepared(varied(question.drive, found))
@@ -186,50 +168,40 @@ def _defaults(question: Question, name: str, set_up: list[Any]) -> Vector:
     return np.array(values, dtype=np.float64)
 
 
-class SharedCosts:
-    """The costs of `trials`, computed by the workers of a pool in any number of parts: the same bits."""
-
-    def __init__(self, trials: Trials, pool: Pool) -> None:
-        self.trials, self.pool = trials, pool
-        elsewhere = pool.scheduler is not None or (pool.count > 1 and not pool.threads)
-        about = (trials.question, trials.robust, (trials.default, trials.bound))
-        self._packed = pickle.dumps(about) if elsewhere else b""
-
-    def __call__(self, jobs: Indices, places: Vector) -> Vector:
-        most = STARTS_A_THREAD if self.pool.threads and self.pool.count > 1 else STARTS_A_CALL
-        size = min(-(-len(jobs) // self.pool.count), max(most // self.trials.starts_of.shape[1], 1))
-        parts = (Part(k, self._packed, jobs[k : k + size], places[k : k + size])
-                 for k in range(0, len(jobs), size))  # fmt: skip
-        found = np.empty(len(jobs))
-        for part, costs in self.pool.results(_costs if self._packed else self._here, parts):
-            found[part.first : part.first + size] = costs
-        return found
-
-    def _here(self, part: Part) -> Vector:
-        return self.trials.costs(part.jobs, part.places)
-
-
 class Part(NamedTuple):
-    """Candidates from number `first` on; `trials` makes the same trials in another process."""
+    """Candidates from number `first` on, each a place for a job of its own."""
 
     first: int
-    trials: bytes
+    trials: Trials
     jobs: Indices
     places: Vector
 
 
-@lru_cache(maxsize=2)
-def _trials(packed: bytes) -> Trials:
-    return Trials(*pickle.loads(packed))
+def _costs_of(part: Part) -> Vector:
+    return part.trials.costs(part.jobs, part.places)
 
 
-def _costs(part: Part) -> Vector:
-    return _trials(part.trials).costs(part.jobs, part.places)
+def shared_costs(trials: Trials, pool: Pool, jobs: Indices, places: Vector) -> Vector:
+    """The costs of candidates, computed by the workers of a pool in any number of parts: the same bits."""
+    most = STARTS_A_THREAD if pool.threads and pool.count > 1 else STARTS_A_CALL
+    size = min(-(-len(jobs) // pool.count), max(most // trials.starts_of.shape[1], 1))
+    parts = (Part(k, trials, jobs[k : k + size], places[k : k + size]) for k in range(0, len(jobs), size))
+    found = np.empty(len(jobs))
+    for part, costs in pool.results(_costs_of, parts):
+        found[part.first : part.first + size] = costs
+    return found
 
 
 TOO_SLOW = 1e30  # where the costs of candidates begin that start, but not in time
 UNFINISHED = 1e60  # where those begin that do not start at all
 SLACK = 1e-9  # of the bound on the start time, for rounding
+TIE = 1e-6  # share of the metric within which the mean over the starts decides
+
+
+def _within(values: Any, quantile: float) -> Any:
+    """The share `quantile` of the last axis, rising."""
+    count = max(math.ceil(quantile * np.shape(values)[-1] - 1e-9), 1)
+    return np.sort(values, axis=-1)[..., :count]
 
 
 def upper(values: Any, quantile: float) -> Any:
@@ -238,9 +210,7 @@ def upper(values: Any, quantile: float) -> Any:
     >>> float(upper(np.array([3.0, 1.0, 2.0, np.inf]), 0.75)), float(upper(np.array([3.0, 1.0]), 1.0))
     (3.0, 3.0)
     """
-    count = np.shape(values)[-1]
-    index = max(math.ceil(quantile * count - 1e-9), 1) - 1
-    return np.sort(values, axis=-1)[..., index]
+    return _within(values, quantile)[..., -1]
 
 
 def excess(start_time: Any, bound: Any, quantile: float) -> Any:
@@ -254,15 +224,17 @@ def cost(metric: Any, start_time: Any, bound: Any, quantile: float) -> Vector:
     """The lower the better: in time beats too slow, less too slow beats more, then the metric decides.
 
     The last axis are the starts that one candidate is judged by; metric and start time both count at their
-    `quantile` over these. A start that fails or does not reach its target speed is the worst of all, and
-    candidates with fewer of them are better.
+    `quantile` over these. Where metrics are the same within 1e-6, the mean over the starts decides. A start
+    that fails or does not reach its target speed is the worst of all, and candidates with fewer of them are
+    better.
 
     >>> t = np.array([[0.3], [0.4], [0.5], [np.nan]])
     >>> cost(np.array([[2.0], [1.0], [1.0], [1.0]]), t, 0.35, 1.0).argsort().tolist()
     [0, 1, 2, 3]
     """
     failed = np.isnan(metric) | np.isnan(start_time)
-    value = upper(np.where(failed, np.inf, metric), quantile)
+    kept = _within(np.where(failed, np.inf, metric), quantile)
+    value = kept[..., -1] + TIE * kept.mean(axis=-1)
     over = excess(np.where(failed, np.nan, start_time), bound, quantile)
     timely = np.isfinite(over)
     ranked = np.where(over == 0.0, value, TOO_SLOW * (1.0 + np.where(timely, over, 0.0)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from softstart.drive import PARAMETERS
 from softstart.start.status import Status
-from softstart.sweeping.summary import pieces
+from softstart.sweeping.summary import SHARES, pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
 from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number
@@ -198,7 +198,7 @@ def _tables(results: xarray.Dataset, summary: Summary) -> list[Table]:
     ]  # fmt: skip
     spreads = [
         [name, label("", _unit(results, name), ""),
-         *column_of([spread.least, *spread.quantiles.values(), spread.most], 5)]
+         *column_of([spread[one] for one in ("min", *SHARES, "max")], 5)]
         for name, spread in summary.spreads.items()
     ]  # fmt: skip
     numbers = [Column(heading) for heading in ("values", "from", "to")]
@@ -219,12 +219,12 @@ def conclusion(results: xarray.Dataset, summary: Summary) -> str:
     found = [f"{of_the_starts(summary.share_reached)} reached the target speed."]
     if summary.worst:
         places = ", ".join(f"{name} {_text(value, 5)}" for name, value in summary.worst.items())
-        most = f"{summary.spreads[summary.judged].most:.4g}"
+        most = f"{summary.spreads[summary.judged]['max']:.4g}"
         unit = label(most, _unit(results, summary.judged), " ")
         found.insert(0, f"Largest {label(summary.judged)} {unit} at {places}.")
     if summary.share_kept is not None:
         least = summary.spreads.get("margin")
-        margin = f", least margin {100.0 * least.least:.3g} %" if least is not None and least.count else ""
+        margin = f", least margin {100.0 * least['min']:.3g} %" if least and least["count"] else ""
         kept = f"{of_the_starts(summary.share_kept)} keep the limits of shaft torque and start time"
         found.append(f"{kept}{margin}.")
     return " ".join(found)
@@ -245,7 +245,7 @@ def sweep_sheet(
     spreads = summary.spreads.items()
     files: dict[str, str | Writer] = {}
     if spreads:
-        records = [{"figure": one, "unit": _unit(results, one)} | spread.summary() for one, spread in spreads]
+        records = [{"figure": one, "unit": _unit(results, one), **spread} for one, spread in spreads]
         files["sweep.csv"] = records_file(records)
     if summary.starts <= MOST_WRITTEN:
         files[FILE] = partial(_write_cells, results)
@@ -262,7 +262,7 @@ def sweep_sheet(
         figures={
             file: partial(sweep_figure, results, name)
             for file, name in drawn.items()
-            if name in summary.spreads and summary.spreads[name].count and _drawn(results, name)
+            if name in summary.spreads and summary.spreads[name]["count"] and _drawn(results, name)
         },
         files=files,
         machine=drive,

@@ -56,8 +56,7 @@ class Sweeping:
     def finished(self, folder: Path) -> dict[str, int]:
         """The files of the finished chunks, and when each was written."""
         parts = parts_in(folder / "status" / "softstart.sqlite")
-        chunks = [one["part"] for one in parts if isinstance(one["part"], list)]
-        names = ["/".join(["status", "c", *map(str, index)]) for index in chunks]
+        names = ["/".join(["status", "c", *map(str, one["part"])]) for one in parts]
         return {name: (folder / name).stat().st_mtime_ns for name in names}
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:

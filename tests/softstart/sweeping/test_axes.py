@@ -13,7 +13,7 @@ CRANE = Drive.load("crane-4amtkf")
 
 
 def test_names_and_units():
-    axes = read_grid(
+    grid = read_grid(
         {
             "load.inertia": ["700 kg*cm^2", 0.175],
             "gap": np.array([0.5, 2.0]),
@@ -24,13 +24,11 @@ def test_names_and_units():
         Recipe("ramp"),
         CRANE,
     )
-    assert [axis.name for axis in axes] == [
-        "load_inertia", "gap", "controller_time", "load_kind", "controller_period",
-    ]  # fmt: skip
-    assert [list(axis.columns[0].values) for axis in axes] == [
-        [0.07, 0.175], [0.5, 2.0], [0.12, 0.2], ["reactive", "active"], [1.0, 2.0],
-    ]  # fmt: skip
-    assert [axis.columns[0].unit for axis in axes] == ["kg*m^2", "rad", "s", "", "s"]
+    assert {name: one.values.tolist() for name, one in grid.items()} == {
+        "load_inertia": [0.07, 0.175], "gap": [0.5, 2.0], "controller_time": [0.12, 0.2],
+        "load_kind": ["reactive", "active"], "controller_period": [1.0, 2.0],
+    }  # fmt: skip
+    assert [one.attrs.get("units") for one in grid.values()] == ["kg*m^2", "rad", "s", None, "s"]
 
 
 ONE_SENTENCE = {
@@ -52,7 +50,7 @@ ONE_SENTENCE = {
     "wrong unit": ({"load.inertia": ["1 N"]}, "direct", 'load.inertia[0] = "1 N"'),
     "not finite": ({"gap": [np.nan]}, "direct", "gap"),
     "twice": ({"gap": [0.5, 1, 0.5]}, "direct", "gap = 0.5: this value is given twice"),
-    "same axis": ({"gap": [1], "shaft.gap": [2]}, "direct", "shaft.gap: this is the same as gap"),
+    "same axis": ({"gap": [1], "shaft.gap": [2]}, "direct", "shaft.gap: gap is an axis already"),
     "kind": ({"load.kind": ["activ"]}, "direct", 'did you mean "active"?'),
     "a kind that is a number": ({"load.kind": [1]}, "direct", "takes names"),
     "the drive's name": ({"name": ["a"]}, "direct", "changes no start"),

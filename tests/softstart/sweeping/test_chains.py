@@ -5,7 +5,7 @@ import pytest
 
 from softstart import InputError, Status, simulate, sweep
 from softstart.chain import Chain
-from softstart.sweeping.compute import known_figures
+from softstart.start.batch import named
 
 CHAIN = Chain.from_toml(
     Chain.load("crane-4-mass").to_toml(),
@@ -69,7 +69,7 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bits(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         sweep(CHAIN, "s-curve", grid, chunk=1, to=folder, workers=1, progress=stopped)
     told = []
-    again = sweep(CHAIN, "s-curve", grid, to=folder, workers=2, progress=told.append)
+    again = sweep(CHAIN, "s-curve", grid, chunk=1, to=folder, workers=2, progress=told.append)
     assert told[0].done >= 2
     for name in whole.data_vars:
         np.testing.assert_array_equal(whole[name].values, again[name].values)
@@ -93,7 +93,7 @@ def test_what_is_no_axis_of_a_chain(grid, said):
 
 
 def test_figures_of_a_chain_are_named():
-    known = known_figures(CHAIN.shaft_names)
+    known = named(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)
     results = sweep(CHAIN, "direct", {"gap": ["1x"]}, figures=["peak_torque_2", "used_torque"], workers=1)
     run = simulate(CHAIN, "direct")

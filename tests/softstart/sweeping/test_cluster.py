@@ -133,8 +133,6 @@ def test_tunings_and_limit_curves_are_the_same_on_a_cluster(cluster, tmp_path):
     again = tune(*asked, **options, workers=1, save_to=kept)
     assert again.starts == 0
     same(again, alone)
-    with pytest.raises(InputError, match="scheduler: the controller or the metric cannot be handed"):
-        tune(*asked, **options, metric=lambda figures: figures["peak_torque"], scheduler=address)
 
     def points(front):
         return [{**point.summary(), "seconds": 0.0} for point in front.points], [

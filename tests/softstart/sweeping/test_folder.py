@@ -49,8 +49,9 @@ def test_killed_at_random_instants_it_goes_on(sweeping, uninterrupted, tmp_path)
         before = after
     told = []
     found = sweep(
-        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=folder, workers=1, progress=told.append
-    )
+        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=folder, workers=1, chunk=sweeping.chunk,
+        progress=told.append,
+    )  # fmt: skip
     assert told[0].done == told[0].before >= sweeping.chunk * len(before)
     assert [now.done for now in told[1:]] == sorted({now.done for now in told[1:]})
     assert told[-1].done == told[-1].starts == 12_000
@@ -64,7 +65,7 @@ def test_a_finished_sweep_is_opened_and_not_computed_again(tmp_path):
     first = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")}
     told = []
-    again = sweep(CRANE, "ramp", GRID, to=str(tmp_path / "a"), progress=told.append, chunk=4)
+    again = sweep(CRANE, "ramp", GRID, to=str(tmp_path / "a"), progress=told.append, chunk=2)
     assert again.identical(first)
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")} == before
     assert [(now.done, now.before) for now in told] == [(6, 6)]
@@ -84,7 +85,7 @@ def test_it_is_a_zarr_folder_that_says_what_is_missing(tmp_path):
     assert begun.status.values.tolist() == [[0, 0], [-1, -1], [-1, -1]]
     assert np.isnan(begun.k_dyn.values[1:]).all()
     assert begun.k_dyn.chunks == ((1, 1, 1), (2,))
-    whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a")
+    whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
     memory = sweep(CRANE, "ramp", GRID, **OPTIONS)
     assert whole.drop_attrs().identical(memory.drop_attrs())
     assert (
@@ -128,7 +129,7 @@ def as_pipe(path):
     os.mkfifo(path)
 
 
-DAMAGES = [flip, swap, in_the_way, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
+DAMAGES = [flip, swap, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
            lambda path: path.write_bytes(path.read_bytes() + b"more")]  # fmt: skip
 
 
@@ -145,21 +146,21 @@ def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, n
     lost = 2 if damage is swap else 1
     told = []
     with warnings.catch_warnings(record=True, action="always") as sentences:
-        again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+        again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
     assert (told[0].before, told[-1].done) == (6 - 2 * lost, 6)
     assert again.identical(xarray.open_zarr(pristine, chunks=None))
     assert len(sentences) == 1
     assert sentences[0].category is DamagedWarning
     assert name in str(sentences[0].message)
     told.clear()
-    sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+    sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
     assert [now.before for now in told] == [6]
     assert {p.relative_to(folder) for p in folder.rglob("*")} == {
         p.relative_to(pristine) for p in pristine.rglob("*")
     }
 
 
-@pytest.mark.parametrize("damage", [flip, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
+@pytest.mark.parametrize("damage", [flip, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
 def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
     files = ("zarr.json", "k_dyn/zarr.json", "status/zarr.json", "gap/c/0")
     for number, name in enumerate(files):
@@ -173,6 +174,16 @@ def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
         assert {
             path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
         } == {path.relative_to(pristine): path.read_bytes() for path in pristine.rglob("*") if path.is_file()}
+
+
+@pytest.mark.filterwarnings("ignore::softstart.errors.DamagedWarning")  # it is named, too
+@pytest.mark.parametrize(("name", "damage"), [("k_dyn/c/0/0", in_the_way), ("status/c/0/0", as_folder),
+                                               ("gap/zarr.json", as_folder)])  # fmt: skip
+def test_what_is_no_file_of_a_sweep_is_not_removed(pristine, tmp_path, name, damage):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    damage(folder / name)
+    with pytest.raises(InputError, match=r"to = .*: nothing can be written there"):
+        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, as_folder, lambda path: path.write_bytes(bytes(4096))])
@@ -210,6 +221,7 @@ def test_a_folder_that_was_deleted_leaves_no_memory(tmp_path):
         ({"grid": dict(reversed(GRID.items()))}, "another order of the axes;"),
         ({"grid": {**GRID, "stiffness": [300.0]}}, "another order of the axes and axis stiffness;"),
         ({"until": 0.5}, "another until;"),
+        ({"chunk": 1}, "another chunk;"),
         ({"figures": ["k_dyn"], "fitted_to": CRANE}, "another figures and fitted_to;"),
     ],
 )  # fmt: skip
