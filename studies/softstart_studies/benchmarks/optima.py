@@ -87,7 +87,7 @@ def casadi_one_phase(start_time: float, guess: float) -> Answer:
 
 
 def _collocated(start_time: float, guess: float, intervals: Sequence[int]) -> Answer:
-    """Radau collocation of degree 3, constant torque in each interval; of two phases the first has an open gap.
+    """Radau collocation of degree 3, constant torque in each interval; the first of two phases is the gap.
 
     States: twist over half the gap, both speeds over the target speed.
     """

@@ -282,8 +282,8 @@ def claims(outcomes: Sequence[Outcome]) -> list[Claim]:
     if shares:
         found.append(
             Claim(
-                f"A batch of chains makes {AT_ONCE:,.0f} starts/s under constant torque, {SAMPLED:.0f} sampled at "
-                "1 kHz.",
+                f"A batch of chains makes {AT_ONCE:,.0f} starts/s under constant torque, "
+                f"{SAMPLED:.0f} with a controller at 1 kHz.",
                 Verdict.of(*(share >= 1.0 for share in shares)),
                 f"Least share of that: {min(shares):.2f}.",
             )
