@@ -1,6 +1,6 @@
 """`identify` beside least squares on LSODA, on the same simulated logs.
 
-The drive is the crane of [G] with a gap of 80 mrad, damped, without load torque, so that the peer need not model
+The drive is the crane of [G] with a gap of 80 mrad, damped, without load torque, so that the peer needs no
 dry friction. It starts from a random place in its gap. Each log has the torque demand and the angle of an
 encoder with 1024 lines every 4 ms; the torque is 1 N m (2.5 %) off in each sample, which nobody is told. The
 guess, the same for all, is off by up to a factor of 1.5 in every parameter, or true.

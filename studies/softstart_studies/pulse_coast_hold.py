@@ -36,8 +36,6 @@ Array = NDArray[np.float64]
 Changes = Mapping[str, Any]
 
 CONTROLLER = "pulse-coast-hold"
-REDUCED = ("reduced-first-stage", "reduced-two-stage", "acceleration-delay")
-FEEDBACK = "current-limit-feedback"
 MOST = {"reactive": 1.10, "active": 1.15}  # asked: over the optimum, in every cell
 MEAN = {"reactive": 1.06, "active": 1.08}
 K_DYN, SPREAD = 1.05, 0.03  # reactive load
@@ -328,58 +326,6 @@ def within_tolerances(found: Sequence[Case]) -> Claim:
     )
 
 
-# the other strategies on the same grid, told the same ----------------------------------------------------
-
-
-def rivals(kind: LoadKind, extent: Extent, progress: Progress) -> dict[str, Grid]:
-    """Each with its defaults for the drive that it is told, pulse-coast-hold last."""
-    found = {}
-    for name in ("direct", *REDUCED, FEEDBACK, CONTROLLER):
-        progress(f"{kind} load, {name}")
-        found[name] = run(kind, extent.gaps, extent.ratios, extent.phases, controller=published(name))
-    return found
-
-
-def later(found: Mapping[str, Grid], name: str) -> float:
-    """Start time over that of pulse-coast-hold, on the mean."""
-    return float((found[name].start_time / found[CONTROLLER].start_time).mean())
-
-
-def rivals_table(found: Mapping[LoadKind, Mapping[str, Grid]]) -> Table:
-    """A row a controller."""
-    rows = [
-        (kind, name, float(k.min()), float(k.max()), 100 * one.spread(k), later(grids, name))
-        for kind, grids in found.items()
-        for name, one in grids.items()
-        for k in [one.k_dyn]
-    ]
-    columns = ("load", "controller", "K_dyn, least", "K_dyn, most", "spread over gaps, %",
-               "start time over ours")  # fmt: skip
-    return Table("All strategies on the same grid, set up for gap 0.5 rad and J2 = 5 J1", columns, rows)
-
-
-def softer_than_its_rivals(found: Mapping[LoadKind, Mapping[str, Grid]]) -> Claim:
-    """What the reduced torques of [G] and a feedback make of the same unknowns."""
-    parts, softer = [], True
-    for kind, grids in found.items():
-        most = {name: float(one.k_dyn.max()) for name, one in grids.items()}
-        reduced = min(REDUCED, key=most.__getitem__)
-        quicker = later(grids, FEEDBACK) > 1.05
-        unbeaten = most[CONTROLLER] < most[FEEDBACK] or quicker
-        softer = softer and most[CONTROLLER] < most[reduced] and unbeaten
-        shown = (reduced, FEEDBACK, CONTROLLER)
-        spans = [f"{grids[name].k_dyn.min():.2f} to {most[name]:.2f}" for name in shown]
-        parts.append(
-            f"{kind} load: {reduced} {spans[0]}, {FEEDBACK} {spans[1]} with starts "
-            f"{100 * (later(grids, FEEDBACK) - 1):+.0f} %, {CONTROLLER} {spans[2]}"
-        )
-    return Claim(
-        "On the same grid no strategy of [G] starts as softly in the same time, all with their defaults.",
-        Verdict.of(softer),
-        f"K_dyn, {'; '.join(parts)}.",
-    )
-
-
 # figures and the study -----------------------------------------------------------------------------------
 
 
@@ -422,7 +368,7 @@ class PulseCoastHoldStudy(Study):
     pictures: ClassVar[tuple[str, ...]] = ("pulse-coast-hold-starts", "pulse-coast-hold-ratios")
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
-        """All of it: the grid for both kinds of load, the tolerances, the other controllers."""
+        """All of it: the grid for both kinds of load, the tolerances."""
         return present(Extent(), progress)
 
 
@@ -431,11 +377,10 @@ def present(extent: Extent, progress: Progress) -> StudyResult:
     grids = {kind: judged(kind, extent, progress) for kind in extent.kinds}
     costs = costs_table(extent, progress)
     tolerances = [case for kind in extent.kinds for case in cases(kind, extent, progress)]
-    others = {kind: rivals(kind, extent, progress) for kind in extent.kinds}
     progress("drawing")
     claims = [claim(one) for one in grids.values() for claim in (near_the_optimum, invariant_to_the_gap)]
     return PulseCoastHoldStudy.result(
-        (*map(grid_table, grids.values()), costs, tolerances_table(tolerances), rivals_table(others)),
-        (*claims, within_tolerances(tolerances), softer_than_its_rivals(others)),
+        (*map(grid_table, grids.values()), costs, tolerances_table(tolerances)),
+        (*claims, within_tolerances(tolerances)),
         (corners_figure(extent), ratios_figure(grids)),
     )

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from softstart import simulate
 from softstart.optimal.optimize import optimize
-from softstart.study import Verdict, find_study
+from softstart.study import Verdict
 from softstart_studies.crane import LAG, WITH_INVERTER
 from softstart_studies.pulse_coast_hold import (
     Case,
     Extent,
     Grid,
     Judged,
-    PulseCoastHoldStudy,
     cases,
     ideal,
     invariant_to_the_gap,
@@ -39,15 +36,6 @@ PART = Extent(
     tolerance_ratios=(5.0,),
     deviations=(),
 )
-
-
-@pytest.fixture(scope="module")
-def result():
-    return present(PART, lambda text: None)
-
-
-def test_it_is_registered():
-    assert isinstance(find_study("pulse-coast-hold"), PulseCoastHoldStudy)
 
 
 def test_drives_of_the_grid():
@@ -110,10 +98,7 @@ def test_verdicts_follow_the_numbers():
     np.testing.assert_allclose(shown, 1.02 / 0.97)
 
 
-def test_tables_can_be_written_and_pictures_are_there(result):
-    for table in result.tables:
-        assert table.rows
-        for row in table.rows:
-            assert not any(isinstance(cell, float) and not math.isfinite(cell) for cell in row)
-    assert tuple(result.figures) == PulseCoastHoldStudy.pictures
-    assert len({claim.statement for claim in result.claims}) == len(result.claims)
+def test_a_part_of_it_is_worked_out_and_drawn():
+    result = present(PART, lambda text: None)
+    assert [len(table.rows) for table in result.tables] == [2, 5, 4]
+    assert len(result.claims) == 3

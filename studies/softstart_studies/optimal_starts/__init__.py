@@ -2,8 +2,8 @@
 
 The optimal start of the crane is drawn by profiles.py (figure optimal-starts-profiles: motor torque, shaft
 torque and speeds, both gaps); limits.py has the least K_dyn over the start time, what no start undercuts and
-the controllers beside it; costs.py the terminal conditions, smooth torques and other drives; sensor.py one
-torque for several gaps. The theory is in docs/optimal-starts.md, the drive in drives.py.
+the controllers beside it; costs.py the terminal conditions; sensor.py one torque for several gaps. The theory
+is in docs/optimal-starts.md, the drive in drives.py.
 """
 
 from __future__ import annotations
@@ -28,8 +28,6 @@ class Found:
     fronts: list[Front]
     endings: list[costs.Endings]
     sensed: list[sensor.Sensed]
-    prices: list[costs.Price]
-    kinds: list[costs.Kind]
 
 
 def find(extent: Extent, progress: Progress) -> Found:
@@ -40,8 +38,6 @@ def find(extent: Extent, progress: Progress) -> Found:
         curves,
         [costs.endings(front, progress) for front in curves],
         sensor.sensed(extent, progress),
-        costs.prices(extent, progress),
-        costs.kinds(extent, progress),
     )
 
 
@@ -82,8 +78,6 @@ def present(found: Found, progress: Progress) -> StudyResult:
         costs.steady_costs(found.endings),
         sensor.sensor_pays(found.sensed),
         sensor.optimum_depends_on_gap(found.sensed),
-        costs.smooth_costs_little(found.prices),
-        costs.optimum_of_kinds_is_below(found.kinds),
     )
     landmarks, curves, controllers = limits.tables(found.fronts)
     tables = (
@@ -93,8 +87,6 @@ def present(found: Found, progress: Progress) -> StudyResult:
         controllers,
         costs.endings_table(found.endings),
         sensor.table(found.sensed),
-        costs.prices_table(found.prices),
-        costs.kinds_table(found.kinds),
     )
     progress("drawing")
     fronts = front_figure(found.fronts[0]), front_figure(found.fronts[-1])
