@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.paper_b import figures, orders, tables, verdicts
+from softstart_studies.paper_b import figures, tables, verdicts
 from softstart_studies.paper_b.vaz import VAZ, balanced
 
 __all__ = ["PaperB"]
@@ -41,7 +41,7 @@ class PaperB(Study):
         progress("varying what is assumed")
         made = (
             tables.printed_and_model(), tables.moments(found), tables.designs(found), tables.loads(),
-            tables.assumptions(), orders.convergence(),
+            tables.assumptions(),
         )  # fmt: skip
         claims = verdicts.claims(found)
         progress("drawing")
