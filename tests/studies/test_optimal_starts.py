@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from softstart import TorqueProfile, optimize, simulate
 from softstart.study import Verdict
 from softstart_studies.crane import TARGET
-from softstart_studies.optimal_starts import costs, find, limits, present, profiles, sensor
+from softstart_studies.optimal_starts import costs, find, limits, present, profiles
 from softstart_studies.optimal_starts.drives import (
     Extent,
     crane,
@@ -24,7 +22,6 @@ PART = Extent(
     gaps=(0.5,),
     multiples=(0.9, 1.2),
     points=3,
-    sensor_multiples=(),
     controllers=("direct", "reduced-two-stage", "current-limit-feedback"),
 )
 
@@ -34,9 +31,8 @@ pytestmark = pytest.mark.slow  # all wait for the study
 
 @pytest.fixture(scope="module")
 def found():
-    """A part of the study; the sensor's share, of narrower gaps, is added."""
-    narrow = Extent(sensor_multiples=(1.2,), sensor_gaps=(0.5, 0.6))
-    return replace(find(PART, lambda text: None), sensed=sensor.sensed(narrow, lambda text: None))
+    """A part of the study."""
+    return find(PART, lambda text: None)
 
 
 @pytest.fixture(scope="module")
@@ -94,28 +90,6 @@ def test_a_stricter_terminal_is_never_gentler(found):
             assert cost >= 1.0 - 5e-4  # what the linear program's grid may be worth
     last, k_dyn = list(one.k_dyn("steady").items())[-1]
     assert k_dyn >= one.k_dyn("synchronous")[last]
-
-
-def test_one_torque_for_several_gaps_is_above_the_own_optima(found):
-    (one,) = found.sensed
-    assert one.gaps == (0.5, 0.6)
-    assert one.alone[0] == pytest.approx(0.90924724, abs=1e-6)
-    for each in (one.blind, one.reacting):
-        assert max(each) >= one.hardest * (1.0 - 1e-6)  # both own optima hold for any number of contacts
-    assert max(one.reacting) < max(one.blind)
-    assert [row[1] for row in sensor.table(found.sensed).rows] == [0.5, 0.6]
-
-
-def test_a_torque_planned_again_is_one_start_of_the_drive():
-    """The pulse, and after the contact what is planned there, in one run."""
-    drive, time = crane(0.5), 0.2883042
-    contact, touching = sensor.at_contact(drive, 0.008)
-    rest = optimize(touching, time - contact, terminal="reached")
-    first = TorqueProfile.steps([0.0, 0.008, contact], [62.0, 0.0])
-    whole = first.followed_by(contact, rest.profile)
-    run = simulate(drive, "profile", parameters={"profile": whole})
-    assert run.k_dyn == pytest.approx(rest.k_dyn, rel=1e-7)
-    assert run.start_time == pytest.approx(contact + rest.end_time, rel=1e-6)
 
 
 @pytest.mark.parametrize("gap", [0.5, 2.0])

@@ -2,8 +2,8 @@
 
 The optimal start of the crane is drawn by profiles.py (figure optimal-starts-profiles: motor torque, shaft
 torque and speeds, both gaps); limits.py has the least K_dyn over the start time, what no start undercuts and
-the controllers beside it; costs.py the terminal conditions; sensor.py one torque for several gaps. The theory
-is in docs/optimal-starts.md, the drive in drives.py.
+the controllers beside it; costs.py the terminal conditions. The theory is in docs/optimal-starts.md, the
+drive in drives.py.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from softstart.optimal.front import Front
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.optimal_starts import costs, limits, profiles, sensor
+from softstart_studies.optimal_starts import costs, limits, profiles
 from softstart_studies.optimal_starts.drives import Extent
 
 __all__ = ["OptimalStarts"]
@@ -27,7 +27,6 @@ class Found:
     profiles: list[profiles.OptimalStart]
     fronts: list[Front]
     endings: list[costs.Endings]
-    sensed: list[sensor.Sensed]
 
 
 def find(extent: Extent, progress: Progress) -> Found:
@@ -37,7 +36,6 @@ def find(extent: Extent, progress: Progress) -> Found:
         profiles.starts(extent, progress),
         curves,
         [costs.endings(front, progress) for front in curves],
-        sensor.sensed(extent, progress),
     )
 
 
@@ -76,8 +74,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
         *limits.claims(found.fronts, progress),
         costs.reached_is_lower(found.endings),
         costs.steady_costs(found.endings),
-        sensor.sensor_pays(found.sensed),
-        sensor.optimum_depends_on_gap(found.sensed),
+        limits.optimum_depends_on_gap(),
     )
     landmarks, curves, controllers = limits.tables(found.fronts)
     tables = (
@@ -86,7 +83,6 @@ def present(found: Found, progress: Progress) -> StudyResult:
         curves,
         controllers,
         costs.endings_table(found.endings),
-        sensor.table(found.sensed),
     )
     progress("drawing")
     fronts = front_figure(found.fronts[0]), front_figure(found.fronts[-1])

@@ -27,8 +27,6 @@ class Extent:
     gaps: tuple[float, ...] = (0.5, 2.0)  # rad, new and worn
     multiples: tuple[float, ...] = (1.05, 1.2, 1.5)  # of the start time of direct
     points: int = 8  # of each front
-    sensor_multiples: tuple[float, ...] = (1.2, 1.35)  # of the start time of direct at the first gap
-    sensor_gaps: tuple[float, ...] = (0.5, 1.0, 2.0)
     controllers: tuple[str, ...] | None = None  # beside the fronts; None: all that are shipped
 
 

@@ -27,6 +27,7 @@ from softstart_studies.optimal_starts.drives import (
 
 AGREE = 2.5e-3  # of two methods
 MULTIPLE = 1.2  # of the start time of direct, at which the descent is asked too
+GAPS, MULTIPLES = (0.5, 1.0, 2.0), (1.2, 1.35)  # rad; of the start time of direct at the first gap
 
 
 def fronts(extent: Extent, progress: Progress) -> list[Front]:
@@ -219,4 +220,19 @@ def constant_torque(found: list[Front]) -> Claim:
         Verdict.of(min(ratios) >= 1.0),
         f"Shortest start time found, reached, K_dyn free: {said}. The load has its speed first at the top "
         "of a swing of the shaft, and a pause in the torque can make that swing larger.",
+    )
+
+
+def optimum_depends_on_gap() -> Claim:
+    """At equal start time; what a wide gap takes is time."""
+    times = [multiple * direct_time(GAPS[0]) for multiple in MULTIPLES]
+    found = {time: [optimize(crane(gap), time, terminal="reached").k_dyn for gap in GAPS] for time in times}
+    said = "; ".join(f"{time:.4f} s: {', '.join(f'{one:.4f}' for one in k)}" for time, k in found.items())
+    spread = [max(k) / min(k) for k in found.values()]
+    return Claim(
+        "The optimum is invariant to the gap.",
+        Verdict.of(max(spread) < 1.01),
+        f"Least K_dyn at {', '.join(f'{gap:g}' for gap in GAPS)} rad in the same start time: {said}; "
+        f"largest over least {max(spread):.3f} to {min(spread):.3f}. Torque profile and K_dyn both depend on "
+        "it; what does not is the form (pulse, coast, hold).",
     )
