@@ -10,7 +10,7 @@ from softstart import Engine
 from softstart.balancing.engine import shaking_of_shafts
 from softstart.study import find_study
 from softstart_studies.paper_b import PaperB, orders, tables, vaz
-from softstart_studies.paper_b.vaz import MOMENTS, RPM, SPEEDS, TUNING, VAZ, balanced, first_order
+from softstart_studies.paper_b.vaz import MOMENTS, RPM, TUNING, VAZ, balanced, first_order
 
 VERDICTS = {
     "Two shafts against the crank": "confirmed",
@@ -100,7 +100,6 @@ def test_courses_of_figures_2_and_3():
     assert one.shafts[i] == pytest.approx(one.sine[i], rel=1e-12)
     assert one.shafts / one.rpm**2 == pytest.approx(one.shafts[i] / 4500.0**2, rel=1e-12)
     assert one.inertia / one.rpm**2 == pytest.approx(one.inertia[i] / 4500.0**2, rel=1e-12)
-    assert [row[0] for row in tables.moments(found).rows] == list(SPEEDS)
 
 
 def test_an_arm_for_full_load_is_wrong_at_others():

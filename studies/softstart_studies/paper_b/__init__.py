@@ -40,7 +40,7 @@ class PaperB(Study):
             write_whole(out / "vaz-11113.toml", lambda stream: stream.write(VAZ.to_toml()))
         progress("varying what is assumed")
         made = (
-            tables.printed_and_model(), tables.moments(found), tables.designs(found), tables.loads(),
+            tables.printed_and_model(), tables.loads(),
             tables.assumptions(),
         )  # fmt: skip
         claims = verdicts.claims(found)

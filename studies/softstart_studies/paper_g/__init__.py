@@ -58,10 +58,6 @@ class PaperG(Study):
         tables = (
             curves.worked_table(),
             curves.agreement_table(drawn),
-            stages.durations_table(),
-            whole_start.table(starts),
-            set_up_once.wear_table(worn),
-            set_up_once.frequency_table(by_load, by_shaft),
             set_up_once.spreads_table(spreads),
             from_flank.table(),
         )
