@@ -76,15 +76,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
         costs.steady_costs(found.endings),
         limits.optimum_depends_on_gap(),
     )
-    landmarks, curves, controllers = limits.tables(found.fronts)
-    tables = (
-        landmarks,
-        profiles.table(found.profiles),
-        curves,
-        controllers,
-        costs.endings_table(found.endings),
-    )
     progress("drawing")
     fronts = front_figure(found.fronts[0]), front_figure(found.fronts[-1])
     drawn = profiles.figure(found.profiles), *fronts, costs.endings_figure(found.endings)
-    return OptimalStarts.result(tables, claims, drawn)
+    return OptimalStarts.result(limits.tables(found.fronts), claims, drawn)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from softstart.optimal.front import Front, FrontPoint
 from softstart.optimal.problem import TERMINALS, Terminal
-from softstart.study import Claim, Progress, Table, Verdict
+from softstart.study import Claim, Progress, Verdict
 from softstart.views.drawing import drawing, new_figure
 from softstart_studies.crane import K_DYN, draw_lines, percent
-from softstart_studies.optimal_starts.drives import crane, direct_time, gap_of, optima
+from softstart_studies.optimal_starts.drives import crane, gap_of, optima
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,18 +48,6 @@ def endings(front: Front, progress: Progress) -> Endings:
     return Endings(
         gap, {name: {one.start_time_bound: one for one in points} for name, points in found.items()}
     )
-
-
-def endings_table(found: Sequence[Endings]) -> Table:
-    """K_dyn of the three over the start time."""
-    rows = []
-    for one in found:
-        for time in one.by_terminal["reached"]:
-            k = [one.k_dyn(terminal).get(time) for terminal in TERMINALS]
-            more = [100 * (one.cost(name).get(time, math.nan) - 1) for name in ("synchronous", "steady")]
-            rows.append((one.gap, time, time / direct_time(one.gap), *k, *more))
-    columns = ("gap, rad", "start time, s", "x direct", *TERMINALS, "synchronous, % more", "steady, % more")
-    return Table("What the terminal condition costs", columns, rows)
 
 
 def reached_is_lower(found: Sequence[Endings]) -> Claim:

@@ -71,24 +71,14 @@ def any_contacts_bound(front: Front, one: ControllerPoint) -> float:
 
 
 def tables(found: list[Front]) -> tuple[Table, ...]:
-    """Landmarks of each gap, the curves, each controller against the optimum and the bound of any start."""
-    gaps = [gap_of(front) for front in found]
-    ones = [limit(gap) for gap in gaps]
-    points = [(gap, point) for gap, front in zip(gaps, found, strict=True) for point in front.points]
+    """The curves, and each controller against the optimum and the bound of any start."""
+    points = [(gap_of(front), point) for front in found for point in front.points]
     judged = [
         (gap_of(front), one, any_contacts_bound(front, one))
         for front in found
         for one in sorted(front.controllers, key=lambda c: c.ratio or math.inf)
     ]
     return (
-        Table.of("Landmarks: undamped, active load, reached", {
-            "gap, rad": gaps,
-            "direct, s": map(direct_time, gaps),
-            "shortest found, s": map(shortest_time, gaps),
-            "K_dyn = 1 at, s": [one.time_of_one for one in ones],
-            "x direct": [one.time_of_one / direct_time(one.gap) for one in ones],
-            "K_dyn however long it takes": [one.floor for one in ones],
-        }),
         Table.of("Least K_dyn over the start time, reached", {
             "gap, rad": [gap for gap, _ in points],
             "x direct": [point.start_time_bound / direct_time(gap) for gap, point in points],
