@@ -14,12 +14,11 @@ class Short(PaperC):
 
 @pytest.fixture(scope="module")
 def study():
-    told: list[str] = []
-    return Short().run(None, told.append), told
+    return Short().run(None, lambda doing: None)
 
 
 def table(study, title):
-    return next(one for one in study[0].tables if one.title == title)
+    return next(one for one in study.tables if one.title == title)
 
 
 def test_printed_and_recomputed_side_by_side(study):
@@ -63,8 +62,8 @@ def test_a_print_is_rounded_or_cut(value, print_, met):
 
 
 def test_verdicts(study):
-    found = {claim.statement.split(" ")[1]: claim for claim in study[0].claims}
-    assert [Verdict(claim.verdict).value for claim in study[0].claims] == [
+    found = {claim.statement.split(" ")[1]: claim for claim in study.claims}
+    assert [Verdict(claim.verdict).value for claim in study.claims] == [
         "refuted", "refuted", "confirmed", "confirmed", "partly",
     ]  # fmt: skip
     assert "costs 568 kgf m more; printed: 1512 less" in found["exponential"].evidence

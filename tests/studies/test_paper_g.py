@@ -11,7 +11,7 @@ from softstart import simulate
 from softstart.study import Verdict
 from softstart_studies.crane import CRANE, spread
 from softstart_studies.paper_g import PaperG, curves, from_flank, set_up_once, whole_start
-from softstart_studies.paper_g.crane import RATIOS, closed_form, crane, k_dyn, simulated, ways
+from softstart_studies.paper_g.crane import RATIOS, crane, simulated, ways
 
 
 @pytest.fixture(scope="module")
@@ -41,19 +41,6 @@ def test_curves_go_through_the_simulated_points(drawn):
         assert curve.values[on_axis] == pytest.approx(curve.exact, rel=1e-12)
 
 
-def test_all_curves_of_figure_2_have_the_base_of_the_heavy_load(drawn):
-    full = [curve.values[-1] for curve in drawn["2"]]
-    assert full == pytest.approx([3.11785, 3.11785, 2.71567, 2.71567], abs=5e-6)
-
-
-def test_figure_4_is_in_the_order_of_its_curves(drawn):
-    worn_1, worn_2, worn_open, new_1, new_2, new_open = (curve.values for curve in drawn["4"])
-    assert np.all(worn_1 >= worn_2)
-    assert np.all(worn_2 > worn_open)
-    assert np.all(new_1 >= new_2)
-    assert np.all(new_2 > new_open)
-
-
 def test_table_of_reference_to_all_printed_digits():
     rows = curves.worked_table().rows
     assert len(rows) == 20
@@ -73,43 +60,29 @@ def test_table_of_reference_to_all_printed_digits():
 
 # verdicts ----------------------------------------------------------------------------------------------
 
-VERDICTS = {
-    "Method 1 damps": "confirmed",
-    "Method 2 can bring": "confirmed",
-    "Method 2 is to be preferred": "refuted",
-    "(Not in [G]) Raised at the peak": "confirmed",
-    "A wider gap": "confirmed",
-    "A smaller J2": "partly",
-    "The least K_dyn": "refuted",
-    "Stage 2 lasts almost": "partly",
-    "The total time": "confirmed",
-    "Stage 1 lasts the same": "partly",
-    "Switching by time": "partly",
-    "Torque held reduced": "partly",
-    "The delay fits": "partly",
-    "Regulators acting": "partly",
-    "(Not in [G]) The conclusions hold": "partly",
+VERDICTS = {  # by the beginning of the statement, with the number that decides
+    "Method 1 damps": ("confirmed", "2.0386 as M1 -> 0"),
+    "Method 2 can bring": ("confirmed", "M1/Ms < 0.5236"),
+    "Method 2 is to be preferred": ("refuted", "first contact 1.2677, second 2.3894"),
+    "(Not in [G]) Raised at the peak": ("confirmed", "1.2677 at 0.5 rad and 2.2144 at 2 rad"),
+    "A wider gap": ("confirmed", "+56 %"),
+    "A smaller J2": ("partly", "3.1179 to 2.7157"),
+    "The least K_dyn": ("refuted", "0.856"),
+    "Stage 2 lasts almost": ("partly", "6 %, 14 %, 29 %"),
+    "The total time": ("confirmed", "2.8 times"),
+    "Stage 1 lasts the same": ("partly", "-17.6 %"),
+    "Switching by time": ("partly", "to 3.1279"),
+    "Torque held reduced": ("partly", "2.3948 to 3.2654"),
+    "The delay fits": ("partly", "1.9730 instead of 1.1383"),
+    "Regulators acting": ("partly", "1.2564 where the direct start has 5.2106"),
+    "(Not in [G]) The conclusions hold": ("partly", "1.4661"),
 }
 
 
-def test_each_conclusion_has_its_verdict_and_a_number(study):
-    claims = study.claims
-    assert len(claims) == len(VERDICTS)
-    for claim, (beginning, verdict) in zip(claims, VERDICTS.items(), strict=True):
+def test_each_conclusion_has_its_verdict_and_its_number(study):
+    for claim, (beginning, (verdict, number)) in zip(study.claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(beginning)
-        assert claim.verdict is Verdict(verdict), claim.statement
-        assert re.search(r"\d", claim.evidence)
-        assert "nan" not in claim.evidence.lower()
-
-
-def test_least_k_dyn_of_method_1_is_that_of_a_vanishing_torque():
-    # (17) with M1 = 0: the load torque alone closes the gap
-    for gap, least in ((0.5, 2.0386), (2.0, 2.1466)):
-        assert k_dyn(5, gap, 0.0, 1) == pytest.approx(least, abs=5e-5)
-        k = np.asarray(closed_form(crane(5, gap), RATIOS, 1).k_dyn)
-        assert np.all(np.diff(k) > 0)
-    assert k_dyn(2, 0.5, 0.0, 1) == pytest.approx(1.7444, abs=5e-5)
-    assert k_dyn(2, 0.5, 0.0, 1, None) > 2.0
+        assert (claim.verdict, number in claim.evidence) == (Verdict(verdict), True), claim
 
 
 @pytest.mark.parametrize("gap", [0.5, 2.0])
