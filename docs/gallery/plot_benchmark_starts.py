@@ -20,7 +20,7 @@ figure.set_label("Number of starts by softstart in the time of one start by LSOD
 table = result.tables[0]
 for row in table.rows:
     cells = dict(zip(table.columns, row, strict=True))
-    print(cells["strategy"], cells["peer"], cells["K_dyn diff."])
+    print(cells["start"], cells["peer"], cells["K_dyn diff."])
 
 # %%
 # The whole study: ``make benchmark``; for the method see :doc:`/benchmarks`.
