@@ -30,7 +30,6 @@ from softstart.identification.logs import Log
 from softstart.identification.planning import Experiment, made_up_log
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
-from softstart.views.drawing import COLOURS, drawing, head, new_figure
 
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
 SYMBOLS = ("J1", "J2", "c", "gap", "d")
@@ -260,29 +259,11 @@ def claims(found: Findings) -> tuple[Claim, ...]:
     )
 
 
-def figure(found: Findings) -> Any:
-    """Relative error of the gap of each fit that has not failed."""
-    cases = list(dict.fromkeys(case for case, _ in found.fits))
-    with drawing():
-        drawn, axes = new_figure(len(cases), 1, (7.0, 1.2 + 2.0 * len(cases)), squeeze=False)
-        for ax, case in zip(axes[:, 0], cases, strict=True):
-            for i, name in enumerate(METHODS):
-                fits = found.kept(case, name)
-                off = [100.0 * (one.values[3] / drive().gap - 1.0) for one in fits]
-                ax.plot(off, np.full(len(off), float(i)), "o", ms=4, alpha=0.6, color=COLOURS[i])
-            ax.axvline(0.0, color="black", lw=0.8)
-            ax.set_yticks(range(len(METHODS)), list(METHODS))
-            ax.set_ylim(len(METHODS) - 0.5, -0.5)
-            head(ax, f"guess {case}: error of the gap, % (each point a log)", "")
-    return drawn
-
-
 class IdentificationStudy(Study):
     """`identify` and its peer."""
 
     name: ClassVar[str] = "identification"
     title: ClassVar[str] = "The drive from logs: softstart beside least squares on LSODA"
-    pictures: ClassVar[tuple[str, ...]] = ("identification",)
 
     def __init__(self, extent: Extent | None = None) -> None:
         self.extent = extent or Extent()
@@ -290,4 +271,4 @@ class IdentificationStudy(Study):
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """Make the logs, fit them by each method, compare."""
         found = find(self.extent, progress)
-        return self.result([table(found)], claims(found), [figure(found)])
+        return StudyResult([table(found)], claims(found))

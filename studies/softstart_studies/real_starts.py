@@ -140,8 +140,8 @@ def _case(drive: Drive, names: Sequence[str], optimum: bool) -> Case:
 
 
 def tables(found: Findings) -> tuple[Table, ...]:
-    """The strategies from each position, the optima, and lives."""
-    return (*(_strategies(found, name) for name in found.drives), _optima(found), _order(found))
+    """The strategies from each position with their lives, and the optima."""
+    return (*(_strategies(found, name) for name in found.drives), _optima(found))
 
 
 def _strategies(found: Findings, name: str) -> Table:
@@ -175,16 +175,6 @@ def _optima(found: Findings) -> Table:
         "direct",
     )
     return Table(f"Least K_dyn in {SLOWER} times the start time of direct", columns, rows)
-
-
-def _order(found: Findings) -> Table:
-    rows = [
-        (*place, case.gentlest(), max(case.runs, key=case.life), *concordance(case))
-        for place, case in found.cases.items()
-    ]
-    columns = ("drive", "position", "gentlest in time", "longest life",
-               "pairs of strategies in the same order", "of")  # fmt: skip
-    return Table("Order by K_dyn and by life", columns, rows)
 
 
 def concordance(case: Case) -> tuple[int, int]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
@@ -56,5 +54,3 @@ def test_the_table_counts_fits_and_intervals(monkeypatch):
     assert rows[0][2:9] == [0.995] * 5 + ["10 of 10", 0]
     assert rows[1][2:9] == [None] * 5 + ["none", 2]
     assert rows[2][8] == 2
-    json.dumps(result.summary())
-    assert list(result.figures) == list(peers.IdentificationStudy.pictures)

@@ -74,6 +74,6 @@ def test_order_of_life_and_of_k_dyn(found):
 
 def test_tables_claims_and_figures(found):
     result = present(found, lambda text: None)
-    assert [len(table.rows) for table in result.tables] == [4, 4, 8, 8]
+    assert [len(table.rows) for table in result.tables] == [4, 4, 8]
     assert tuple(result.figures) == RealStarts.pictures
     assert len(result.claims) == 4
