@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -253,8 +253,7 @@ def costs_table(extent: Extent, progress: Progress) -> Table:
 # tolerances ----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One deviation, the worst of its cells and phases."""
 
     kind: LoadKind
@@ -307,12 +306,8 @@ def cases(kind: LoadKind, extent: Extent, progress: Progress) -> list[Case]:
 
 def tolerances_table(found: Sequence[Case]) -> Table:
     """A row a deviation."""
-    return Table.of("pulse-coast-hold, tolerances: the worst gap, inertia and encoder phase", {
-        "load": [case.kind for case in found],
-        "really": [case.what for case in found],
-        "K_dyn, most": [case.k_dyn for case in found],
-        "over the optimum, most": [case.over for case in found],
-    })  # fmt: skip
+    title = "pulse-coast-hold, tolerances: the worst gap, inertia and encoder phase"
+    return Table(title, ("load", "really", "K_dyn, most", "over the optimum, most"), found)
 
 
 def within_tolerances(found: Sequence[Case]) -> Claim:
