@@ -89,42 +89,49 @@ class Grid:
     k_dyn: Array
     start_time: Array  # s
     contacts: Array
-    really: Changes
+    optimum: Array  # the least K_dyn of each cell, (gap, J2, ...)
 
     def spread(self, k: Array) -> float:
         """Largest less least over gaps and phases, over their mean; the worst inertia."""
         return float((np.ptp(k, axis=(0, 2)) / k.mean(axis=(0, 2))).max())
 
-    def optima(self, times: Array) -> Array:
-        """The least K_dyn of each cell at these times, (gap, J2, ...).
-
-        At the longest start time of a cell it is smaller than at the others: a ratio to it is that of all
-        phases, or a little too large.
-        """
-        found = np.empty_like(times)
-        for i, j, k in np.ndindex(*times.shape):
-            drive = ideal(self.kind, self.gaps[i], self.ratios[j], **self.really)
-            found[i, j, k] = optimum(drive, float(times[i, j, k]))
-        return found
-
     @property
-    def latest(self) -> Array:
-        """The longest start time of each cell, s."""
-        longest: Array = self.start_time.max(axis=2, keepdims=True)
-        return longest
+    def over(self) -> Array:
+        """K_dyn over that of the optimum."""
+        over: Array = self.k_dyn / self.optimum
+        return over
+
+
+def latest(times: Array) -> Array:
+    """The longest start time of each cell, s.
+
+    There the optimum is smaller than at the others: a ratio to it is that of all phases, or a little too
+    large.
+    """
+    longest: Array = times.max(axis=2, keepdims=True)
+    return longest
 
 
 def run(
     kind: LoadKind, gaps: Sequence[float], ratios: Sequence[float], phases: int, *,
-    controller: Controller | None = None, told: Changes | None = None, really: Changes | None = None,
+    at: Callable[[Array], Array] = latest, controller: Controller | None = None,
+    told: Changes | None = None, really: Changes | None = None,
 ) -> Grid:  # fmt: skip
-    """Start all drives; `told` and `really` are how the drive told, and the drives, differ from the crane."""
+    """Start all drives, and find the optima at these of their start times.
+
+    `told` and `really` are how the drive told, and the drives, differ from the crane.
+    """
     batch = starts(kind, gaps, ratios, phases, **(really or {}))
     ready = controller or published(CONTROLLER)
     set_ups = ready.set_ups(WITH_INVERTER.replace(load_kind=kind, **(told or {})))
     found = prepared(batch).figures(set_ups, batch.mean_torque)
     k, times, contacts = (found[name][0].reshape(batch.shape) for name in ("k_dyn", "start_time", "contacts"))
-    return Grid(kind, gaps, ratios, k, times, contacts, really or {})
+    allowed = at(times)
+    optima = np.empty_like(allowed)
+    for i, j, phase in np.ndindex(*allowed.shape):
+        drive = ideal(kind, gaps[i], ratios[j], **(really or {}))
+        optima[i, j, phase] = optimum(drive, float(allowed[i, j, phase]))
+    return Grid(kind, gaps, ratios, k, times, contacts, optima)
 
 
 def ideal(kind: LoadKind, gap: float, ratio: float, **changed: Any) -> Drive:
@@ -151,47 +158,26 @@ def optimum(drive: Drive, start_time: float) -> float:
 # the grid: near the optimum, whatever gap and inertia ----------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A grid and the optimum of each cell at its longest start time."""
-
-    grid: Grid
-    optimum: Array
-
-    @property
-    def over(self) -> Array:
-        """K_dyn over that of the optimum."""
-        over: Array = self.grid.k_dyn / self.optimum
-        return over
-
-
-def judged(kind: LoadKind, extent: Extent, progress: Progress) -> Judged:
-    """All the cells of a kind of load."""
-    progress(f"{kind} load: {len(extent.gaps) * len(extent.ratios)} cells and their optima")
-    grid = run(kind, extent.gaps, extent.ratios, extent.phases)
-    return Judged(grid, grid.optima(grid.latest))
-
-
-def grid_table(found: Judged) -> Table:
+def grid_table(grid: Grid) -> Table:
     """A row a cell."""
-    grid, over = found.grid, found.over
+    over = grid.over
     gap, ratio = np.meshgrid(grid.gaps, grid.ratios, indexing="ij")
     return Table.of(f"{CONTROLLER}, {grid.kind} load, {grid.k_dyn.shape[2]} encoder phases", {
         "gap, rad": gap.ravel(),
         "J2/J1": ratio.ravel(),
         "K_dyn, least": grid.k_dyn.min(axis=2).ravel(),
         "K_dyn, most": grid.k_dyn.max(axis=2).ravel(),
-        "start time, s, longest": grid.latest.ravel(),
-        "optimum there": found.optimum.ravel(),
+        "start time, s, longest": latest(grid.start_time).ravel(),
+        "optimum there": grid.optimum.ravel(),
         "over the optimum, mean": over.mean(axis=2).ravel(),
         "over the optimum, most": over.max(axis=2).ravel(),
         "contacts": grid.contacts.max(axis=2).astype(int).ravel(),
     })  # fmt: skip
 
 
-def near_the_optimum(found: Judged) -> Claim:
+def near_the_optimum(grid: Grid) -> Claim:
     """In every cell, and on the mean."""
-    grid, over = found.grid, found.over
+    over = grid.over
     i, j, _ = map(int, np.unravel_index(np.argmax(over), over.shape))
     return Claim(
         f"Load {grid.kind}, its inertia, its speed and the gap unknown: K_dyn is at most "
@@ -199,14 +185,13 @@ def near_the_optimum(found: Judged) -> Claim:
         "on the mean.",
         Verdict.of(bool(over.max() <= MOST[grid.kind] and over.mean() <= MEAN[grid.kind])),
         f"At most {over.max():.3f} (gap {grid.gaps[i]:g} rad, J2 = {grid.ratios[j]:g} J1), on the mean "
-        f"{over.mean():.3f}, over {over.size} starts in {found.optimum.size} cells.",
+        f"{over.mean():.3f}, over {over.size} starts in {grid.optimum.size} cells.",
     )
 
 
-def invariant_to_the_gap(found: Judged) -> Claim:
+def invariant_to_the_gap(grid: Grid) -> Claim:
     """K_dyn itself over the gaps: with an active load that of the optimum varies, too."""
-    grid = found.grid
-    k, own, best = grid.k_dyn, grid.spread(grid.k_dyn), grid.spread(found.optimum)
+    k, own, best = grid.k_dyn, grid.spread(grid.k_dyn), grid.spread(grid.optimum)
     if grid.kind == "reactive":
         return Claim(
             f"With a reactive load K_dyn is at most {K_DYN:.2f} and the same over the gaps within "
@@ -243,8 +228,8 @@ def costs_table(extent: Extent, progress: Progress) -> Table:
         for gap, ratio in SMALL:
             own = PulseCoastHold(**given(ratio))
             cell = (gap,), (ratio,), extent.phases
-            grid = run("active", *cell, controller=own, told=changed, really=changed)
-            ratios.append(grid.k_dyn / grid.optima(grid.start_time))
+            grid = run("active", *cell, at=np.copy, controller=own, told=changed, really=changed)
+            ratios.append(grid.over)
         rows.append((name, float(np.mean(ratios)), float(np.max(ratios))))
     columns = ("and then", "over the optimum, mean", "over the optimum, most")
     return Table("What each costs, active load, cells with K_dyn below 1", columns, rows)
@@ -282,13 +267,13 @@ def _percent(deviation: float) -> str:
     return f"{100 * deviation:+.0f} %" if deviation else "as told"
 
 
-def rounded_up(time: Array) -> Array:
-    """To the next power of 1.01: starts that take about as long then share an optimum.
+def rounded_up(times: Array) -> Array:
+    """The longest of each cell, to the next power of 1.01: starts that take about as long share an optimum.
 
-    >>> rounded_up(np.array([0.25])).round(6)
-    array([0.250801])
+    >>> rounded_up(np.array([[[0.25, 0.2]]])).round(6)
+    array([[[0.250801]]])
     """
-    found: Array = 1.01 ** np.ceil(np.log(time) / np.log(1.01))
+    found: Array = 1.01 ** np.ceil(np.log(latest(times)) / np.log(1.01))
     return found
 
 
@@ -298,9 +283,8 @@ def cases(kind: LoadKind, extent: Extent, progress: Progress) -> list[Case]:
     for name, told, really in deviations(extent):
         progress(f"{kind} load, {name}")
         cells = extent.tolerance_gaps, extent.tolerance_ratios
-        grid = run(kind, *cells, extent.phases, told=told, really=really)
-        over = grid.k_dyn / grid.optima(rounded_up(grid.latest))
-        found.append(Case(kind, name, float(grid.k_dyn.max()), float(over.max())))
+        grid = run(kind, *cells, extent.phases, at=rounded_up, told=told, really=really)
+        found.append(Case(kind, name, float(grid.k_dyn.max()), float(grid.over.max())))
     return found
 
 
@@ -337,14 +321,14 @@ def corners_figure(extent: Extent) -> Figure:
     return starts_figure(columns)
 
 
-def ratios_figure(found: Mapping[LoadKind, Judged]) -> Figure:
+def ratios_figure(found: Mapping[LoadKind, Grid]) -> Figure:
     """The worst K_dyn over the optimum of each cell, as a map."""
     worst = {kind: one.over.max(axis=2) for kind, one in found.items()}
     scale = colour_scale(np.array([1.0, *MOST.values()]), *worst.values())
     with drawing():
         figure, axes = panels(len(found), (4.2, 3.4), 2, "$J_2/J_1$", "gap, rad")
         for panel, (kind, one) in zip(axes, found.items(), strict=True):
-            ratios, gaps = ([f"{value:g}" for value in axis] for axis in (one.grid.ratios, one.grid.gaps))
+            ratios, gaps = ([f"{value:g}" for value in axis] for axis in (one.ratios, one.gaps))
             heat_map(panel, ratios, gaps, worst[kind], scale, decimals=3)
             panel.set_title(f"{kind} load (at most {MOST[kind]:.2f} asked)", loc="left")
         figure.suptitle("worst $K_{dyn}$ of each cell over that of the optimum", fontsize=9.5)
@@ -369,7 +353,10 @@ class PulseCoastHoldStudy(Study):
 
 def present(extent: Extent, progress: Progress) -> StudyResult:
     """Work it out, and say and draw what came out."""
-    grids = {kind: judged(kind, extent, progress) for kind in extent.kinds}
+    grids = {}
+    for kind in extent.kinds:
+        progress(f"{kind} load: {len(extent.gaps) * len(extent.ratios)} cells and their optima")
+        grids[kind] = run(kind, extent.gaps, extent.ratios, extent.phases)
     costs = costs_table(extent, progress)
     tolerances = [case for kind in extent.kinds for case in cases(kind, extent, progress)]
     progress("drawing")
