@@ -91,11 +91,9 @@ package-check: package
 package-test: package
 	$(BIN)/python .ci/package.py dist --whole
 
-benchmark: $(VENV)/.installed-benchmark
+benchmark: $(VENV)/.installed
 	$(BIN)/softstart study benchmark-starts --out results/benchmark-starts
 	$(BIN)/softstart study benchmark-optima --out results/benchmark-optima
-	$(BIN)/softstart study benchmark-sweeps --out results/benchmark-sweeps
-	$(BIN)/softstart study benchmark-chains --out results/benchmark-chains
 
 clean:
 	rm -rf $(VENV) $(FLOORS) results dist docs/_build docs/gallery_pages
@@ -119,10 +117,6 @@ $(FLOORS)/.installed: pyproject.toml $(VENV)/.installed-dev
 	rm -rf $(FLOORS)
 	$(BIN)/uv venv --quiet --python 3.11 $(FLOORS)
 	$(BIN)/uv pip install --quiet --python $(FLOORS)/bin/python --resolution lowest-direct --editable '.[test]'
-	@touch $@
-
-$(VENV)/.installed-benchmark: $(VENV)/.installed-test
-	$(PIP) install --editable '.[benchmark]'
 	@touch $@
 
 $(VENV)/.installed-docs: $(VENV)/.installed

@@ -7,9 +7,9 @@ of each method is replayed on the exact plant.
 """
 
 # %%
-# Crane drive of [G], gap 0.5 rad, to 60 rad/s within 0.2883 s. The study also includes rockit, dymos and
-# GEKKO, if installed, and a shorter start time.
-from softstart_studies.benchmarks.optima.study import BenchmarkOptima
+# Crane drive of [G], gap 0.5 rad, to 60 rad/s within 0.2883 s. The study also includes the same problem
+# written plainly in CasADi, and a shorter start time.
+from softstart_studies.benchmarks.optima import BenchmarkOptima
 
 methods = ("closed-form", "descent", "collocation")
 study = BenchmarkOptima(methods, start_times=[0.2883], repetitions=0)
@@ -25,4 +25,4 @@ for row in table.rows:
     print(" | ".join(str(cell) for cell in row))
 
 # %%
-# All packages: ``make benchmark``; for the method see :doc:`/benchmarks`.
+# The whole study: ``make benchmark``; for the method see :doc:`/benchmarks`.

@@ -3,12 +3,12 @@
 
 softstart evaluates the motion between two events and the instant of the next event in closed form; a
 general integrator needs hundreds of steps for the same curve. Both simulate the same starts to the same
-end, each in its own process, with rates by processor time.
+end, with rates by processor time.
 """
 
 # %%
 # Constant and staged torque, compared with ``solve_ivp(method="LSODA")`` with located events, in one pass.
-# The study makes seven passes and also includes python-control and diffrax.
+# The study makes seven passes and also includes chains, sampled torque and python-control.
 from softstart_studies.benchmarks.starts import DUELS, BenchmarkStarts
 
 result = BenchmarkStarts(DUELS[:3], passes=1).run(None, lambda doing: None)
@@ -20,7 +20,7 @@ figure.set_label("Number of starts by softstart in the time of one start by LSOD
 table = result.tables[0]
 for row in table.rows:
     cells = dict(zip(table.columns, row, strict=True))
-    print(cells["strategy"], cells["peer"], cells["K_dyn diff."])
+    print(cells["start"], cells["peer"], cells["K_dyn diff."])
 
 # %%
-# All packages: ``make benchmark``; for the method see :doc:`/benchmarks`.
+# The whole study: ``make benchmark``; for the method see :doc:`/benchmarks`.

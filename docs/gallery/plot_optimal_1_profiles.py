@@ -26,7 +26,7 @@ for start in found:
     print(f"{start.multiple:.2f} x direct: K_dyn {point.k_dyn:.6f}, bound {point.k_dyn_lower_bound:.6f}")
 
 # %%
-# With the worn gap, all terminals and other drives: ``softstart study optimal-starts --out results`` (3
+# With the worn gap and all terminals: ``softstart study optimal-starts --out results`` (3
 # min); the theory is on :doc:`/optimal-starts`.
 #
 # **References.** [G] R. P. Gerasymiak, V. V. Subbotin, *Dual-mass mechanical part electromechanical system

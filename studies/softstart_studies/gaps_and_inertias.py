@@ -115,24 +115,11 @@ def grid(extent: Extent, progress: Progress) -> Grid:
     return found
 
 
-# tables --------------------------------------------------------------------------------------------------
+# table ---------------------------------------------------------------------------------------------------
 
 
-def tables(found: Grid) -> tuple[Table, ...]:
-    """Each controller over the whole grid and its core; K_dyn and its ratio to the optimum in every cell."""
-    gaps, inertias = np.meshgrid(found.extent.gaps, found.extent.inertias, indexing="ij")
-    made = [_controllers(found)]
-    for gains in GAINS:
-        for what in ("K_dyn", "K_dyn over optimum"):
-            cells = {"gap, rad": gaps.ravel(), "J2/J1": inertias.ravel()}
-            for name in found.tunings:
-                one = found.ratio(name, gains) if "over" in what else found.values(name, gains, "k_dyn")
-                cells[name] = one.ravel()
-            made.append(Table.of(f"active load, {gains}: {what}", cells))
-    return tuple(made)
-
-
-def _controllers(found: Grid) -> Table:
+def table(found: Grid) -> Table:
+    """Each controller over the whole grid and its core."""
     core, e = found.core, found.extent
     rows = []
     for name in found.tunings:
@@ -267,4 +254,4 @@ def present(found: Grid, progress: Progress) -> StudyResult:
     progress("drawing")
     headings = {"tuned": "tuned for each cell", "one set": "one set for all cells"}
     figures = [maps_figure(found, *one) for one in headings.items()]
-    return GapsAndInertias.result(tables(found), claims(found), figures)
+    return GapsAndInertias.result((table(found),), claims(found), figures)

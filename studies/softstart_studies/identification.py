@@ -1,18 +1,12 @@
-"""`identify` beside peers on the same simulated logs: least squares on LSODA, multiple shooting, speed drop.
+"""`identify` beside least squares on LSODA, on the same simulated logs.
 
-The drive is the crane of [G] with a gap of 80 mrad, damped, without load torque, so that no peer has to model
+The drive is the crane of [G] with a gap of 80 mrad, damped, without load torque, so that the peer needs no
 dry friction. It starts from a random place in its gap. Each log has the torque demand and the angle of an
 encoder with 1024 lines every 4 ms; the torque is 1 N m (2.5 %) off in each sample, which nobody is told. The
 guess, the same for all, is off by up to a factor of 1.5 in every parameter, or true.
 
-The peers: (a) the usual residual of a simulation, scipy's `least_squares` on LSODA, intervals from its
-Jacobian and the variance of the residual; (b) multiple shooting in CasADi with IPOPT, Runge-Kutta of order 4
-four times a sample, the edges of the gap rounded, intervals from the Gauss-Newton matrix of the constrained
-problem; (c) by hand from speeds, as drives with backlash are commissioned: the inertias from accelerations in
-contact and while the gap is crossed, the gap as what the motor turns further than the load between the
-speed's two bends, the stiffness from the swing after the impact (M. Nordin, P.-O. Gutman, Controlling
-mechanical systems with backlash - a survey, Automatica 38 (2002) 1633-1649; G. Brandenburg, H. Unger,
-A. Wagenpfeil, Stability problems of a speed controlled drive in an elastic system with backlash, 1986).
+The peer: the usual residual of a simulation, scipy's `least_squares` on LSODA, with intervals from its
+Jacobian and the variance of the residual.
 """
 
 from __future__ import annotations
@@ -36,15 +30,11 @@ from softstart.identification.logs import Log
 from softstart.identification.planning import Experiment, made_up_log
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
-from softstart.views.drawing import COLOURS, drawing, head, new_figure
 
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
 SYMBOLS = ("J1", "J2", "c", "gap", "d")
 PERIOD, RIPPLE, LINES = 4e-3, 1.0, 1024.0
 ASTRAY = 1.5  # factor by which a gap or a stiffness is off where a fit has failed
-RANGE = math.log(5.0)  # of each parameter about its guess, in the multiple shooting
-ROUNDED = 1e-3  # rad, edges of the gap in the multiple shooting
-SUBSTEPS = 4  # of a sample period there
 
 
 def drive() -> Drive:
@@ -56,6 +46,11 @@ def drive() -> Drive:
     return Drive.load("crane-4amtkf").replace(
         gap=0.08, damping=0.3, load_torque=0.0, torque_lag=0.0, encoder_lines=LINES, start_position="unknown"
     )
+
+
+def truth() -> Vector:
+    """Its parameters, in the order of `NAMES`."""
+    return np.array([float(getattr(drive(), name)) for name in NAMES])
 
 
 @dataclass(frozen=True)
@@ -115,110 +110,9 @@ def by_lsoda(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
     )
     spare = log.time.size - x0.size
     covariance = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * found.cost / spare
-    return _with_intervals(found.x[:5], np.sqrt(np.diag(covariance))[:5], spare)
-
-
-def by_shooting(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
-    """Multiple shooting: all states at the samples are unknowns, tied by the equations of motion."""
-    import casadi as ca
-
-    casadi: Any = ca
-    n = log.time.size
-    p, s, u = casadi.MX.sym("p", 7), casadi.MX.sym("s", 4), casadi.MX.sym("u")
-    J1, J2, c, gap, d = (casadi.exp(p[i]) for i in range(5))
-
-    def edge(y: Any) -> tuple[Any, Any]:
-        root = casadi.sqrt(y * y + ROUNDED**2)
-        return 0.5 * (y + root), 0.5 * (1.0 + y / root)
-
-    def rates(state: Any) -> Any:
-        twist, slip = state[0] - state[2], state[1] - state[3]
-        (up, pressed), (down, pulled) = edge(twist - 0.5 * gap), edge(-twist - 0.5 * gap)
-        T = c * (up - down) + d * slip * (pressed + pulled)
-        return casadi.vertcat(state[1], (u - T) / J1, state[3], T / J2)
-
-    state, h = s, PERIOD / SUBSTEPS
-    for _ in range(SUBSTEPS):
-        k1 = rates(state)
-        k2 = rates(state + 0.5 * h * k1)
-        k3 = rates(state + 0.5 * h * k2)
-        state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rates(state + h * k3))
-    step = casadi.Function("step", [s, u, p], [state]).map(n - 1)
-    states, unknown = casadi.MX.sym("states", 4, n), casadi.MX.sym("unknown", 7)
-    parameters = casadi.repmat(unknown, 1, n - 1)
-    ties = casadi.vec(step(states[:, :-1], log.torque[:-1].reshape(1, -1), parameters) - states[:, 1:])
-    place = 0.5 * casadi.exp(unknown[3]) * casadi.tanh(unknown[5])
-    begun = states[:, 0] - casadi.vertcat(0.0, 0.0, -place, 0.0)
-    x, g = casadi.vertcat(unknown, casadi.vec(states)), casadi.vertcat(begun, ties)
-    residual = (states[0, :].T + unknown[6] - log.values) / 1e-3
-    # Gauss-Newton: the residual is linear in the states, which the ties hold to the motion
-    f, lam_f, lam_g = 0.5 * casadi.sumsqr(residual), casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", g.size1())
-    slope = casadi.jacobian(residual, x)
-    none = casadi.MX.sym("none", 0)
-    bent = casadi.Function("bent", [x, none, lam_f, lam_g], [casadi.triu(lam_f * slope.T @ slope)])
-    options = {
-        "ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.max_iter": 300,
-        "show_eval_warnings": False, "ipopt.acceptable_tol": 1e-4, "hess_lag": bent,
-    }  # fmt: skip
-    solver = casadi.nlpsol("shooting", "ipopt", {"x": x, "f": f, "g": g}, options)
-    speed = np.gradient(log.values, PERIOD)
-    share = float(guess.J2) / float(guess.J1 + guess.J2)  # the shaft is wound up and on its flank throughout
-    twist = 0.5 * float(guess.gap) * np.sign(log.torque) + log.torque * share / float(guess.c)
-    path = np.vstack([log.values, speed, log.values - twist, speed])
-    start = [*(math.log(float(getattr(guess, name))) for name in NAMES), 0.0, 0.0]
-    x0 = np.concatenate([start, path.ravel("F")])
-    room = np.concatenate([np.full(5, RANGE), [3.0, 0.01], np.full(4 * n, math.inf)])
-    found = solver(x0=x0, lbx=x0 - room, ubx=x0 + room, lbg=0.0, ubg=0.0)
-    if not solver.stats()["success"]:
-        raise InputError(f"shooting: IPOPT ended with {solver.stats()['return_status']}.")
-    both = casadi.Function("both", [x], [casadi.jacobian(residual, x), casadi.jacobian(g, x)])
-    slope, tied = (np.array(one) for one in both(found["x"]))
-    # Gauss-Newton matrix where the ties hold, on a basis of the directions that keep them
-    fixed = np.linalg.solve(tied[:, 7:], tied[:, :7])  # states follow the parameters
-    reduced = slope[:, :7] - slope[:, 7:] @ fixed
-    spare = n - 7
-    covariance = np.linalg.pinv(reduced.T @ reduced) * 2.0 * float(found["f"]) / spare
-    return _with_intervals(np.array(found["x"]).ravel()[:5], np.sqrt(np.diag(covariance))[:5], spare)
-
-
-def _with_intervals(logarithms: Vector, sizes: Vector, spare: int) -> tuple[Vector, Matrix]:
-    half = student.ppf(0.975, spare) * sizes
-    return np.exp(logarithms), np.exp(np.clip(np.array([logarithms - half, logarithms + half]).T, -50, 50))
-
-
-def by_speed_drop(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
-    """Inertias, gap and stiffness from the bends of the speed after the torque has changed its sign.
-
-    Before it, u/(J1 + J2) accelerates both; while the gap is crossed u/J1 the motor alone, and the load
-    coasts with the momentum that is left; the impact throws the motor back. The damping is the guess.
-    """
-    turned = np.flatnonzero(np.diff(np.sign(log.torque)) != 0)
-    if turned.size == 0:
-        raise InputError("speed drop: the torque never changes its sign; the gap is not crossed.")
-    k = int(turned[0]) + 1  # the first sample of the other torque
-    u, speed = log.torque, np.gradient(log.values, PERIOD)
-    change = np.diff(log.values, 2) / PERIOD**2  # change[i] at the sample i + 1
-    own = change[k:] * np.sign(u[k])
-    closed = k + int(np.argmax(own[1:] < 0.0)) + 1
-    plateau = own[: closed - k]
-    opened = k + int(np.argmax(plateau <= 1.5 * np.median(plateau[plateau.size // 2 :])))
-    if closed - opened < 3:
-        raise InputError("speed drop: the gap is crossed within three samples.")
-    rest = slice(k // 2, k)
-    whole = float(u[rest].mean() / np.polyfit(log.time[rest], speed[rest], 1)[0])
-    J1 = float(u[k] / np.median(change[opened : closed - 1]))
-    J2 = whole - J1
-    momentum = float(np.sum(u[:opened]) * PERIOD)
-    coast = (momentum - J1 * float(speed[opened])) / J2 if J2 > 0.0 else math.nan
-    gap = float(np.abs(log.values[closed] - log.values[opened] - coast * (closed - opened) * PERIOD))
-    swing = speed[closed + 2 :] - np.polyval(np.polyfit(log.time[closed + 2 :], speed[closed + 2 :], 3),
-                                             log.time[closed + 2 :])  # fmt: skip
-    spectrum = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 4096))
-    Omega = 2.0 * math.pi * float(np.argmax(spectrum)) / (4096 * PERIOD)
-    values = np.array([J1, J2, Omega**2 * J1 * J2 / whole, gap, float(guess.damping)])
-    if not np.all(values > 0.0):
-        raise InputError("speed drop: the speed has no two bends after the reversal.")
-    return values, np.zeros((5, 0))
+    half = student.ppf(0.975, spare) * np.sqrt(np.diag(covariance))[:5]
+    ends = np.array([found.x[:5] - half, found.x[:5] + half]).T
+    return np.exp(found.x[:5]), np.exp(np.clip(ends, -50, 50))
 
 
 def by_softstart(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
@@ -231,8 +125,6 @@ def by_softstart(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
 METHODS: Mapping[str, Method] = {
     "softstart": by_softstart,
     "least squares on LSODA": by_lsoda,
-    "multiple shooting": by_shooting,
-    "speed drop": by_speed_drop,
 }
 
 
@@ -247,11 +139,10 @@ class Findings:
 
     def kept(self, case: str, method: str) -> list[Fit]:
         """Those that did not fail: gap and stiffness within a factor of 1.5."""
-        truth = np.array([float(getattr(drive(), name)) for name in NAMES])
         return [
             one
             for one in self.fits[case, method]
-            if one is not None and np.all(np.abs(np.log(one.values / truth)[2:4]) < math.log(ASTRAY))
+            if one is not None and np.all(np.abs(np.log(one.values / truth())[2:4]) < math.log(ASTRAY))
         ]
 
 
@@ -301,18 +192,16 @@ def find(extent: Extent, progress: Progress) -> Findings:
 
 def errors(fits: Sequence[Fit]) -> Vector:
     """Root mean square of the relative error of each parameter."""
-    truth = np.array([float(getattr(drive(), name)) for name in NAMES])
     if not fits:
         return np.full(len(NAMES), math.nan)
-    found: Vector = np.sqrt(np.mean(np.log(np.array([one.values for one in fits]) / truth) ** 2, axis=0))
+    found: Vector = np.sqrt(np.mean(np.log(np.array([one.values for one in fits]) / truth()) ** 2, axis=0))
     return found
 
 
 def coverage(fits: Sequence[Fit]) -> tuple[int, int]:
     """How many intervals hold the truth, of how many."""
-    truth = np.array([float(getattr(drive(), name)) for name in NAMES])
     with_ends = [one.intervals for one in fits if one.intervals.size]
-    held = sum(int(np.sum((ends[:, 0] <= truth) & (truth <= ends[:, 1]))) for ends in with_ends)
+    held = sum(int(np.sum((ends[:, 0] <= truth()) & (truth() <= ends[:, 1]))) for ends in with_ends)
     return held, len(NAMES) * len(with_ends)
 
 
@@ -370,30 +259,11 @@ def claims(found: Findings) -> tuple[Claim, ...]:
     )
 
 
-def figure(found: Findings) -> Any:
-    """Relative error of the gap of each fit that has not failed."""
-    truth = drive()
-    cases = list(dict.fromkeys(case for case, _ in found.fits))
-    with drawing():
-        drawn, axes = new_figure(len(cases), 1, (7.0, 1.2 + 2.0 * len(cases)), squeeze=False)
-        for ax, case in zip(axes[:, 0], cases, strict=True):
-            for i, name in enumerate(METHODS):
-                fits = found.kept(case, name)
-                off = [100.0 * (one.values[3] / float(truth.gap) - 1.0) for one in fits]
-                ax.plot(off, np.full(len(off), float(i)), "o", ms=4, alpha=0.6, color=COLOURS[i])
-            ax.axvline(0.0, color="black", lw=0.8)
-            ax.set_yticks(range(len(METHODS)), list(METHODS))
-            ax.set_ylim(len(METHODS) - 0.5, -0.5)
-            head(ax, f"guess {case}: error of the gap, % (each point a log)", "")
-    return drawn
-
-
 class IdentificationStudy(Study):
-    """Peers of `identify`."""
+    """`identify` and its peer."""
 
     name: ClassVar[str] = "identification"
-    title: ClassVar[str] = "The drive from logs: softstart beside LSODA, multiple shooting and speed drop"
-    pictures: ClassVar[tuple[str, ...]] = ("identification",)
+    title: ClassVar[str] = "The drive from logs: softstart beside least squares on LSODA"
 
     def __init__(self, extent: Extent | None = None) -> None:
         self.extent = extent or Extent()
@@ -401,4 +271,4 @@ class IdentificationStudy(Study):
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """Make the logs, fit them by each method, compare."""
         found = find(self.extent, progress)
-        return self.result([table(found)], claims(found), [figure(found)])
+        return StudyResult([table(found)], claims(found))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,6 @@ Array = NDArray[np.float64]
 Changes = Mapping[str, Any]
 
 CONTROLLER = "pulse-coast-hold"
-REDUCED = ("reduced-first-stage", "reduced-two-stage", "acceleration-delay")
-FEEDBACK = "current-limit-feedback"
 MOST = {"reactive": 1.10, "active": 1.15}  # asked: over the optimum, in every cell
 MEAN = {"reactive": 1.06, "active": 1.08}
 K_DYN, SPREAD = 1.05, 0.03  # reactive load
@@ -91,42 +89,49 @@ class Grid:
     k_dyn: Array
     start_time: Array  # s
     contacts: Array
-    really: Changes
+    optimum: Array  # the least K_dyn of each cell, (gap, J2, ...)
 
     def spread(self, k: Array) -> float:
         """Largest less least over gaps and phases, over their mean; the worst inertia."""
         return float((np.ptp(k, axis=(0, 2)) / k.mean(axis=(0, 2))).max())
 
-    def optima(self, times: Array) -> Array:
-        """The least K_dyn of each cell at these times, (gap, J2, ...).
-
-        At the longest start time of a cell it is smaller than at the others: a ratio to it is that of all
-        phases, or a little too large.
-        """
-        found = np.empty_like(times)
-        for i, j, k in np.ndindex(*times.shape):
-            drive = ideal(self.kind, self.gaps[i], self.ratios[j], **self.really)
-            found[i, j, k] = optimum(drive, float(times[i, j, k]))
-        return found
-
     @property
-    def latest(self) -> Array:
-        """The longest start time of each cell, s."""
-        longest: Array = self.start_time.max(axis=2, keepdims=True)
-        return longest
+    def over(self) -> Array:
+        """K_dyn over that of the optimum."""
+        over: Array = self.k_dyn / self.optimum
+        return over
+
+
+def latest(times: Array) -> Array:
+    """The longest start time of each cell, s.
+
+    There the optimum is smaller than at the others: a ratio to it is that of all phases, or a little too
+    large.
+    """
+    longest: Array = times.max(axis=2, keepdims=True)
+    return longest
 
 
 def run(
     kind: LoadKind, gaps: Sequence[float], ratios: Sequence[float], phases: int, *,
-    controller: Controller | None = None, told: Changes | None = None, really: Changes | None = None,
+    at: Callable[[Array], Array] = latest, controller: Controller | None = None,
+    told: Changes | None = None, really: Changes | None = None,
 ) -> Grid:  # fmt: skip
-    """Start all drives; `told` and `really` are how the drive told, and the drives, differ from the crane."""
+    """Start all drives, and find the optima at these of their start times.
+
+    `told` and `really` are how the drive told, and the drives, differ from the crane.
+    """
     batch = starts(kind, gaps, ratios, phases, **(really or {}))
     ready = controller or published(CONTROLLER)
     set_ups = ready.set_ups(WITH_INVERTER.replace(load_kind=kind, **(told or {})))
     found = prepared(batch).figures(set_ups, batch.mean_torque)
     k, times, contacts = (found[name][0].reshape(batch.shape) for name in ("k_dyn", "start_time", "contacts"))
-    return Grid(kind, gaps, ratios, k, times, contacts, really or {})
+    allowed = at(times)
+    optima = np.empty_like(allowed)
+    for i, j, phase in np.ndindex(*allowed.shape):
+        drive = ideal(kind, gaps[i], ratios[j], **(really or {}))
+        optima[i, j, phase] = optimum(drive, float(allowed[i, j, phase]))
+    return Grid(kind, gaps, ratios, k, times, contacts, optima)
 
 
 def ideal(kind: LoadKind, gap: float, ratio: float, **changed: Any) -> Drive:
@@ -153,47 +158,26 @@ def optimum(drive: Drive, start_time: float) -> float:
 # the grid: near the optimum, whatever gap and inertia ----------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A grid and the optimum of each cell at its longest start time."""
-
-    grid: Grid
-    optimum: Array
-
-    @property
-    def over(self) -> Array:
-        """K_dyn over that of the optimum."""
-        over: Array = self.grid.k_dyn / self.optimum
-        return over
-
-
-def judged(kind: LoadKind, extent: Extent, progress: Progress) -> Judged:
-    """All the cells of a kind of load."""
-    progress(f"{kind} load: {len(extent.gaps) * len(extent.ratios)} cells and their optima")
-    grid = run(kind, extent.gaps, extent.ratios, extent.phases)
-    return Judged(grid, grid.optima(grid.latest))
-
-
-def grid_table(found: Judged) -> Table:
+def grid_table(grid: Grid) -> Table:
     """A row a cell."""
-    grid, over = found.grid, found.over
+    over = grid.over
     gap, ratio = np.meshgrid(grid.gaps, grid.ratios, indexing="ij")
     return Table.of(f"{CONTROLLER}, {grid.kind} load, {grid.k_dyn.shape[2]} encoder phases", {
         "gap, rad": gap.ravel(),
         "J2/J1": ratio.ravel(),
         "K_dyn, least": grid.k_dyn.min(axis=2).ravel(),
         "K_dyn, most": grid.k_dyn.max(axis=2).ravel(),
-        "start time, s, longest": grid.latest.ravel(),
-        "optimum there": found.optimum.ravel(),
+        "start time, s, longest": latest(grid.start_time).ravel(),
+        "optimum there": grid.optimum.ravel(),
         "over the optimum, mean": over.mean(axis=2).ravel(),
         "over the optimum, most": over.max(axis=2).ravel(),
         "contacts": grid.contacts.max(axis=2).astype(int).ravel(),
     })  # fmt: skip
 
 
-def near_the_optimum(found: Judged) -> Claim:
+def near_the_optimum(grid: Grid) -> Claim:
     """In every cell, and on the mean."""
-    grid, over = found.grid, found.over
+    over = grid.over
     i, j, _ = map(int, np.unravel_index(np.argmax(over), over.shape))
     return Claim(
         f"Load {grid.kind}, its inertia, its speed and the gap unknown: K_dyn is at most "
@@ -201,14 +185,13 @@ def near_the_optimum(found: Judged) -> Claim:
         "on the mean.",
         Verdict.of(bool(over.max() <= MOST[grid.kind] and over.mean() <= MEAN[grid.kind])),
         f"At most {over.max():.3f} (gap {grid.gaps[i]:g} rad, J2 = {grid.ratios[j]:g} J1), on the mean "
-        f"{over.mean():.3f}, over {over.size} starts in {found.optimum.size} cells.",
+        f"{over.mean():.3f}, over {over.size} starts in {grid.optimum.size} cells.",
     )
 
 
-def invariant_to_the_gap(found: Judged) -> Claim:
+def invariant_to_the_gap(grid: Grid) -> Claim:
     """K_dyn itself over the gaps: with an active load that of the optimum varies, too."""
-    grid = found.grid
-    k, own, best = grid.k_dyn, grid.spread(grid.k_dyn), grid.spread(found.optimum)
+    k, own, best = grid.k_dyn, grid.spread(grid.k_dyn), grid.spread(grid.optimum)
     if grid.kind == "reactive":
         return Claim(
             f"With a reactive load K_dyn is at most {K_DYN:.2f} and the same over the gaps within "
@@ -245,8 +228,8 @@ def costs_table(extent: Extent, progress: Progress) -> Table:
         for gap, ratio in SMALL:
             own = PulseCoastHold(**given(ratio))
             cell = (gap,), (ratio,), extent.phases
-            grid = run("active", *cell, controller=own, told=changed, really=changed)
-            ratios.append(grid.k_dyn / grid.optima(grid.start_time))
+            grid = run("active", *cell, at=np.copy, controller=own, told=changed, really=changed)
+            ratios.append(grid.over)
         rows.append((name, float(np.mean(ratios)), float(np.max(ratios))))
     columns = ("and then", "over the optimum, mean", "over the optimum, most")
     return Table("What each costs, active load, cells with K_dyn below 1", columns, rows)
@@ -255,8 +238,7 @@ def costs_table(extent: Extent, progress: Progress) -> Table:
 # tolerances ----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One deviation, the worst of its cells and phases."""
 
     kind: LoadKind
@@ -285,13 +267,13 @@ def _percent(deviation: float) -> str:
     return f"{100 * deviation:+.0f} %" if deviation else "as told"
 
 
-def rounded_up(time: Array) -> Array:
-    """To the next power of 1.01: starts that take about as long then share an optimum.
+def rounded_up(times: Array) -> Array:
+    """The longest of each cell, to the next power of 1.01: starts that take about as long share an optimum.
 
-    >>> rounded_up(np.array([0.25])).round(6)
-    array([0.250801])
+    >>> rounded_up(np.array([[[0.25, 0.2]]])).round(6)
+    array([[[0.250801]]])
     """
-    found: Array = 1.01 ** np.ceil(np.log(time) / np.log(1.01))
+    found: Array = 1.01 ** np.ceil(np.log(latest(times)) / np.log(1.01))
     return found
 
 
@@ -301,20 +283,15 @@ def cases(kind: LoadKind, extent: Extent, progress: Progress) -> list[Case]:
     for name, told, really in deviations(extent):
         progress(f"{kind} load, {name}")
         cells = extent.tolerance_gaps, extent.tolerance_ratios
-        grid = run(kind, *cells, extent.phases, told=told, really=really)
-        over = grid.k_dyn / grid.optima(rounded_up(grid.latest))
-        found.append(Case(kind, name, float(grid.k_dyn.max()), float(over.max())))
+        grid = run(kind, *cells, extent.phases, at=rounded_up, told=told, really=really)
+        found.append(Case(kind, name, float(grid.k_dyn.max()), float(grid.over.max())))
     return found
 
 
 def tolerances_table(found: Sequence[Case]) -> Table:
     """A row a deviation."""
-    return Table.of("pulse-coast-hold, tolerances: the worst gap, inertia and encoder phase", {
-        "load": [case.kind for case in found],
-        "really": [case.what for case in found],
-        "K_dyn, most": [case.k_dyn for case in found],
-        "over the optimum, most": [case.over for case in found],
-    })  # fmt: skip
+    title = "pulse-coast-hold, tolerances: the worst gap, inertia and encoder phase"
+    return Table(title, ("load", "really", "K_dyn, most", "over the optimum, most"), found)
 
 
 def within_tolerances(found: Sequence[Case]) -> Claim:
@@ -325,58 +302,6 @@ def within_tolerances(found: Sequence[Case]) -> Claim:
         f"of one sample: never more than {WITH_TOLERANCES:.2f} of the optimum.",
         Verdict.of(worst.over <= WITH_TOLERANCES),
         f"At most {worst.over:.3f} ({worst.kind} load, {worst.what}).",
-    )
-
-
-# the other strategies on the same grid, told the same ----------------------------------------------------
-
-
-def rivals(kind: LoadKind, extent: Extent, progress: Progress) -> dict[str, Grid]:
-    """Each with its defaults for the drive that it is told, pulse-coast-hold last."""
-    found = {}
-    for name in ("direct", *REDUCED, FEEDBACK, CONTROLLER):
-        progress(f"{kind} load, {name}")
-        found[name] = run(kind, extent.gaps, extent.ratios, extent.phases, controller=published(name))
-    return found
-
-
-def later(found: Mapping[str, Grid], name: str) -> float:
-    """Start time over that of pulse-coast-hold, on the mean."""
-    return float((found[name].start_time / found[CONTROLLER].start_time).mean())
-
-
-def rivals_table(found: Mapping[LoadKind, Mapping[str, Grid]]) -> Table:
-    """A row a controller."""
-    rows = [
-        (kind, name, float(k.min()), float(k.max()), 100 * one.spread(k), later(grids, name))
-        for kind, grids in found.items()
-        for name, one in grids.items()
-        for k in [one.k_dyn]
-    ]
-    columns = ("load", "controller", "K_dyn, least", "K_dyn, most", "spread over gaps, %",
-               "start time over ours")  # fmt: skip
-    return Table("All strategies on the same grid, set up for gap 0.5 rad and J2 = 5 J1", columns, rows)
-
-
-def softer_than_its_rivals(found: Mapping[LoadKind, Mapping[str, Grid]]) -> Claim:
-    """What the reduced torques of [G] and a feedback make of the same unknowns."""
-    parts, softer = [], True
-    for kind, grids in found.items():
-        most = {name: float(one.k_dyn.max()) for name, one in grids.items()}
-        reduced = min(REDUCED, key=most.__getitem__)
-        quicker = later(grids, FEEDBACK) > 1.05
-        unbeaten = most[CONTROLLER] < most[FEEDBACK] or quicker
-        softer = softer and most[CONTROLLER] < most[reduced] and unbeaten
-        shown = (reduced, FEEDBACK, CONTROLLER)
-        spans = [f"{grids[name].k_dyn.min():.2f} to {most[name]:.2f}" for name in shown]
-        parts.append(
-            f"{kind} load: {reduced} {spans[0]}, {FEEDBACK} {spans[1]} with starts "
-            f"{100 * (later(grids, FEEDBACK) - 1):+.0f} %, {CONTROLLER} {spans[2]}"
-        )
-    return Claim(
-        "On the same grid no strategy of [G] starts as softly in the same time, all with their defaults.",
-        Verdict.of(softer),
-        f"K_dyn, {'; '.join(parts)}.",
     )
 
 
@@ -396,14 +321,14 @@ def corners_figure(extent: Extent) -> Figure:
     return starts_figure(columns)
 
 
-def ratios_figure(found: Mapping[LoadKind, Judged]) -> Figure:
+def ratios_figure(found: Mapping[LoadKind, Grid]) -> Figure:
     """The worst K_dyn over the optimum of each cell, as a map."""
     worst = {kind: one.over.max(axis=2) for kind, one in found.items()}
     scale = colour_scale(np.array([1.0, *MOST.values()]), *worst.values())
     with drawing():
         figure, axes = panels(len(found), (4.2, 3.4), 2, "$J_2/J_1$", "gap, rad")
         for panel, (kind, one) in zip(axes, found.items(), strict=True):
-            ratios, gaps = ([f"{value:g}" for value in axis] for axis in (one.grid.ratios, one.grid.gaps))
+            ratios, gaps = ([f"{value:g}" for value in axis] for axis in (one.ratios, one.gaps))
             heat_map(panel, ratios, gaps, worst[kind], scale, decimals=3)
             panel.set_title(f"{kind} load (at most {MOST[kind]:.2f} asked)", loc="left")
         figure.suptitle("worst $K_{dyn}$ of each cell over that of the optimum", fontsize=9.5)
@@ -422,20 +347,22 @@ class PulseCoastHoldStudy(Study):
     pictures: ClassVar[tuple[str, ...]] = ("pulse-coast-hold-starts", "pulse-coast-hold-ratios")
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
-        """All of it: the grid for both kinds of load, the tolerances, the other controllers."""
+        """All of it: the grid for both kinds of load, the tolerances."""
         return present(Extent(), progress)
 
 
 def present(extent: Extent, progress: Progress) -> StudyResult:
     """Work it out, and say and draw what came out."""
-    grids = {kind: judged(kind, extent, progress) for kind in extent.kinds}
+    grids = {}
+    for kind in extent.kinds:
+        progress(f"{kind} load: {len(extent.gaps) * len(extent.ratios)} cells and their optima")
+        grids[kind] = run(kind, extent.gaps, extent.ratios, extent.phases)
     costs = costs_table(extent, progress)
     tolerances = [case for kind in extent.kinds for case in cases(kind, extent, progress)]
-    others = {kind: rivals(kind, extent, progress) for kind in extent.kinds}
     progress("drawing")
     claims = [claim(one) for one in grids.values() for claim in (near_the_optimum, invariant_to_the_gap)]
     return PulseCoastHoldStudy.result(
-        (*map(grid_table, grids.values()), costs, tolerances_table(tolerances), rivals_table(others)),
-        (*claims, within_tolerances(tolerances), softer_than_its_rivals(others)),
+        (*map(grid_table, grids.values()), costs, tolerances_table(tolerances)),
+        (*claims, within_tolerances(tolerances)),
         (corners_figure(extent), ratios_figure(grids)),
     )

@@ -8,21 +8,18 @@ go at once, so it is left out.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from softstart import Drive, Fatigue, Run, fatigue, optimize, simulate
 from softstart.controller import ready_controller_names
 from softstart.errors import InputError
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
-from softstart.start.fatigue import damped, impacts, worst_damage
+from softstart.start.fatigue import damped
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, new_figure
 from softstart_studies.crane import spread
@@ -31,7 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POSITIONS = ("mid-gap", "driving-flank", "opposite-flank", "hanging")
-TURNS = 5  # of which the least time of each contender counts
 SLOWER = 1.2  # start time allowed to an optimum, over that of direct from there
 KEPT = 1.05  # K_dyn from the worst position over that from mid-gap, up to which a promise is kept
 ALIKE = 0.01  # relative differences below this decide no order
@@ -69,7 +65,6 @@ class Case:
     runs: Mapping[str, Run]
     lives: Fatigue
     optimum: Optimum | None
-    seconds: tuple[float, ...]  # of the starts, and of their lives: turning points, cycles, damage, impacts
 
     @property
     def direct(self) -> Run:
@@ -138,37 +133,15 @@ def _case(drive: Drive, names: Sequence[str], optimum: bool) -> Case:
     if optimum:
         with suppress(InfeasibleError, OptimumError, InputError):
             best = optimize(drive, SLOWER * runs["direct"].start_time, terminal="reached")
-
-    def start() -> None:
-        for name in names:
-            simulate(drive, name)
-
-    def judge() -> None:
-        for run in runs.values():
-            worst_damage(run, lives.curve)
-            impacts(run)
-
-    return Case(drive, runs, lives, best, least_times(start, judge))
-
-
-def least_times(*works: Callable[[], object]) -> tuple[float, ...]:
-    """Processor time of each in s, in turns; the least of TURNS."""
-    turns = []
-    for _ in range(TURNS):
-        times = [time.process_time()]
-        for work in works:
-            work()
-            times.append(time.process_time())
-        turns.append(np.diff(times))
-    return tuple(np.min(turns, axis=0).tolist())
+    return Case(drive, runs, lives, best)
 
 
 # tables --------------------------------------------------------------------------------------------------
 
 
 def tables(found: Findings) -> tuple[Table, ...]:
-    """The strategies from each position, the optima, and lives."""
-    return (*(_strategies(found, name) for name in found.drives), _optima(found), _order(found))
+    """The strategies from each position with their lives, and the optima."""
+    return (*(_strategies(found, name) for name in found.drives), _optima(found))
 
 
 def _strategies(found: Findings, name: str) -> Table:
@@ -204,16 +177,6 @@ def _optima(found: Findings) -> Table:
     return Table(f"Least K_dyn in {SLOWER} times the start time of direct", columns, rows)
 
 
-def _order(found: Findings) -> Table:
-    rows = [
-        (*place, case.gentlest(), max(case.runs, key=case.life), *concordance(case))
-        for place, case in found.cases.items()
-    ]
-    columns = ("drive", "position", "gentlest in time", "longest life",
-               "pairs of strategies in the same order", "of")  # fmt: skip
-    return Table("Order by K_dyn and by life", columns, rows)
-
-
 def concordance(case: Case) -> tuple[int, int]:
     """Pairs of strategies that K_dyn and life put in the same order, and pairs that both put in an order."""
     same = pairs = 0
@@ -235,7 +198,7 @@ def claims(found: Findings) -> tuple[Claim, ...]:
         made.append(strategies_reach_the_optimum(found))
     if found.unknown:
         made.append(a_sensor_is_worth_it(found))
-    return (*made, life_ranks_as_k_dyn(found), life_costs_little(found), unknown_costs_three(found))
+    return (*made, life_ranks_as_k_dyn(found))
 
 
 def position_decides(found: Findings) -> Claim:
@@ -353,40 +316,6 @@ def life_ranks_as_k_dyn(found: Findings) -> Claim:
         "Life and K_dyn put the strategies in the same order.",
         Verdict.CONFIRMED if same == pairs else Verdict.PARTLY if 2 * same > pairs else Verdict.REFUTED,
         f"{same} of {pairs} pairs of strategies, over all drives and positions.{text}",
-    )
-
-
-def life_costs_little(found: Findings) -> Claim:
-    """The time to count and judge cycles and impacts, beside that of the starts."""
-    ratios = {}
-    for name in found.drives:
-        starts, lives = np.sum([case.seconds for case in found.of(name).values()], axis=0)
-        ratios[name] = lives / starts
-    said = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in ratios.items())
-    return Claim(
-        "Life adds at most 20 % to the time of a start.",
-        Verdict.of(*(value <= 0.2 for value in ratios.values())),
-        f"Over all strategies and positions, on this machine: {said}.",
-    )
-
-
-def unknown_costs_three(found: Findings) -> Claim:
-    """The time of starts from an unknown position, beside that of the three known ones, in turns."""
-
-    def starts(drive: Drive) -> Callable[[], object]:
-        return lambda: [simulate(drive, one) for one in found.strategies]
-
-    ratios = {}
-    for name in found.drives:
-        unknown = next(iter(found.of(name).values())).drive.replace(start_position="unknown")
-        worst, *known = least_times(*map(starts, (unknown, *unknown.positions.values())))
-        ratios[name] = len(known) * worst / sum(known)
-    said = ", ".join(f"{name} {value:.2f}" for name, value in ratios.items())
-    return Claim(
-        "The worst of three positions takes at most 3.2 times the time of one.",
-        Verdict.of(*(value <= 3.2 for value in ratios.values())),
-        "Processor time of the starts of all strategies, over the mean of the three positions by "
-        f"themselves: {said}.",
     )
 
 

@@ -89,7 +89,6 @@ def table(found: Findings) -> Table:
         "two masses": [one.k_dyn if one else None for one in two],
         "bound, two masses": [one.bound.k_dyn if one else None for one in two],
         "contacts": [row.best.run.contacts for row in found.rows],
-        "computed in, s": [round(row.best.seconds) for row in found.rows],
     })  # fmt: skip
 
 

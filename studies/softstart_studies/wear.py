@@ -111,11 +111,11 @@ def _starts(worn: Records, controller: Controller, fitted_to: Drive | None) -> t
     return np.asarray(found.k_dyn), np.asarray(found.start_time)
 
 
-# tables --------------------------------------------------------------------------------------------------
+# table ---------------------------------------------------------------------------------------------------
 
 
-def tables(found: Life) -> tuple[Table, ...]:
-    """From new to worn, and every point of every life."""
+def table(found: Life) -> Table:
+    """From new to worn."""
     rows = [
         (name, gains, *one.k_dyn[[0, -1]], one.k_dyn.max(), *one.start_time[[0, -1]],
          *mean_and_most(one.ratio))
@@ -124,16 +124,7 @@ def tables(found: Life) -> tuple[Table, ...]:
     ]  # fmt: skip
     columns = ("strategy", "gains", "K_dyn new", "K_dyn worn", "K_dyn largest", "start time new, s",
                "start time worn, s", "over optimum mean", "over optimum largest")  # fmt: skip
-    ends = Table(f"From {found.gaps[0]:g} to {found.gaps[-1]:g} rad of gap", columns, rows)
-    return (ends, *(_points(found, gains) for gains in GAINS))
-
-
-def _points(found: Life, gains: str) -> Table:
-    cells: dict[str, Any] = {"gap, rad": found.gaps, "direct": found.direct}
-    for name, ways in found.courses.items():
-        pairs = zip(ways[gains].k_dyn, ways[gains].start_time, strict=True)
-        cells[name] = [f"{k:.3f} in {time:.3f}" for k, time in pairs]
-    return Table.of(f"K_dyn and start time in s, gains: {gains}", cells)
+    return Table(f"From {found.gaps[0]:g} to {found.gaps[-1]:g} rad of gap", columns, rows)
 
 
 # claims --------------------------------------------------------------------------------------------------
@@ -224,4 +215,4 @@ def present(found: Life, progress: Progress) -> StudyResult:
     """Tables, claims and figures of what was found."""
     progress("drawing")
     claims = fixed_gains_hold(found), a_schedule_pays(found), one_set_suffices(found)
-    return Wear.result(tables(found), claims, (life_figure(found, False), life_figure(found, True)))
+    return Wear.result((table(found),), claims, (life_figure(found, False), life_figure(found, True)))

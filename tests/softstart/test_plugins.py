@@ -43,7 +43,7 @@ def test_a_checkout_registers_what_its_project_file_names(tmp_path, monkeypatch,
 def test_the_benchmarks_are_studies_of_the_checkout():
     found = [point.name for point in plugins._of_checkout("softstart.studies")]
     benchmarks = [name for name in found if name.startswith("benchmark-")]
-    assert benchmarks == ["benchmark-starts", "benchmark-optima", "benchmark-sweeps", "benchmark-chains"]
+    assert benchmarks == ["benchmark-starts", "benchmark-optima"]
     assert {"paper-g", "real-starts"} <= set(found)  # found without being installed again
     for name in found:
         assert plugins.load("softstart.studies", "study", name, "list").name == name

@@ -8,7 +8,6 @@ import pytest
 from softstart.clutch import LAWS, Clutch, engage
 from softstart.errors import InputError, SimulationError
 from softstart_studies.paper_c import optimize_engagement
-from softstart_studies.paper_c.collocation import collocated
 from softstart_studies.paper_c.fronts import pulse_and_pause, two_steps
 from softstart_studies.paper_c.least_work import Program, Search, Slip
 
@@ -148,14 +147,6 @@ def test_simple_laws_bring_the_shaft_to_rest_and_lie_between_bound_and_optimum(l
     first = fronts[law_class].points[0]
     assert first.peak_torque == pytest.approx(SLIP.Tm, rel=1e-9)
     assert first.work_bound <= run.slip_work <= first.slip_work * (1.0 + 1e-6)
-
-
-@pytest.mark.parametrize("law_class", CLASSES)
-def test_collocation_finds_the_same(law_class, fronts):
-    point = fronts[law_class].points[1]
-    other = collocated(PAPER, point.peak_torque, law_class, intervals=40, after=30)
-    assert other >= point.work_bound * (1.0 - 1e-4)  # its peak is kept at its points only
-    assert other == pytest.approx(point.slip_work, rel=1e-3)
 
 
 def test_another_clutch_with_a_table_of_its_own():

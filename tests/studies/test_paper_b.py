@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
-import numpy as np
 import pytest
 
 from softstart import Engine
 from softstart.balancing.engine import shaking_of_shafts
-from softstart.study import find_study
 from softstart_studies.paper_b import PaperB, orders, tables, vaz
-from softstart_studies.paper_b.vaz import MOMENTS, RPM, SPEEDS, TUNING, VAZ, balanced, first_order
+from softstart_studies.paper_b.vaz import MOMENTS, RPM, TUNING, VAZ, balanced, first_order
 
 VERDICTS = {
     "Two shafts against the crank": "confirmed",
@@ -30,8 +26,7 @@ VERDICTS = {
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper-b")
-    told: list[str] = []
-    return PaperB().run(folder, told.append), folder, told
+    return PaperB().run(folder, lambda doing: None), folder
 
 
 def test_verdicts(study):
@@ -45,14 +40,8 @@ def test_verdicts(study):
     assert f"in amplitude instead, {abs(first + 1j * abs(first)):.1f})" in claims[6].evidence
 
 
-def test_result_is_complete_and_plain(study):
-    result, folder, told = study
-    assert tuple(result.figures) == PaperB.pictures
-    assert len(told) == 3
-    json.dumps(result.summary())
-    assert Engine.load(folder / "vaz-11113.toml") == VAZ
-    assert find_study("paper-b").title == PaperB.title
-    assert all(word in result.figures["paper-b-figure-2"].axes[0].get_title("left") for word in ("assumed",))
+def test_the_engine_is_written_as_it_was_assumed(study):
+    assert Engine.load(study[1] / "vaz-11113.toml") == VAZ
 
 
 def test_printed_and_model_stand_side_by_side():
@@ -101,7 +90,6 @@ def test_courses_of_figures_2_and_3():
     assert one.shafts[i] == pytest.approx(one.sine[i], rel=1e-12)
     assert one.shafts / one.rpm**2 == pytest.approx(one.shafts[i] / 4500.0**2, rel=1e-12)
     assert one.inertia / one.rpm**2 == pytest.approx(one.inertia[i] / 4500.0**2, rel=1e-12)
-    assert [row[0] for row in tables.moments(found).rows] == list(SPEEDS)
 
 
 def test_an_arm_for_full_load_is_wrong_at_others():
@@ -116,10 +104,5 @@ def test_an_arm_for_full_load_is_wrong_at_others():
     assert vaz.left_at_load(0.0, TUNING, sideways=True)[1] == pytest.approx(abs(left), rel=1e-12)
 
 
-def test_convergence_of_the_orders():
+def test_the_orders_by_fft_are_those_of_the_power_series():
     assert orders.series_difference(VAZ.cylinders.crank.ratio) < 1e-14
-    inertia = [orders.inertia_by_samples(n) for n in (8, 16, 24)]
-    assert inertia[1] < 1e-4 * inertia[0]
-    assert inertia[2] < 1e-12
-    gas = np.array([orders.gas_by_samples(n) for n in (180, 360, 720)])
-    assert np.all(gas[1:] / gas[:-1] < 0.35)  # second order: one fourth

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from softstart.study import Verdict, find_study
+from softstart.study import Verdict
 from softstart_studies.paper_c import PaperC, printed, readings
 
 
@@ -14,16 +14,11 @@ class Short(PaperC):
 
 @pytest.fixture(scope="module")
 def study():
-    told: list[str] = []
-    return Short().run(None, told.append), told
+    return Short().run(None, lambda doing: None)
 
 
 def table(study, title):
-    return next(one for one in study[0].tables if one.title == title)
-
-
-def test_it_is_installed():
-    assert isinstance(find_study("paper-c"), PaperC)
+    return next(one for one in study.tables if one.title == title)
 
 
 def test_printed_and_recomputed_side_by_side(study):
@@ -38,7 +33,7 @@ def test_printed_and_recomputed_side_by_side(study):
 
 def test_no_reading_gives_the_printed_table(study):
     rows = table(study, "Which reading gives the printed numbers").rows
-    met = {(row[0], row[1]): row[3] for row in rows}
+    met = {(row[0], row[1]): row[-1] for row in rows}
     assert met.pop(("linear", "Md")) > 0
     assert set(met.values()) == {0}
 
@@ -67,8 +62,8 @@ def test_a_print_is_rounded_or_cut(value, print_, met):
 
 
 def test_verdicts(study):
-    found = {claim.statement.split(" ")[1]: claim for claim in study[0].claims}
-    assert [Verdict(claim.verdict).value for claim in study[0].claims] == [
+    found = {claim.statement.split(" ")[1]: claim for claim in study.claims}
+    assert [Verdict(claim.verdict).value for claim in study.claims] == [
         "refuted", "refuted", "confirmed", "confirmed", "partly",
     ]  # fmt: skip
     assert "costs 568 kgf m more; printed: 1512 less" in found["exponential"].evidence
@@ -81,12 +76,3 @@ def test_the_paper_laws_are_dominated(study):
         assert excess > 5.0
         assert least_peak == pytest.approx(160.0 / 3.0)
         assert peak > 1.2 * least_peak
-
-
-def test_collocation_and_search_agree(study):
-    for row in table(study, "The same optimum by collocation").rows:
-        assert abs(row[4]) < 0.05
-
-
-def test_pictures_are_those_announced(study):
-    assert tuple(study[0].figures) == PaperC.pictures

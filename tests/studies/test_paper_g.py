@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import csv
-import json
-import math
 import re
 
 import numpy as np
 import pytest
 
 from softstart import simulate
-from softstart.study import Verdict, find_study
-from softstart_studies.crane import CRANE, spread
+from softstart.study import Verdict
+from softstart_studies.crane import CRANE
 from softstart_studies.paper_g import PaperG, curves, from_flank, set_up_once, whole_start
-from softstart_studies.paper_g.crane import RATIOS, closed_form, crane, k_dyn, simulated, ways
+from softstart_studies.paper_g.crane import RATIOS, crane, simulated, ways
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("paper-g")
-    told: list[str] = []
-    return PaperG().run(folder, told.append), folder, told
+def study():
+    return PaperG().run(None, lambda doing: None)
 
 
 @pytest.fixture(scope="module")
@@ -46,19 +41,6 @@ def test_curves_go_through_the_simulated_points(drawn):
         assert curve.values[on_axis] == pytest.approx(curve.exact, rel=1e-12)
 
 
-def test_all_curves_of_figure_2_have_the_base_of_the_heavy_load(drawn):
-    full = [curve.values[-1] for curve in drawn["2"]]
-    assert full == pytest.approx([3.11785, 3.11785, 2.71567, 2.71567], abs=5e-6)
-
-
-def test_figure_4_is_in_the_order_of_its_curves(drawn):
-    worn_1, worn_2, worn_open, new_1, new_2, new_open = (curve.values for curve in drawn["4"])
-    assert np.all(worn_1 >= worn_2)
-    assert np.all(worn_2 > worn_open)
-    assert np.all(new_1 >= new_2)
-    assert np.all(new_2 > new_open)
-
-
 def test_table_of_reference_to_all_printed_digits():
     rows = curves.worked_table().rows
     assert len(rows) == 20
@@ -78,43 +60,29 @@ def test_table_of_reference_to_all_printed_digits():
 
 # verdicts ----------------------------------------------------------------------------------------------
 
-VERDICTS = {
-    "Method 1 damps": "confirmed",
-    "Method 2 can bring": "confirmed",
-    "Method 2 is to be preferred": "refuted",
-    "(Not in [G]) Raised at the peak": "confirmed",
-    "A wider gap": "confirmed",
-    "A smaller J2": "partly",
-    "The least K_dyn": "refuted",
-    "Stage 2 lasts almost": "partly",
-    "The total time": "confirmed",
-    "Stage 1 lasts the same": "partly",
-    "Switching by time": "partly",
-    "Torque held reduced": "partly",
-    "The delay fits": "partly",
-    "Regulators acting": "partly",
-    "(Not in [G]) The conclusions hold": "partly",
+VERDICTS = {  # by the beginning of the statement, with the number that decides
+    "Method 1 damps": ("confirmed", "2.0386 as M1 -> 0"),
+    "Method 2 can bring": ("confirmed", "M1/Ms < 0.5236"),
+    "Method 2 is to be preferred": ("refuted", "first contact 1.2677, second 2.3894"),
+    "(Not in [G]) Raised at the peak": ("confirmed", "1.2677 at 0.5 rad and 2.2144 at 2 rad"),
+    "A wider gap": ("confirmed", "+56 %"),
+    "A smaller J2": ("partly", "3.1179 to 2.7157"),
+    "The least K_dyn": ("refuted", "0.856"),
+    "Stage 2 lasts almost": ("partly", "6 %, 14 %, 29 %"),
+    "The total time": ("confirmed", "2.8 times"),
+    "Stage 1 lasts the same": ("partly", "-17.6 %"),
+    "Switching by time": ("partly", "to 3.1279"),
+    "Torque held reduced": ("partly", "2.3948 to 3.2654"),
+    "The delay fits": ("partly", "1.9730 instead of 1.1383"),
+    "Regulators acting": ("partly", "1.2564 where the direct start has 5.2106"),
+    "(Not in [G]) The conclusions hold": ("partly", "1.4661"),
 }
 
 
-def test_each_conclusion_has_its_verdict_and_a_number(study):
-    claims = study[0].claims
-    assert len(claims) == len(VERDICTS)
-    for claim, (beginning, verdict) in zip(claims, VERDICTS.items(), strict=True):
+def test_each_conclusion_has_its_verdict_and_its_number(study):
+    for claim, (beginning, (verdict, number)) in zip(study.claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(beginning)
-        assert claim.verdict is Verdict(verdict), claim.statement
-        assert re.search(r"\d", claim.evidence)
-        assert "nan" not in claim.evidence.lower()
-
-
-def test_least_k_dyn_of_method_1_is_that_of_a_vanishing_torque():
-    # (17) with M1 = 0: the load torque alone closes the gap
-    for gap, least in ((0.5, 2.0386), (2.0, 2.1466)):
-        assert k_dyn(5, gap, 0.0, 1) == pytest.approx(least, abs=5e-5)
-        k = np.asarray(closed_form(crane(5, gap), RATIOS, 1).k_dyn)
-        assert np.all(np.diff(k) > 0)
-    assert k_dyn(2, 0.5, 0.0, 1) == pytest.approx(1.7444, abs=5e-5)
-    assert k_dyn(2, 0.5, 0.0, 1, None) > 2.0
+        assert (claim.verdict, number in claim.evidence) == (Verdict(verdict), True), claim
 
 
 @pytest.mark.parametrize("gap", [0.5, 2.0])
@@ -143,12 +111,6 @@ def test_time_switched_torque_fails_at_first_contact_of_the_worn_gap(worn):
     assert simulate(crane(gap=2.0), ways()["instant"]).k_dyn == pytest.approx(whole[-1], rel=1e-12)
 
 
-def test_acceleration_delay_keeps_its_first_contact_while_the_gap_wears(worn):
-    assert worn.first["delay (15)"] == pytest.approx(worn.promised, rel=0.05)
-    assert np.all(worn.whole["delay (15)"] > 2.3)
-    assert worn.whole["delay (14)"] == pytest.approx(worn.promised, rel=0.03)
-
-
 def test_the_delay_fits_within_10_percent_and_breaks_before_20():
     by_load, by_shaft = set_up_once.detuned("load inertia"), set_up_once.detuned("stiffness")
     for found in (by_load, by_shaft):
@@ -159,52 +121,6 @@ def test_the_delay_fits_within_10_percent_and_breaks_before_20():
     over, near = by_shaft.first["delay (15)"] / by_shaft.promised, by_shaft.within(0.10)
     assert over[near] == pytest.approx(1.0, rel=0.02)
     assert np.max(over[by_shaft.within(0.20)]) > 1.5
-
-
-def test_feedback_depends_less_on_the_drive_than_the_direct_start():
-    found = set_up_once.spreads()
-    direct, feedback = found["direct"], found["current-limit-feedback"]
-    assert spread(direct[-1]) == pytest.approx(1.0383, abs=5e-4)
-    assert feedback[-1].shape == direct[-1].shape == (80,)
-    assert spread(feedback[-1]) < 0.6 * spread(direct[-1])
-    assert spread(feedback[0]) < 0.15
-    assert feedback[-1].max() < 1.6
-
-
-# the study ---------------------------------------------------------------------------------------------
-
-
-def test_the_study_is_registered_and_says_what_it_draws(study):
-    result, _, told = study
-    assert isinstance(find_study("paper-g"), PaperG)
-    assert tuple(result.figures) == PaperG.pictures
-    assert len(told) >= 5
-    json.dumps(result.summary(), allow_nan=False)
-
-
-def test_every_figure_has_labelled_axes(study):
-    for stem, figure in study[0].figures.items():
-        assert any(axes.get_ylabel() for axes in figure.axes), stem
-        assert figure.axes[-1].get_xlabel(), stem
-        for axes in figure.axes:
-            for line in axes.lines:
-                assert np.all(np.isfinite(np.asarray(line.get_ydata(), dtype=float))), stem
-
-
-def test_curves_are_written_with_closed_form_and_plant(study):
-    with (study[1] / "paper-g-curves.csv").open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert len(rows) == 14 * 120
-    compared = [row for row in rows if row["plant"]]
-    assert len(compared) == 14 * 20
-    for row in compared:
-        assert math.isclose(float(row["plant"]), float(row["closed form"]), rel_tol=1e-9)
-
-
-def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    PaperG().run(None, lambda doing: None)
-    assert list(tmp_path.iterdir()) == []
 
 
 # from the flanks ---------------------------------------------------------------------------------------

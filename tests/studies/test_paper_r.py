@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.contour import QuadContourSet
 from tests.twin import chain_of
 
 from softstart import Drive
 from softstart.chain import Chain, natural_vibration, reduce_chain
-from softstart.study import Verdict, find_study
+from softstart.study import Verdict
 from softstart.vibration import elastic_frequencies
-from softstart_studies.paper_r import PaperR, findings, four_to_two, tables
+from softstart_studies.paper_r import findings, four_to_two, tables
 from softstart_studies.paper_r.findings import free, scale_gaps, tractor
 from softstart_studies.paper_r.lever import error_bound, lever
 from softstart_studies.paper_r.vibration_with_gaps import backbone, let_go, twists
@@ -170,25 +169,7 @@ def test_a_constant_torque_above_the_alternating_one_locks_all_gaps():
     assert findings.locked(0.0).frequency < 0.9
 
 
-def test_locked_gaps_answer_a_harmonic_torque_as_if_there_were_none(monkeypatch):
-    monkeypatch.setattr(findings, "FREQUENCIES", np.array([62.0, 80.0]))
-    found = findings.forced.__wrapped__(540.0)
-    np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
-
-
 def test_every_claim_of_the_tables_has_its_verdict():
     verdicts = [Verdict(claim.verdict) for claim in tables.claims()]
     assert verdicts == [Verdict.PARTLY, Verdict.CONFIRMED, Verdict.PARTLY, Verdict.CONFIRMED]
     assert "by choice" in findings.twist().evidence
-    assert isinstance(find_study("paper-r"), PaperR)
-    assert len(PaperR.pictures) == 2
-
-
-def test_the_error_map_draws_its_lines_whole_but_for_their_labels() -> None:
-    """On logarithmic axes: no label cuts more than half a decade out of its line."""
-    figure = four_to_two.map_figure(four_to_two.error_map())
-    lines = [line for line in figure.axes[0].collections if isinstance(line, QuadContourSet)]
-    assert len(lines) == 2
-    for path in (path for line in lines for path in line.get_paths() if path.vertices.size):
-        x = np.sort(np.log10(path.vertices[:, 0]))
-        assert np.diff(x).max() < 0.5

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from softstart import fatigue, simulate
-from softstart.study import Verdict, find_study
+from softstart.study import Verdict
 from softstart_studies.real_starts import (
     SLOWER,
     Extent,
@@ -74,8 +74,6 @@ def test_order_of_life_and_of_k_dyn(found):
 
 def test_tables_claims_and_figures(found):
     result = present(found, lambda text: None)
-    assert [len(table.rows) for table in result.tables] == [4, 4, 8, 8]
+    assert [len(table.rows) for table in result.tables] == [4, 4, 8]
     assert tuple(result.figures) == RealStarts.pictures
-    assert len(result.claims) == 6
-    assert "The worst of three positions" in result.claims[-1].statement
-    assert isinstance(find_study("real-starts"), RealStarts)
+    assert len(result.claims) == 4

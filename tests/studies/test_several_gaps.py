@@ -3,8 +3,8 @@
 import pytest
 
 from softstart import optimize, simulate
-from softstart.study import Verdict, find_study
-from softstart_studies.several_gaps import Extent, SeveralGaps, chain, claims, find, table
+from softstart.study import Verdict
+from softstart_studies.several_gaps import Extent, chain, claims, find, table
 
 pytestmark = pytest.mark.slow  # all wait for the study
 
@@ -27,7 +27,3 @@ def test_the_claims_hold_here(found):
     assert said[0].verdict is Verdict.CONFIRMED
     assert said[1].verdict is Verdict.CONFIRMED
     assert simulate(chain(), "s-curve").k_dyn > found.rows[0].best.k_dyn
-
-
-def test_it_is_found():
-    assert isinstance(find_study("several-gaps"), SeveralGaps)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from softstart import optimize, simulate
-from softstart.study import find_study
 from softstart_studies.crane import WITH_INVERTER, published
 from softstart_studies.wear import Extent, Wear, live, present
 
@@ -67,7 +66,3 @@ def test_tables_claims_and_figures(life):
     panel = result.figures["wear-life"].axes[0]
     lines = {line.get_label(): line for line in panel.lines}
     assert np.array_equal(lines["scheduled"].get_ydata(), life.courses["ramp"]["scheduled"].k_dyn)
-
-
-def test_the_study_is_registered():
-    assert isinstance(find_study("wear"), Wear)

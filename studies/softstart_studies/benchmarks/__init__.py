@@ -1,1 +1,1 @@
-"""Speed and memory of softstart beside named peers: the same starts, the same end, in one run, as ratios."""
+"""Speed of starts and of optima beside scipy, python-control and CasADi, as ratios of one run."""

@@ -22,23 +22,22 @@ T_MAX = 100.0  # s, never reached
 
 
 def restarted(problem: Problem, count: int) -> Solve:
-    """All starts, one after the other."""
-    lines = problem.lines(count)
+    """solve_ivp LSODA, rtol 1e-8, located events, restarted at each of them and at each sample."""
+    lines = [problem.line(one) for one in problem.machines(count)]
     return lambda: np.array([start(line)[0] for line in lines])
 
 
 def tight(problem: Problem, count: int) -> Solve:
-    """The same at the tightest tolerance, which shows whose the difference is."""
-    lines = problem.lines(count)
+    """The same at rtol 1e-12, which shows whose the difference is."""
+    lines = [problem.line(one) for one in problem.machines(count)]
     return lambda: np.array([start(line, TIGHT)[0] for line in lines])
 
 
-def start(line: Line, tolerance: float | None = None) -> tuple[Vector, float]:
+def start(line: Line, tolerance: float = TOLERANCE) -> tuple[Vector, float]:
     """Largest |T| of each shaft in one start, N m, and the start time, s.
 
     States: twists, speeds, and behind a lag the motor torque.
     """
-    tolerance = tolerance or TOLERANCE
     n, half = line.J.size, 0.5 * line.gap
     y = np.concatenate([line.theta0, np.zeros(n), np.zeros(int(line.lag > 0.0))])
     side, peaks = np.zeros(n - 1), np.zeros(n - 1)

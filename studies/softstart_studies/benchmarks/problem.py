@@ -12,14 +12,16 @@ import numpy as np
 from softstart.arrays import Vector
 
 if TYPE_CHECKING:
-    from softstart.controller import Controller
+    from softstart.controller.base import SetUp
 
 DRIVE, CHAIN = "crane-4amtkf", "crane-4-mass"
 GAPS = (0.5, 2.0)  # rad, the two gaps of [G]; the drives of a batch lie between them
 RAMP_TIME = 0.5  # s, longer than most of the start, so that it is sampled nearly throughout
 DAMPED = "damped "  # before the name of a strategy: a drive with damping and lag, a chain with damping
 DAMPING, LAG, CHAIN_DAMPING = 0.03, 0.002, 0.02  # share of the critical damping; s; of each shaft
-NEVER = math.inf
+
+Solve = Callable[[], Any]
+"""Peaks of the shaft torques, N m, a row a start: what is timed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +51,12 @@ class Line:
     def demand(self, t: float, stage: int) -> tuple[float, float]:
         """The torque now, and the instant at which it changes if the stage does not."""
         if self.stage_torques is not None:
-            return self.stage_torques[min(stage, 3) - 1], NEVER
+            return self.stage_torques[min(stage, 3) - 1], math.inf
         k = math.floor(t / self.period + 1e-6)
         if k * self.period >= self.time:
-            return self.full, NEVER
+            return self.full, math.inf
         share = k * self.period / self.time
         return self.initial + (self.full - self.initial) * share, (k + 1) * self.period
-
-    def stages(self) -> tuple[float, float, float]:
-        """The torque of each stage; ValueError for a ramp."""
-        if self.stage_torques is None:
-            raise ValueError("a ramp has no torque of its own for each stage.")
-        return self.stage_torques
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,28 +89,27 @@ class Problem:
                 one = one.replace(damping=2.0 * DAMPING * one.c / one.Omega, torque_lag=LAG)
             return [one.replace(gap=float(gap)) for gap in gaps(count)] if count else [one]
         if damped:
-            one = replace(
-                one, shafts=tuple(shaft.replace(damping_ratio=CHAIN_DAMPING) for shaft in one.shafts)
-            )
-        shares = 0.9 + 0.2 * (np.arange(count) + 0.5) / max(count, 1)
+            shafts = (shaft.replace(damping_ratio=CHAIN_DAMPING) for shaft in one.shafts)
+            one = replace(one, shafts=tuple(shafts))
+        widths = 0.9 + 0.2 * (np.arange(count) + 0.5) / max(count, 1)
         inertias = 0.9 + 0.2 * ((0.5 + np.arange(count) * 0.618034) % 1.0)
-        pairs = zip(shares.tolist(), inertias.tolist(), strict=True)
+        pairs = zip(widths.tolist(), inertias.tolist(), strict=True)
         return [one.changed(gaps=gap, load_inertia=inertia) for gap, inertia in pairs] if count else [one]
 
-    def controller(self) -> Controller:
-        """Set up for the machine; a ramp takes `ramp_time`, method 2 raises its torque where [G](15) says."""
+    def set_up(self) -> SetUp:
+        """The controller for the machine; method 2 raises its torque where [G](15) says."""
         from softstart.controller import make_controller
         from softstart_studies.crane import published
 
         strategy = self.strategy.removeprefix(DAMPED)
         given = {"time": self.ramp_time} if strategy == "ramp" else {}
         made = published(strategy, **given) if self.on_drive else make_controller(strategy, given)
-        return made.set_up(self.machines()[0].design_drive)[0]
+        return made.set_up(self.machines()[0].design_drive)
 
     def line(self, machine: Any = None) -> Line:
         """The machine, or a variant of it, as numbers."""
         one: Any = self.machines()[0] if machine is None else machine
-        given: dict[str, Any] = dict(self.controller().parameters)
+        given: dict[str, Any] = dict(self.set_up()[0].parameters)
         stages, plain = None, self.strategy.removeprefix(DAMPED)
         if plain != "ramp":
             first, full = given["torque"], given.get("full_torque", given["torque"])
@@ -130,14 +125,6 @@ class Problem:
         numbers += [float(getattr(one, "torque_lag", 0.0)), stages]
         numbers += [float(given.get(name, 0.0)) for name in ("initial", "full_torque", "time", "period")]
         return Line(*numbers)
-
-    def lines(self, count: int) -> list[Line]:
-        """So many variants as numbers."""
-        return [self.line(machine) for machine in self.machines(count)]
-
-
-Solve = Callable[[], Any]
-"""Peaks of the shaft torques, N m, a row a start: what is timed."""
 
 
 def gaps(count: int) -> Vector:

@@ -2,8 +2,8 @@
 
 The optimal start of the crane is drawn by profiles.py (figure optimal-starts-profiles: motor torque, shaft
 torque and speeds, both gaps); limits.py has the least K_dyn over the start time, what no start undercuts and
-the controllers beside it; costs.py the terminal conditions, smooth torques and other drives; sensor.py one
-torque for several gaps. The theory is in docs/optimal-starts.md, the drive in drives.py.
+the controllers beside it; costs.py the terminal conditions. The theory is in docs/optimal-starts.md, the
+drive in drives.py.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from softstart.optimal.front import Front
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.optimal_starts import costs, limits, profiles, sensor
+from softstart_studies.optimal_starts import costs, limits, profiles
 from softstart_studies.optimal_starts.drives import Extent
 
 __all__ = ["OptimalStarts"]
@@ -27,9 +27,6 @@ class Found:
     profiles: list[profiles.OptimalStart]
     fronts: list[Front]
     endings: list[costs.Endings]
-    sensed: list[sensor.Sensed]
-    prices: list[costs.Price]
-    kinds: list[costs.Kind]
 
 
 def find(extent: Extent, progress: Progress) -> Found:
@@ -39,9 +36,6 @@ def find(extent: Extent, progress: Progress) -> Found:
         profiles.starts(extent, progress),
         curves,
         [costs.endings(front, progress) for front in curves],
-        sensor.sensed(extent, progress),
-        costs.prices(extent, progress),
-        costs.kinds(extent, progress),
     )
 
 
@@ -80,23 +74,9 @@ def present(found: Found, progress: Progress) -> StudyResult:
         *limits.claims(found.fronts, progress),
         costs.reached_is_lower(found.endings),
         costs.steady_costs(found.endings),
-        sensor.sensor_pays(found.sensed),
-        sensor.optimum_depends_on_gap(found.sensed),
-        costs.smooth_costs_little(found.prices),
-        costs.optimum_of_kinds_is_below(found.kinds),
-    )
-    landmarks, curves, controllers = limits.tables(found.fronts)
-    tables = (
-        landmarks,
-        profiles.table(found.profiles),
-        curves,
-        controllers,
-        costs.endings_table(found.endings),
-        sensor.table(found.sensed),
-        costs.prices_table(found.prices),
-        costs.kinds_table(found.kinds),
+        limits.optimum_depends_on_gap(),
     )
     progress("drawing")
     fronts = front_figure(found.fronts[0]), front_figure(found.fronts[-1])
     drawn = profiles.figure(found.profiles), *fronts, costs.endings_figure(found.endings)
-    return OptimalStarts.result(tables, claims, drawn)
+    return OptimalStarts.result(limits.tables(found.fronts), claims, drawn)

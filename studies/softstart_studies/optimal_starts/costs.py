@@ -1,41 +1,22 @@
-"""What it costs to end synchronous or steady, to play a smooth torque, and to start another kind of drive."""
+"""What it costs to end synchronous or steady."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from softstart.optimal.front import Front, FrontPoint
-from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import TERMINALS, Terminal
-from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
-from softstart.study import Claim, Progress, Table, Verdict
+from softstart.study import Claim, Progress, Verdict
 from softstart.views.drawing import drawing, new_figure
 from softstart_studies.crane import K_DYN, draw_lines, percent
-from softstart_studies.optimal_starts.drives import (
-    DAMPING,
-    Extent,
-    crane,
-    direct_time,
-    gap_of,
-    of_points,
-    optima,
-)
-from softstart_studies.optimal_starts.limits import nearest
+from softstart_studies.optimal_starts.drives import crane, gap_of, optima
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PROMISED = 0.05  # by how much reached is said to lie below synchronous where K_dyn > 1
-MULTIPLE = 1.2  # of the start time of direct, for a smooth torque
-PLAYABLE = 5000.0  # N m/s: a drive that takes 12 ms to its starting torque
-LITTLE = 1.05
-
-
-# terminal conditions -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -67,18 +48,6 @@ def endings(front: Front, progress: Progress) -> Endings:
     return Endings(
         gap, {name: {one.start_time_bound: one for one in points} for name, points in found.items()}
     )
-
-
-def endings_table(found: Sequence[Endings]) -> Table:
-    """K_dyn of the three over the start time."""
-    rows = []
-    for one in found:
-        for time in one.by_terminal["reached"]:
-            k = [one.k_dyn(terminal).get(time) for terminal in TERMINALS]
-            more = [100 * (one.cost(name).get(time, math.nan) - 1) for name in ("synchronous", "steady")]
-            rows.append((one.gap, time, time / direct_time(one.gap), *k, *more))
-    columns = ("gap, rad", "start time, s", "x direct", *TERMINALS, "synchronous, % more", "steady, % more")
-    return Table("What the terminal condition costs", columns, rows)
 
 
 def reached_is_lower(found: Sequence[Endings]) -> Claim:
@@ -134,125 +103,3 @@ def endings_figure(found: Sequence[Endings]) -> Figure:
         panels[1, 0].set_ylabel(f"{K_DYN} above that of reached, %")
         panels[0, -1].legend(loc="upper right", handlelength=3.2)
     return figure  # type: ignore[no-any-return]
-
-
-# a torque that a drive can play --------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Price:
-    """The optimum with a torque of limited smoothness, None where none was found."""
-
-    lag: float  # s
-    rate: float  # N m/s
-    weight: float  # s
-    best: Optimum | None
-
-    @property
-    def k_dyn(self) -> float:
-        """Of the optimum; NaN without."""
-        return self.best.k_dyn if self.best else math.nan
-
-    def __str__(self) -> str:
-        parts = {
-            f"lag {1000 * self.lag:g} ms": self.lag,
-            f"rate {self.rate:g} N m/s": math.isfinite(self.rate),
-            f"weight {self.weight:g} s": self.weight,
-        }
-        return ", ".join(text for text, said in parts.items() if said)
-
-
-def prices(extent: Extent, progress: Progress) -> list[Price]:
-    """The ideal torque first; then each lag from the quickest rate on; then the weights."""
-    asked = [(0.0, math.inf, 0.0)]
-    for lag in extent.lags:
-        asked += [(lag, math.inf, 0.0)] if lag > 0.0 else []
-        asked += [(lag, rate, 0.0) for rate in extent.rates]
-    asked += [(0.0, math.inf, weight) for weight in extent.weights]
-    found = []
-    for lag, rate, weight in asked:
-        progress(f"torque with lag {lag:g} s, rate {rate:g} N m/s, weight {weight:g} s")
-        drive = crane().replace(torque_lag=lag, torque_rate=rate)
-        best = None
-        with suppress(InfeasibleError, OptimumError):
-            best = optimize(drive, MULTIPLE * direct_time(float(drive.gap)), smoothness=weight)
-        found.append(Price(lag, rate, weight, best))
-    return found
-
-
-def prices_table(found: Sequence[Price]) -> Table:
-    """K_dyn of each, and how much it is above that of an ideal torque."""
-    return Table.of(f"What a smooth torque costs, gap 0.5 rad, {MULTIPLE:g} x direct, synchronous", {
-        "lag, s": [one.lag for one in found],
-        "rate limit, N m/s": [one.rate for one in found],
-        "weight, s": [one.weight for one in found],
-        "K_dyn": [one.k_dyn for one in found],
-        "above ideal, %": [100 * (one.k_dyn / found[0].k_dyn - 1) for one in found],
-        "heat, s": [one.best.heat if one.best else None for one in found],
-        "at least": [one.best.bound.k_dyn if one.best else None for one in found],
-    })  # fmt: skip
-
-
-def smooth_costs_little(found: Sequence[Price]) -> Claim:
-    """Whether the optimum survives what a drive can do."""
-    least = found[0].k_dyn
-    solved = sorted((one for one in found[1:] if one.best), key=lambda one: one.weight > 0.0)
-    playable = [one for one in solved if one.weight == 0.0 and one.rate >= PLAYABLE]
-    dearest = max(one.k_dyn for one in playable)
-    said = "; ".join(f"{one} {one.k_dyn:.4f} ({percent(one.k_dyn / least, 1)})" for one in solved)
-    return Claim(
-        "(Not in [G]) A torque that an inverter can play costs little.",
-        Verdict.of(dearest < LITTLE * least),
-        f"Ideal torque {least:.4f}; {said}. Down to {PLAYABLE:g} N m/s and with a lag of up to "
-        f"{1000 * max(one.lag for one in playable):g} ms it costs at most {percent(dearest / least, 1)}.",
-    )
-
-
-# reactive loads and damped shafts ------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Kind:
-    """The optima of one kind of drive, terminal synchronous; its controllers beside it at the first gap."""
-
-    name: str
-    front: Front
-
-
-def kinds(extent: Extent, progress: Progress) -> list[Kind]:
-    """All kinds at all gaps, at the start times of the undamped active drive."""
-    found = []
-    for name in extent.kinds:
-        for gap in extent.gaps:
-            times = [m * direct_time(gap) for m in extent.kind_multiples]
-            beside = extent.kind_controllers if gap == extent.gaps[0] else ()
-            found.append(Kind(name, optima(crane(gap, name), times, "synchronous", progress, beside)))
-    return found
-
-
-def kinds_table(found: Sequence[Kind]) -> Table:
-    """K_dyn of each; that of the undamped active drive is in the table of optimal starts."""
-    rows = [(kind.name, gap_of(kind.front), point) for kind in found for point in kind.front.points]
-    return Table.of(f"Reactive load and damped shaft (d = {DAMPING:g} N m s/rad, assumed), synchronous", {
-        "drive": [name for name, _, _ in rows],
-        "gap, rad": [gap for _, gap, _ in rows],
-        **of_points([point for *_, point in rows]),
-    })  # fmt: skip
-
-
-def optimum_of_kinds_is_below(found: Sequence[Kind]) -> Claim:
-    """The optimum beside the controllers of these drives."""
-    judged = [kind for kind in found if kind.front.controllers]
-    names = ", ".join(one.name for one in judged[0].front.controllers)
-    ratios = [one.ratio for kind in judged for one in kind.front.controllers if one.ratio is not None]
-    best = [(kind, nearest(kind.front)) for kind in judged]
-    said = "; ".join(
-        f"{kind.name}, {gap_of(kind.front):g} rad: {one.name} {one.k_dyn:.4f}, "
-        f"{percent(one.ratio or 1.0, 1)} above the optimum"
-        for kind, one in best
-    )
-    return Claim(
-        "(Not in [G]) With a reactive load or a damped shaft too, the optimum is well below the controllers.",
-        Verdict.of(min(ratios) > 1.05),
-        f"At equal start time, {len(ratios)} starts of {names}; nearest: {said}.",
-    )

@@ -17,7 +17,6 @@ from softstart.optimal.problem import Problem, Terminal
 from softstart.study import Progress
 from softstart_studies.crane import CRANE, TARGET, prefixed, published
 
-DAMPING = 1.0  # N m s/rad, assumed: 15 % of the critical one; [G] has none
 NEAREST, LONGEST = 1.06, 1.6  # of the start time of direct
 
 
@@ -28,27 +27,12 @@ class Extent:
     gaps: tuple[float, ...] = (0.5, 2.0)  # rad, new and worn
     multiples: tuple[float, ...] = (1.05, 1.2, 1.5)  # of the start time of direct
     points: int = 8  # of each front
-    sensor_multiples: tuple[float, ...] = (1.2, 1.35)  # of the start time of direct at the first gap
-    sensor_gaps: tuple[float, ...] = (0.5, 1.0, 2.0)
-    rates: tuple[float, ...] = (20000.0, 5000.0, 2000.0)  # N m/s
-    lags: tuple[float, ...] = (0.0, 0.002)  # s
-    weights: tuple[float, ...] = (1e-4, 1e-3, 1e-2)  # s
-    kinds: tuple[str, ...] = ("reactive", "damped", "reactive, damped")
-    kind_multiples: tuple[float, ...] = (1.2, 1.5)
     controllers: tuple[str, ...] | None = None  # beside the fronts; None: all that are shipped
-    kind_controllers: tuple[str, ...] = ("current-limit-feedback", "reduced-two-stage")
 
 
-def crane(gap: float = 0.5, kind: str = "") -> Drive:
-    """The drive of [G] with this total gap in rad; `kind` names what is different: reactive, damped, or both.
-
-    >>> crane(2.0, "reactive, damped").load_kind, crane().d
-    ('reactive', 0.0)
-    """
-    drive = CRANE.replace(gap=gap, target_speed=TARGET, name=f"Crane of [G], gap {gap:g} rad")
-    if "reactive" in kind:
-        drive = drive.replace(load_kind="reactive")
-    return drive.replace(damping=DAMPING) if "damped" in kind else drive
+def crane(gap: float = 0.5) -> Drive:
+    """The drive of [G] with this total gap in rad."""
+    return CRANE.replace(gap=gap, target_speed=TARGET, name=f"Crane of [G], gap {gap:g} rad")
 
 
 @cache

@@ -9,9 +9,9 @@ from softstart import Run, simulate
 from softstart.controller import make_controller
 from softstart.optimal.front import FrontPoint
 from softstart.profile import TorqueProfile
-from softstart.study import Progress, Table
+from softstart.study import Progress
 from softstart_studies.crane import K_DYN, starts_figure
-from softstart_studies.optimal_starts.drives import Extent, crane, direct_time, of_points, optima
+from softstart_studies.optimal_starts.drives import Extent, crane, direct_time, optima
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,19 +50,6 @@ def run_of(gap: float, point: FrontPoint) -> Run | None:
     profile = TorqueProfile(list(point.time), list(point.torque))
     player = make_controller("profile", {"profile": profile})
     return simulate(crane(gap), player, point.start_time + float(crane(gap).elastic_period))
-
-
-def table(found: list[OptimalStart]) -> Table:
-    """What each comes to, or the shortest start time where there is none."""
-    points = [one.point for one in found]
-    return Table.of("Optimal starts, synchronous, undamped, active load", {
-        "gap, rad": [one.gap for one in found],
-        "x direct": [one.multiple for one in found],
-        **of_points(points),
-        "contacts": [p.contacts for p in points],
-        "heat, s": [p.heat for p in points],
-        "shortest, s": [p.shortest_start_time for p in points],
-    })  # fmt: skip
 
 
 def figure(found: list[OptimalStart]) -> Figure:

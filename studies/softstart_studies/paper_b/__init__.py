@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.paper_b import figures, orders, tables, verdicts
+from softstart_studies.paper_b import figures, tables, verdicts
 from softstart_studies.paper_b.vaz import VAZ, balanced
 
 __all__ = ["PaperB"]
@@ -40,8 +40,8 @@ class PaperB(Study):
             write_whole(out / "vaz-11113.toml", lambda stream: stream.write(VAZ.to_toml()))
         progress("varying what is assumed")
         made = (
-            tables.printed_and_model(), tables.moments(found), tables.designs(found), tables.loads(),
-            tables.assumptions(), orders.convergence(),
+            tables.printed_and_model(), tables.loads(),
+            tables.assumptions(),
         )  # fmt: skip
         claims = verdicts.claims(found)
         progress("drawing")

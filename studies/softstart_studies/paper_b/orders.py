@@ -1,14 +1,11 @@
-"""How exact the orders are: inertia by FFT and by power series in lambda, gas by FFT and by quadrature."""
+"""The orders of the inertia torque by power series in lambda, beside the FFT of the package."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.balancing.slider_crank import SliderCrank, inertia_torque_harmonics
-from softstart.study import Table
-from softstart_studies.paper_b.vaz import RPM, TUNING, VAZ
+from softstart.balancing.slider_crank import inertia_torque_harmonics
 
 
 def acceleration_series(ratio: float, orders: int) -> Vector:
@@ -59,30 +56,3 @@ def series_difference(ratio: float) -> float:
     True
     """
     return float(np.abs(inertia_torque_harmonics(ratio, 12) - inertia_torque_series(ratio, 12)).max())
-
-
-def inertia_by_samples(samples: int) -> float:
-    """Largest error of B_1 .. B_4 by FFT with so many samples a turn."""
-    ratio, phi = VAZ.cylinders.crank.ratio, 2.0 * np.pi * np.arange(samples) / samples
-    one = SliderCrank(ratio, 1.0)
-    torque = -one.slope(phi) * one.curvature(phi) / ratio**2
-    found = -2.0 / samples * np.fft.rfft(torque).imag[:5]
-    return float(np.abs(found - inertia_torque_series(ratio, 4)).max())
-
-
-def gas_by_samples(samples: int) -> float:
-    """Largest error in N m of the orders 1 to 4 of the gas torque by FFT with so many samples a cycle."""
-    w, phi = TUNING * RPM, CYCLE_ANGLE * np.arange(samples) / samples
-    found = 2.0 / samples * np.fft.rfft(VAZ.gas_torque(phi, w))[2:9:2]
-    return float(np.abs(found - VAZ.gas_harmonics(w)[2:9:2]).max())
-
-
-def convergence() -> Table:
-    """Errors over samples: inertia exponentially, gas by the kinks of the pressure."""
-    inertia, gas = "inertia torque, B_1 .. B_4", "gas torque, orders 1 .. 4"
-    of_inertia, of_gas = "of the power series in lambda", "N m, of Gauss quadrature"
-    rows = [
-        *((inertia, n, f"{inertia_by_samples(n):.1e}", of_inertia) for n in (8, 12, 16, 24, 32)),
-        *((gas, n, f"{gas_by_samples(n):.1e}", of_gas) for n in (90, 180, 360, 720, 7200)),
-    ]
-    return Table("Convergence of the orders", ("what", "samples", "largest error", "unit"), rows)

@@ -15,7 +15,6 @@ from softstart_studies.paper_b.vaz import (
     MOMENTS,
     RADIUS,
     RPM,
-    SPEEDS,
     TUNING,
     VARIED,
     VAZ,
@@ -84,37 +83,6 @@ def curves(found: Balance) -> Curves:
     assert height is not None
     both, shafts = gas + inertia, found.imbalance * height * w**2
     return Curves(w / RPM, np.abs(gas), np.abs(inertia), np.abs(both), -both.imag, shafts)
-
-
-def moments(found: Balance) -> Table:
-    """Figures 2 and 3 in numbers."""
-    one = curves(found)
-    rows = []
-    for n, i in _indices(found):
-        model = [round(float(curve[i]), 2) for curve in one[1:]]
-        rows.append((n, *model, *(round(moment * n**2, 2) for _, moment in MOMENTS)))
-    columns = (
-        "n, rpm", "gas", "inertia", "both", "sine of both", "M_b of the model, h fixed",
-        "M_b printed, 1e-5", "M_b printed, 1e-6",
-    )  # fmt: skip
-    return Table("Figures 2 and 3: first-order moments in N m at full load", columns, rows)
-
-
-def designs(found: Balance) -> Table:
-    """The first-order moment that each design leaves, and its arm."""
-    last = found.residual("variable-h-e")
-    assert last.height is not None
-    assert last.offset is not None
-    rows = []
-    for n, i in _indices(found):
-        left = [round(float(one.first_order_moment[i]), 2) for one in found.residuals]
-        rows.append((n, *left, round(1e3 * float(last.height[i]), 2), round(1e3 * float(last.offset[i]), 2)))
-    columns = ("n, rpm", *(one.name for one in found.residuals), "h(n), mm", "e(n), mm")
-    return Table("First-order moment left on the housing, N m, at full load", columns, rows)
-
-
-def _indices(found: Balance) -> list[tuple[float, int]]:
-    return [(n, int(np.argmin(np.abs(found.speeds / RPM - n)))) for n in SPEEDS]
 
 
 def loads() -> Table:

@@ -46,7 +46,6 @@ class PaperC(Study):
             optimize_engagement(printed.clutch(), self.points, law_class=law_class, progress=progress)
             for law_class in fronts.COVERS
         )
-        progress("the same by collocation")
         tables = (*printed.tables(runs), search, *fronts.tables(found))
         progress("drawing")
         names = ["linear", *(f"optimal, {one.law_class}" for one in found)]

@@ -22,12 +22,10 @@ from softstart.views.drawing import COLOURS, DASHES, GREY, MARKERS, drawing, ent
 from softstart.views.numbers import Table as ShownTable
 from softstart.views.numbers import column_of, number
 from softstart.views.sheet import Sheet, columns_file, records_file
-from softstart_studies.paper_c.collocation import collocated
 from softstart_studies.paper_c.least_work import STEPS, OptimalLaw, Search
 from softstart_studies.paper_c.printed import IN_KGF, KGF
 
 HIGHEST = 1.5  # of the mean torque: peaks above are useless, and the clutch locks in mid-swing there
-CROSS_CHECKED = 4  # the point at this part of each front, but not the first, by collocation
 COVERS = {
     name: f"all {words}laws with 0 <= M(t) <= MM for t < tM and M = MM from tM on, with which the clutch "
     "slips for at least one elastic period after tM; peak and work up to the first lock-up"
@@ -252,7 +250,7 @@ def two_steps(clutch: Clutch) -> tuple[list[float], list[float]]:
 
 
 def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
-    """The fronts, the laws of [C] against them, simple laws, and a point of each front by collocation."""
+    """The fronts, the laws of [C] against them, and simple laws."""
     points = [
         (one.law_class, point.peak_torque / KGF, point.slip_work / KGF, point.work_bound / KGF,
          point.gap_percent, point.run.slip_time, point.run.locked_peak_torque / KGF)
@@ -266,7 +264,7 @@ def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
         for front in found
         for law in front.laws
     ]  # fmt: skip
-    simple, checked = [], []
+    simple = []
     names = (("full torque, pause, full torque", pulse_and_pause), ("two steps", two_steps))
     for one, (name, law_of) in zip(found, names, strict=True):
         times, torques = law_of(one.clutch)
@@ -274,12 +272,6 @@ def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
         instants = ", ".join(f"{t:.4f}" for t in sorted(set(times)) if t > 0.0)
         figures = (run.slip_peak_torque, run.slip_work, best.slip_work, best.work_bound)
         simple.append((one.law_class, name, instants, *(figure / KGF for figure in figures)))
-        if len(one.points) > 1:
-            point = one.points[max(len(one.points) // CROSS_CHECKED, 1)]
-            other = collocated(one.clutch, point.peak_torque, one.law_class)
-            off_by = 100.0 * (other / point.slip_work - 1.0)
-            peak, work = point.peak_torque / KGF, point.slip_work / KGF
-            checked.append((one.law_class, peak, work, other / KGF, off_by))
     return (
         Table(
             "Least friction work at a given peak",
@@ -298,11 +290,6 @@ def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
             ("laws", "law", "its instants, s", "peak, kgf m", "work, kgf m", "optimum found, kgf m",
              "bound, kgf m"),
             simple,
-        ),
-        Table(
-            "The same optimum by collocation",
-            ("laws", "peak, kgf m", "work, kgf m", "by CasADi and IPOPT, kgf m", "apart, %"),
-            checked,
         ),
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ def claims(
 
 
 def _table(runs: dict[str, Engagement], search: Table, several: bool) -> Claim:
-    met = sum(isinstance(row[3], int) and row[3] > 0 for row in search.rows)
+    met = sum(row[-1] != 0 for row in search.rows)
     linear = runs["linear"].slip_peak_torque / KGF
     more = "some choices meet several" if several else "no set of choices meets more than one"
     return Claim(

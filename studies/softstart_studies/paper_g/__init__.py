@@ -15,7 +15,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
 from softstart_studies.paper_g import curves, from_flank, set_up_once, stages, whole_start
 from softstart_studies.paper_g.crane import GAP_1, GAP_2
@@ -44,12 +43,9 @@ class PaperG(Study):
     )
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
-        """All of it; `out` receives the curves of figs. 2-4 as paper-g-curves.csv."""
+        """All of it; nothing is written beyond tables and pictures."""
         progress("figures 2, 3 and 4, closed form and plant")
         drawn = curves.figures()
-        if out is not None:
-            text = curves.curves_csv(drawn)
-            write_whole(out / "paper-g-curves.csv", lambda stream: stream.write(text))
         progress("the whole start under method 2")
         starts = [whole_start.whole_start(gap) for gap in (GAP_1, GAP_2)]
         progress("wear")
@@ -62,10 +58,6 @@ class PaperG(Study):
         tables = (
             curves.worked_table(),
             curves.agreement_table(drawn),
-            stages.durations_table(),
-            whole_start.table(starts),
-            set_up_once.wear_table(worn),
-            set_up_once.frequency_table(by_load, by_shaft),
             set_up_once.spreads_table(spreads),
             from_flank.table(),
         )

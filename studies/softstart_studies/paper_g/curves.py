@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -140,20 +139,6 @@ def agreement_table(drawn: Mapping[str, Sequence[Curve]]) -> Table:
         "simulated points": [len(curves) * len(POINTS) for curves in drawn.values()],
         "largest relative difference": [max(one.disagreement for one in curves) for curves in drawn.values()],
     })  # fmt: skip
-
-
-def curves_csv(drawn: Mapping[str, Sequence[Curve]]) -> str:
-    """Curves and points as text, one row per value; the plant's column is empty where it was not asked."""
-    stream = io.StringIO()
-    stream.write("figure,curve,M1/Ms,closed form,plant\n")
-    for number, curves in drawn.items():
-        for curve in curves:
-            name = "".join(sign for sign in curve.label if sign not in '$\\,"')
-            for r, value in zip(RATIOS, curve.values, strict=True):
-                stream.write(f'{number},"{name}",{r:.17g},{value:.17g},\n')
-            for r, value, point in zip(POINTS, curve.exact, curve.points, strict=True):
-                stream.write(f'{number},"{name}",{r:.17g},{value:.17g},{point:.17g}\n')
-    return stream.getvalue()
 
 
 def figure(number: str, curves: Sequence[Curve]) -> Any:

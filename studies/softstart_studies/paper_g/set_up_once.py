@@ -93,14 +93,6 @@ def detuned(cause: Cause) -> Sweep:
 # wear ----------------------------------------------------------------------------------------------------
 
 
-def wear_table(found: Sweep) -> Table:
-    """First contact and whole start at some gaps."""
-    columns = {"gap, rad": found.x, "(18)": found.promised}
-    for way in found.first:
-        columns |= {f"{way}: first": found.first[way], f"{way}: whole": found.whole[way]}
-    return Table.of("K_dyn while the gap wears", {name: k[::10] for name, k in columns.items()})
-
-
 def time_fails(found: Sweep) -> Claim:
     """At first contact yes; over the whole start the delay of [G] is harder still."""
     first, whole, delayed = found.first["instant"], found.whole["instant"], found.whole["delay (15)"]
@@ -153,22 +145,6 @@ def wear_figure(found: Sweep) -> Any:
 
 
 # elastic frequency ---------------------------------------------------------------------------------------
-
-
-def frequency_table(by_load: Sweep, by_shaft: Sweep) -> Table:
-    """K_dyn at deviations of 10 % steps."""
-    rows = [
-        (cause, f"{100 * deviation:+.0f} %", float(J2 / CRANE.J1), float(c / CRANE.c), *map(float, k))
-        for cause, one in (("load inertia", by_load), ("stiffness", by_shaft))
-        for deviation, J2, c, *k in zip(
-            one.x, one.J2, one.c, one.promised, one.first["delay (15)"], one.whole["delay (15)"],
-            one.whole["delay (14)"], strict=True,
-        )
-        if round(100 * float(deviation)) % 10 == 0
-    ]  # fmt: skip
-    columns = ("changed", "Omega", "J2/J1", "c/c new", "(18)", "delay (15): first", "delay (15): whole",
-               "delay (14): whole")  # fmt: skip
-    return Table("K_dyn over elastic frequency", columns, rows)
 
 
 def delay_fits(by_load: Sweep, by_shaft: Sweep) -> Claim:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softstart.study import Claim, Table, Verdict
+from softstart.study import Claim, Verdict
 from softstart_studies.crane import CRANE, percent
 from softstart_studies.paper_g.crane import (
     GAP_1,
@@ -93,18 +93,6 @@ def least_k_dyn() -> Claim:
         f"{least:.3f} at 0.5 rad, and without any impact, where it is 2 (Ms J2 + J1 Mc)/(J1 + J2) over the "
         f"base, by {impact_free:.3f}.",
     )
-
-
-def durations_table() -> Table:
-    """Stages 1 and 2 of both methods at some M1/Ms, and how much longer stage 2 is with method 1."""
-    rows = []
-    for gap in (GAP_1, GAP_2):
-        for r in SHOWN:
-            first, second = (closed_form(crane(HEAVY, gap), r, method) for method in METHODS)
-            lengths = first.open_duration, first.contact_duration, second.contact_duration
-            rows.append((gap, r, *map(float, lengths), percent(lengths[1] / lengths[2])))
-    columns = ("gap, rad", "M1/Ms", "t1, s", "t2 method 1, s", "t2 method 2, s", "method 1 over method 2")
-    return Table("Stages 1 and 2, J2 = 5 J1", columns, rows)
 
 
 def stage_2_alike() -> Claim:

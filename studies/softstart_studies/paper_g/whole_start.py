@@ -10,7 +10,7 @@ import numpy as np
 
 from softstart import Run, simulate
 from softstart.arrays import Vector
-from softstart.study import Claim, Table, Verdict
+from softstart.study import Claim, Verdict
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, new_figure, shade_open_gap
 from softstart_studies.crane import CRANE, K_DYN, draw_lines
 from softstart_studies.paper_g.crane import (
@@ -26,7 +26,6 @@ from softstart_studies.paper_g.crane import (
 )
 
 R: Vector = RATIOS[4:]  # 0.05 to 1, as the points of figs. 2-4
-TABLED = np.isin(np.rint(100 * R), (5, 10, 15, 20, 25, 30, 40, 50, 75, 100))
 DAMPING_RATIO = 0.05  # d Omega/(2 c), what a real shaft may have; [G] has none
 
 
@@ -77,22 +76,6 @@ def traces() -> dict[str, Run]:
         "method 2: raised at the end of stage 2, (15)": simulated(crane(), SHARE, 2),
         "raised at the peak of stage 2, (14)": at_peak(GAP_1, SHARE),
     }
-
-
-def table(starts: Sequence[WholeStart]) -> Table:
-    """Method 2 at first contact and over the whole start, beside method 1 and the raise at the peak."""
-
-    def all_gaps(name: str) -> Vector:
-        return np.concatenate([getattr(start, name)[TABLED] for start in starts])
-
-    return Table.of("K_dyn over the whole start", {
-        "gap, rad": np.repeat([start.gap for start in starts], TABLED.sum()),
-        "M1/Ms": np.tile(R[TABLED], len(starts)),
-        "method 1": all_gaps("method_1"),
-        "method 2: first contact": all_gaps("first_contact"),
-        "whole start": all_gaps("whole"),
-        "at peak: whole start": all_gaps("at_peak"),
-    })  # fmt: skip
 
 
 def method_2_is_gentler(starts: Sequence[WholeStart]) -> Claim:

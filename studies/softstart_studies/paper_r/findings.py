@@ -218,27 +218,14 @@ def forced(locking: float) -> ForcedResponse:
 
 
 def tables() -> tuple[Table, ...]:
-    """Shapes, torques of sections, places of a gap, backbone, widths of gaps, locking, forced response."""
-    gaps, none = neighbours(), plain()
-    torques = np.array([run.torque for run in gaps])
+    """Places of a gap, backbone, widths of gaps, locking."""
     nodes = [(mode, one) for mode in (1, 2) for one in placed(mode)]
     vibration = natural_vibration(tractor())
     per_nose = float(np.abs(vibration.torque[1]).max() / abs(vibration.shape[1, 0]))
     noses = (0.5, 1.0, 2.0, 4.0, 8.0)
     backbone = chain_backbone(tractor(), per_nose * np.radians(noses))
     locks = [locked(torque) for torque in TORQUES]
-    loose, tight = forced(0.0), forced(540.0)
     return (
-        Table.of("Shape of the first free vibration, track = 1 (assumed chain)", {
-            "mass": NAMES, "without gaps": normal(none), "with gaps": normal(gaps[0]),
-        }),
-        Table.of("Largest torque of each section in the free vibration, N m at the crank (assumed chain)", {
-            "section": map(section, range(len(NAMES) - 1)),
-            "without gaps": none.torque,
-            "with gaps, least": torques.min(axis=0),
-            "with gaps, most": torques.max(axis=0),
-            "times": torques.max(axis=0) / none.torque,
-        }),
         Table.of("One gap of 0.05 rad at the crank, in each section in turn, same energy (assumed chain)", {
             "mode": [mode for mode, _ in nodes],
             "section": [section(one.shaft) for _, one in nodes],
@@ -256,7 +243,7 @@ def tables() -> tuple[Table, ...]:
             "Whole motion of the masses over the width of all gaps, as multiples of that without (assumed "
             "chain)",
             ("gaps, times those of [R]", "w/Omega", *NAMES[FIRST:]),
-            [(one, neighbours(one)[0].Omega / none.Omega, *ratios(one)[FIRST:]) for one in (0.0, *WIDTHS)],
+            [(one, neighbours(one)[0].Omega / plain().Omega, *ratios(one)[FIRST:]) for one in (0.0, *WIDTHS)],
         ),
         Table.of("Free vibration about a constant torque (assumed chain), 1 deg at the crank nose without "
                  "gaps", {
@@ -264,12 +251,6 @@ def tables() -> tuple[Table, ...]:
             "over the largest alternating torque": np.array(TORQUES) / np.abs(alternating()).max(),
             "w/Omega": [one.frequency for one in locks],
             "gaps that open, of 6": [one.open_gaps for one in locks],
-        }),
-        Table.of("Forced response (assumed chain): amplitude at the crank nose, deg", {
-            "w, rad/s": FREQUENCIES,
-            "no gaps": np.degrees(loose.without_gaps[:, 0]),
-            "gaps, no constant torque": np.degrees(loose.amplitude[:, 0]),
-            "gaps, 540 N m constant": np.degrees(tight.amplitude[:, 0]),
         }),
     )  # fmt: skip
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import optimize
@@ -27,8 +25,7 @@ from softstart.vibration import reduce_chain
 from softstart_studies.paper_r.last_bits import natural_vibration
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(NamedTuple):
     """Instants in s; there angles about the common mean motion, speeds, twists, torques of the shafts."""
 
     t: Vector
@@ -50,8 +47,11 @@ def let_go(
 ) -> Motion:  # fmt: skip
     """The exact motion at the motor shaft from these twists (rad) and speeds, at rest by default.
 
-    Load torques, friction and losses are left out, damping as well unless it is asked for.
+    Load torques, friction and losses are left out, damping as well unless it is asked for. InputError for a
+    chain with a rigid shaft or a mass that is held.
     """
+    if arrays.rigid.any() or arrays.held is not None:
+        raise InputError("chain: a vibration with gaps needs a spring in every shaft, and no ground.")
     speed = np.zeros(arrays.J.size) if speed is None else speed
     d, d_ground = (one if damped else 0.0 * one for one in (arrays.d, arrays.d_ground))
     masses = [
@@ -131,28 +131,22 @@ def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Va
     return Omega / (1.0 + gap / (math.pi * amplitudes))
 
 
-@dataclass(frozen=True, eq=False)
-class Backbone:
+class Backbone(NamedTuple):
     """Frequency against amplitude of the free vibration of a chain with its gaps, at the motor shaft, in SI.
 
     `torque` is the largest shaft torque with which the vibration is released, N m. `frequency` is that of the
     motion along the gap-free shape, rad/s, by simulation; `two_masses` that of the two masses of the modal
-    reduction, by the exact formula of `backbone`; `Omega` the gap-free frequency of the mode.
+    reduction, by the exact formula of `backbone`; `Omega` the gap-free frequency of the first mode.
     """
 
-    chain: Chain
-    mode: int
     Omega: float
     torque: Vector
     frequency: Vector
     two_masses: Vector
 
 
-HELD = "inertia = inf: vibrations with gaps are those of masses that all move; leave ground out."
-
-
-def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60) -> Backbone:
-    """The free vibration of the chain with its gaps, released from rest with the shaft torques of a mode.
+def chain_backbone(chain: Chain, torque: Value, periods: int = 60) -> Backbone:
+    """The free vibration of the chain with its gaps, released from rest with the shaft torques of mode 1.
 
     `torque` holds the largest shaft torques (N m at the motor shaft), in the ratio of the gap-free mode among
     the shafts. The chain is simulated exactly, without damping, friction, load and motor torque, for so many
@@ -163,27 +157,16 @@ def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60
     >>> round(float(found.frequency[0]), 4), round(float(found.two_masses[0]), 4)
     (1.0, 1.0)
     """
-    vibration = natural_vibration(chain)
-    if not 1 <= mode < vibration.Omega.size:
-        raise InputError(f"mode = {mode}: the elastic modes are 1 to {vibration.Omega.size - 1}.")
+    arrays, vibration = chain.at_motor_shaft(), natural_vibration(chain)
     torques: Vector = np.atleast_1d(np.asarray(torque, np.float64))
-    if not (torques.size and np.all(torques > 0.0) and np.all(np.isfinite(torques))):
-        raise InputError("torque: the largest shaft torques at release must be above 0 N m.")
-    arrays = chain.at_motor_shaft()
-    if arrays.rigid.any():
-        raise InputError("chain: a free vibration with gaps needs a spring in every shaft; one is rigid.")
-    if arrays.held is not None:
-        raise InputError(HELD)
-    share = vibration.torque[mode] / np.abs(vibration.torque[mode]).max()
-    Omega = float(vibration.Omega[mode])
+    share = vibration.torque[1] / np.abs(vibration.torque[1]).max()
+    Omega = float(vibration.Omega[1])
     t = np.linspace(0.0, periods * 2.0 * math.pi / Omega, 64 * periods + 1)
     motions = (let_go(arrays, twists(arrays, size * share), t) for size in torques)
-    found = [main_line(one, arrays, vibration.shape[mode], Omega, mode) for one in motions]
-    two = np.full(torques.size, math.nan)
-    if mode == 1:
-        reduced = reduce_chain(chain, force=True)
-        two = np.asarray(backbone(reduced.J1, reduced.J2, reduced.c, reduced.gap, torques / reduced.c))
-    return Backbone(chain, mode, Omega, torques, np.array(found), two)
+    found = [main_line(one, arrays, vibration.shape[1], Omega) for one in motions]
+    reduced = reduce_chain(chain, force=True)
+    two = np.asarray(backbone(reduced.J1, reduced.J2, reduced.c, reduced.gap, torques / reduced.c))
+    return Backbone(Omega, torques, np.array(found), two)
 
 
 PERIODS = 20  # over which an amplitude is measured
@@ -191,24 +174,18 @@ SAMPLES = 64  # a period
 DECAY = math.log(1e4)  # by so much the slowest transient has fallen before
 
 
-@dataclass(frozen=True, eq=False)
-class ForcedResponse:
+class ForcedResponse(NamedTuple):
     """Steady vibration under harmonic torques, at the motor shaft, in SI; a row for each frequency.
 
-    `amplitude` is that of the angle of each mass about their common mean motion, `torque` that of each shaft
-    torque about its mean (sqrt(2) times the root of the mean square, so that of a sine is its height);
-    `without_gaps` and `torque_without_gaps` are those of the chain without gaps, by the linear equations.
-    `spread` is the largest change of an angle's amplitude from the first to the second half of what was
-    measured, as a share of the largest one: a motion with gaps need not be periodic.
+    `amplitude` is that of the angle of each mass about their common mean motion (sqrt(2) times the root of
+    the mean square, so that of a sine is its height), `without_gaps` that of the chain without gaps, by the
+    linear equations. `spread` is the largest change of an amplitude from the first to the second half of what
+    was measured, as a share of the largest one: a motion with gaps need not be periodic.
     """
 
-    chain: Chain
-    locking: float
     frequency: Vector
     amplitude: Vector
-    torque: Vector
     without_gaps: Vector
-    torque_without_gaps: Vector
     spread: Vector
 
 
@@ -244,18 +221,11 @@ def forced_response(
     """
     arrays = chain.at_motor_shaft()
     speeds: Vector = np.atleast_1d(np.asarray(frequency, np.float64))
-    wrong = _wrong(arrays, speeds, locking, settle)
-    force = np.zeros(arrays.J.size)
+    force, mean = np.zeros(arrays.J.size), np.zeros(arrays.J.size)
     for name, size in excitation.items():
-        index = chain.index(name)
-        if isinstance(size, bool) or not isinstance(size, Real) or not math.isfinite(size):
-            wrong.append(f"excitation of {chain.masses[index].name} = {size!r}: give its amplitude in N m.")
-        else:
-            force[index] += arrays.speed_ratio[index] * float(size)
-    if not force.any() and not any(s.startswith("excitation") for s in wrong):
-        wrong.append("excitation: name the masses on which torques act, as {'rotor': 5.0}.")
-    if wrong:
-        raise InputError(wrong)
+        force[chain.index(name)] += arrays.speed_ratio[chain.index(name)] * size
+    mean[arrays.motor] += locking
+    mean[arrays.load] -= locking
     stiffness, damping = _matrices(arrays)
     if settle is None:
         settle = DECAY / _slowest(arrays, stiffness, damping)
@@ -266,28 +236,18 @@ def forced_response(
     for w in speeds.tolist():
         linear = np.linalg.solve(stiffness - w * w * np.diag(arrays.J) + 1j * w * damping, force)
         begins = np.zeros_like(linear) if from_rest else linear
-        rows.append(_steady(arrays, w, force, linear, begins, constant, locking, settle))
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    return ForcedResponse(chain, float(locking), speeds, *columns)
-
-
-def _wrong(arrays: ChainArrays, speeds: Vector, locking: float, settle: float | None) -> list[str]:
-    wrong = []
-    if not (speeds.ndim == 1 and speeds.size and np.all(speeds > 0.0) and np.all(np.isfinite(speeds))):
-        wrong.append("frequency: give one or more frequencies above 0 rad/s.")
-    if not math.isfinite(locking):
-        wrong.append(f"locking = {locking}: give a constant torque in N m at the motor shaft.")
-    if locking and arrays.motor == arrays.load:
-        wrong.append("locking: motor and load are one mass; name another load_mass.")
-    if settle is not None and not (math.isfinite(settle) and settle >= 0.0):
-        wrong.append(f"settle = {settle}: give the time in s after which the vibration is measured.")
-    if arrays.rigid.any():
-        wrong.append("chain: a forced vibration with gaps needs a spring in every shaft; one is rigid.")
-    if arrays.held is not None:
-        wrong.append(HELD)
-    if not (arrays.d.any() or arrays.d_ground.any()):
-        wrong.append("chain: without damping nothing settles; give a shaft or a mass some.")
-    return wrong
+        twist = begins[:-1] - begins[1:]
+        flank = np.sign(constant + ((arrays.c + 1j * w * arrays.d) * twist).real)
+        begin = constant / arrays.c + twist.real + 0.5 * arrays.gap * flank
+        period = 2.0 * math.pi / w
+        first = math.ceil(settle / period)
+        t = first * period + np.linspace(0.0, PERIODS * period, PERIODS * SAMPLES, endpoint=False)
+        acting, speed = harmonic(mean, force, w), (1j * w * begins).real
+        swing = let_go(arrays, begin, t, speed=speed, acting=acting, damped=True).angle
+        halves = np.array([_height(part) for part in np.split(swing, 2)])
+        spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
+        rows.append((_height(swing), np.abs(about_mean(arrays, linear[None, :])[0]), spread))
+    return ForcedResponse(speeds, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def _matrices(arrays: ChainArrays) -> tuple[Vector, Vector]:
@@ -309,37 +269,6 @@ def _slowest(arrays: ChainArrays, stiffness: Vector, damping: Vector) -> float:
     if slowest <= 1e-9 * float(np.abs(swinging).max()):
         raise InputError("chain: one of its vibrations has no damping and never settles; give settle in s.")
     return slowest
-
-
-def _steady(
-    arrays: ChainArrays,
-    w: float,
-    force: Vector,
-    linear: Any,
-    begins: Any,
-    constant: Vector,
-    locking: float,
-    settle: float,
-) -> tuple[Vector, Vector, Vector, Vector, float]:
-    """Amplitudes of angles and shaft torques, those without gaps, and how far they still change."""
-    law = arrays.c + 1j * w * arrays.d
-    twist = begins[:-1] - begins[1:]
-    flank = np.sign(constant + (law * twist).real)
-    begin = constant / arrays.c + twist.real + 0.5 * arrays.gap * flank
-    speed = (1j * w * begins).real
-    mean = np.zeros(arrays.J.size)
-    mean[arrays.motor] += locking
-    mean[arrays.load] -= locking
-    period = 2.0 * math.pi / w
-    first = math.ceil(settle / period)
-    t = first * period + np.linspace(0.0, PERIODS * period, PERIODS * SAMPLES, endpoint=False)
-    motion = let_go(arrays, begin, t, speed=speed, acting=harmonic(mean, force, w), damped=True)
-    swing = motion.angle
-    halves = np.array([_height(part) for part in np.split(swing, 2)])
-    spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
-    without_gaps: Vector = np.abs(about_mean(arrays, linear[None, :])[0])
-    torque: Vector = np.abs(law * (linear[:-1] - linear[1:]))
-    return _height(swing), _height(motion.torque), without_gaps, torque, spread
 
 
 def _height(rows: Vector) -> Vector:

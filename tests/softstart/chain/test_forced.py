@@ -25,19 +25,16 @@ def geared(gap: float) -> Chain:
 def test_without_gaps_it_is_the_linear_response() -> None:
     found = forced_response(geared(0.0), [3.0, 11.0, 30.0], {1: 1.0, 2: 2.0})
     np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
-    np.testing.assert_allclose(found.torque, found.torque_without_gaps, rtol=1e-9)
     # two masses by hand: the twist is an oscillator of the reduced inertia 2/3
     w, m = 14.0, 2.0 / 3.0
     twist = 1.5 / 1.0 / (C / m - w * w + 1j * w * D / m)
     one = forced_response(Chain(TWO.masses, [Shaft(C, damping=D)]), w, {0: 1.5})
-    assert one.torque[0, 0] == pytest.approx(abs((C + 1j * w * D) * twist), rel=1e-9)
     assert one.amplitude[0] == pytest.approx([abs(twist) * 2 / 3, abs(twist) / 3], rel=1e-9)
 
 
 @pytest.mark.parametrize("locking", [9.0, -9.0])
 def test_a_constant_torque_above_the_alternating_one_locks_all_gaps(locking: float) -> None:
     found = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0}, locking=locking)
-    assert found.torque_without_gaps.max() < abs(locking)
     np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
     loose = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0})
     assert (np.abs(loose.amplitude / loose.without_gaps - 1.0).max(axis=1) > 0.2).all()
@@ -68,15 +65,9 @@ def test_an_open_gap_against_scipy() -> None:
     assert found.amplitude[0, 0] > 2.0 * found.without_gaps[0, 0]
 
 
-def test_bad_questions_are_refused_together() -> None:
-    undamped = Chain([Mass(1), Mass(2)], [Shaft(30, gap=0.1)], load_mass="mass 1")
-    with pytest.raises(InputError) as caught:
-        forced_response(undamped, [0.0], {}, locking=1.0, settle=-1.0)
-    said = " ".join(caught.value.sentences)
-    for words in ("frequency:", "locking:", "settle = -1", "excitation:", "without damping"):
-        assert words in said
+def test_what_does_not_settle_or_has_no_spring_is_refused() -> None:
     partly = Chain([Mass(1), Mass(2), Mass(1)], [Shaft(30), Shaft(30, damping=0.0)])
-    with pytest.raises(InputError, match="without damping"):
+    with pytest.raises(InputError, match="never settles"):
         forced_response(partly, 1.0, {0: 1.0})
-    with pytest.raises(InputError, match="one is rigid"):
-        forced_response(Chain([Mass(1, damping=1), Mass(2)], [Shaft("inf")]), 1.0, {0: 1.0})
+    with pytest.raises(InputError, match="a spring in every shaft"):
+        forced_response(Chain([Mass(1, damping=1), Mass(2)], [Shaft("inf")]), 1.0, {0: 1.0}, settle=1.0)
