@@ -202,7 +202,7 @@ class TakeUp(CompiledController):
     rise slower. A coarse encoder raises contact_share to 3 standard deviations of the estimated motor speed.
     After `patience` the torque is just raised.
 
-    Source: docs/take-up.md, with the worth of each part.
+    Source: docs/take-up.md.
 
     >>> from softstart import simulate
     >>> from softstart.chain import Chain

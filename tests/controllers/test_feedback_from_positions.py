@@ -1,6 +1,6 @@
 """Feedback strategies from every start position of the shipped drives: none stalls, rattles or is harder.
 
-`python -m tests.controllers.test_feedback_from_positions` prints the table of docs/controllers.md.
+`python -m tests.controllers.test_feedback_from_positions` prints them as a table.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ SLOW = (  # those that take longest: `make docs-commands ONLY='-m slow'`
     "docs/gaps-and-inertias.md",
     "docs/howto/add-a-controller.md",
     "docs/howto/choose-a-strategy.md",
-    "docs/howto/from-a-log.md",
     "docs/howto/read-a-report.md",
     "docs/identification.md",
     "docs/optimal-starts.md",

@@ -30,7 +30,7 @@ class Found:
 
 
 def find(extent: Extent, progress: Progress) -> Found:
-    """All the optima, in the order of docs/optimal-starts.md."""
+    """All the optima."""
     curves = limits.fronts(extent, progress)
     return Found(
         profiles.starts(extent, progress),
