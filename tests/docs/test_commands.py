@@ -18,8 +18,6 @@ SLOW = (  # those that take longest: `make docs-commands ONLY='-m slow'`
     "docs/benchmarks.md",
     "docs/gaps-and-inertias.md",
     "docs/howto/add-a-controller.md",
-    "docs/howto/choose-a-strategy.md",
-    "docs/howto/read-a-report.md",
     "docs/identification.md",
     "docs/optimal-starts.md",
     "docs/paper-r.md",

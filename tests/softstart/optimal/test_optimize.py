@@ -417,7 +417,7 @@ def test_smoothness_makes_the_torque_continuous_and_costs_the_more_the_more_it_w
 
 
 def test_a_held_hoist_is_near_1_in_the_time_of_direct() -> None:
-    """The hoist of docs/howto/own-drive.md: direct has 1.180 in 0.199 s, the s-curve 1.001 in 0.236 s."""
+    """The hoist of docs/howto/hoist.md: direct has 1.180 in 0.199 s, the s-curve 1.001 in 0.224 s."""
     direct = simulate(HELD, "direct")
     quick = kept(solved(HELD, 1.02 * direct.start_time))
     assert quick.k_dyn == pytest.approx(0.9994, abs=1e-3)
