@@ -10,6 +10,7 @@
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': its speed
 #   make pictures              the pictures of the README (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
+#   make pythons               every library has a wheel for each Python that softstart supports
 #   make docs                  the documentation, warnings are errors; GALLERY=0: without running its examples
 #   make docs-commands         every command shown in it is run, on WORKERS cores (2); ONLY='-m slow': long pages
 #   make package               sdist and wheel into dist/; package-check looks into both and installs the wheel,
@@ -21,10 +22,14 @@ VENV := .venv
 FLOORS := .venv-floors
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# uv installs in a third of pip's time; where there is none for a machine, pip does it
+UV := $(BIN)/uv pip install --quiet --python $(BIN)/python
+install = ($(PIP) install --only-binary :all: uv && $(UV) --editable '$(1)') || $(PIP) install --editable '$(1)'
+EVERYTHING := .[dev,docs,page,package]
 
 unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules and rewrite all tests anew
 
-.PHONY: compare test slow check fuzz everything floors serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test slow check fuzz everything floors pythons serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
@@ -59,8 +64,7 @@ floors: $(FLOORS)/.installed
 		tests/validation/test_gerasymiak_subbotin.py
 
 everything: $(VENV)/.installed-test
-	$(PIP) install uv  # seconds where pip takes a minute
-	$(BIN)/uv pip install --quiet --python $(BIN)/python --editable '.[dev,docs,page,package]'
+	@$(call install,$(EVERYTHING))
 	@touch $(addprefix $(VENV)/.installed-,dev docs ui page package)
 
 serve: $(VENV)/.installed-ui
@@ -80,6 +84,10 @@ docs: $(VENV)/.installed-docs
 docs-commands: $(VENV)/.installed-test
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n $(WORKERS) --dist worksteal \
 		-m "not slow" $(ONLY)
+
+pythons: $(VENV)/.installed-dev
+	for version in 3.11 3.12 3.13 3.14; do $(BIN)/uv pip compile --quiet --python-version $$version \
+		--only-binary :all: --all-extras pyproject.toml >/dev/null && echo "all wheels for Python $$version" || exit 1; done
 
 package: $(VENV)/.installed-package
 	rm -rf dist
@@ -101,16 +109,16 @@ clean:
 $(VENV)/.installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "softstart needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "installing softstart and its libraries into $(VENV) (once, a minute or two)"
-	$(PIP) install --editable .
+	@echo "installing softstart and its libraries into $(VENV) (once, half a minute or more)"
+	@$(call install,.)
 	@touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
-	$(PIP) install --editable '.[test]'
+	@$(call install,.[test])
 	@touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed-test
-	$(PIP) install --editable '.[dev]'
+	@$(call install,.[dev])
 	@touch $@
 
 $(FLOORS)/.installed: pyproject.toml $(VENV)/.installed-dev
@@ -120,17 +128,17 @@ $(FLOORS)/.installed: pyproject.toml $(VENV)/.installed-dev
 	@touch $@
 
 $(VENV)/.installed-docs: $(VENV)/.installed
-	$(PIP) install --editable '.[docs]'
+	@$(call install,.[docs])
 	@touch $@
 
 $(VENV)/.installed-ui: $(VENV)/.installed
-	$(PIP) install --editable '.[ui]'
+	@$(call install,.[ui])
 	@touch $@
 
 $(VENV)/.installed-page: $(VENV)/.installed-test
-	$(PIP) install --editable '.[page]'
+	@$(call install,.[page])
 	@touch $@
 
 $(VENV)/.installed-package: $(VENV)/.installed-test
-	$(PIP) install --editable '.[package]'
+	@$(call install,.[package])
 	@touch $@
