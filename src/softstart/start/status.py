@@ -26,7 +26,7 @@ class Status(Enum):
 
     References
     ----------
-    How events are located: docs/theory/stages.md; accuracy: docs/theory/numerics.md.
+    How events are located, and accuracy: docs/theory/numerics.md.
     """
 
     REACHED = "The load reached its target speed."
