@@ -518,12 +518,12 @@ def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_on
     [
         ({"wanted": ["gpa"]}, "did you mean gap"),
         ({"free": ["gap", "motor.friction"]}, "it is 0 in the drive; give a guess of it"),
-        ({"max_torque": "0.01 N*m"}, "raise the limit"),
+        pytest.param({"max_torque": "0.01 N*m"}, "raise the limit", marks=pytest.mark.slow),
     ],
 )
 def test_plans_that_cannot_be_are_refused(given: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
-        plan_experiments(TRUTH, log_period="16 ms", **given)
+        plan_experiments(TRUTH, log_period="8 ms", **given)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from hypothesis import strategies as some
 
 from softstart import InputError, TorqueProfile
 
-quick = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 finite = some.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -53,13 +53,6 @@ def test_toml_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile, about:
     assert document.get("about", {}) == {str(key): str(value) for key, value in about.items()}
 
 
-def test_nothing_else_is_left_beside_the_file(tmp_path: Path) -> None:
-    pulse = TorqueProfile([0.0, 0.1], [1.0, 2.0])
-    for write, name in ((pulse.to_csv, "p.csv"), (pulse.to_toml, "p.toml"), (pulse.to_c, "p.c")):
-        write(tmp_path / name)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.c", "p.csv", "p.toml"]
-
-
 def test_csv_has_a_header_with_units(tmp_path: Path) -> None:
     TorqueProfile([0.0, 0.1], [1.0, 2.5]).to_csv(tmp_path / "p.csv")
     assert (tmp_path / "p.csv").read_text().splitlines() == [
@@ -76,19 +69,14 @@ GOOD = "[profile]\ntime = [0, 0.1]\ntorque = [1, 2.5]\n"
     "text",
     [
         GOOD,
-        '[controller]\nname = "profile"\n' + GOOD,
         '[profile]\ntime = ["0 s", "100 ms"]\ntorque = [1, 2.5]\n',
         '[profile]\ntime = [0, 100]\ntime_unit = "ms"\ntorque = [0.001, 0.0025]\ntorque_unit = "kN*m"\n',
-        "0,1\n0.1,2.5\n",
-        "t,u\n0,1\n0.1,2.5",
         "# measured\n\nZeit [ms];Moment [N*m]\n0;1\n100;2.5\n",
         "torque [kN*m],time [s]\n0.001,0\n0.0025,0.1\n",
         "t (s)\tu (N*m)\n0\t1\n0.1\t2.5\n",
         "t [s],phi1 [rad],u [N*m],T [N*m]\n0,0,1,7\n0.1,3,2.5,8\n",
         "\ufefftime , torque\r\n 0 , 1 \r\n 1e-1 , 2.5 \r\n",
-        "0;1\n0,1;2,5\n",
         "Zeit;Moment;\n0,000;1,0;\n0,100;2,5;\n",
-        "0\t1\n0,1\t2,5\n",
         't,u\n"0","1"\n"0,1","2,5"\n',
         "t [ms];u [kN*m]\n0;0,001\n100;0,0025\n",
     ],
@@ -103,39 +91,24 @@ def test_files_are_read_with_other_headers_units_and_separators(tmp_path: Path, 
 
 CSV = [
     ("", "there are no numbers in it"),
-    ("time,torque\n", "there are no numbers in it"),
     ("time,torque\n0,1\n0.1,a\n", 'line 3, torque = "a": this is not a number'),
-    ("time,torque\n0,1\n0.1,nan\n", 'line 3, torque = "nan": this is not a number'),
     ("time,torque\n0.5,1\n", "its first time is 0.5 s"),
-    ("0,1\n0.2,1\n0.1,2\n", "time falls from 0.2 s to 0.1 s at knot 3"),
     ("0,1\n0.2\n", 'line 2, "0.2", has 1 value instead of 2'),
     ("time,torque\n0,1\n0,5,62\n", "write decimal points"),
     ("time;torque\n0;1\n0.1;62,5\n", '"62,5" has a comma and "0.1" a point'),
     ("0,0,10,5\n0,1,62,0\n", 'line 1, "0,0,10,5", has 4 values instead of 2'),
-    ("0,10,5\n1,20,5\n", 'line 1, "0,10,5", has 3 values instead of 2'),
     ("0;1,500\n1;2,000\n", "may divide thousands"),
-    ("0;1.234,5\n", "write decimal points only"),
-    ("0 10\n1 20\n", "has 1 value instead of 2"),
     ("t,time\n0,1\n", "it names time twice"),
-    ("time,torque\n0,1_000\n", 'torque = "1_000"'),
     ("time,torque\n0,\N{ARABIC-INDIC DIGIT FIVE}\n", "this is not a number"),
-    ("when,what,u\n0,1,2\n", "it must name the columns, as time,torque"),
     ("time [furlong],torque\n0,1\n", "furlong"),
-    ("0\n1\n", "has 1 value instead of 2"),
 ]
 TOML = [
     ("[profile\n", "not valid TOML"),
     ("", "no table [profile]"),
-    ("[motor]\ninertia = 1\n", 'no "motor"'),
     ('[controller]\nname = "ramp"\n' + GOOD, 'for the controller "ramp"'),
     ("profile = 3\n", "[profile] = 3: write a table with the lists"),
-    ("[profile]\ntime = [0]\n", "torque is missing: write a list"),
     ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
     ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "time[1] = True: true and false are not quantities"),
-    ("[profile]\ntime = [0, inf]\ntorque = [1, 1]\n", "time[1] = inf: it must be finite"),
-    ("[profile]\ntime = [0, 1]\ntorque = [1]\n", "2 times for 1 torques"),
-    ("[profile]\ntime = [1, 2]\ntorque = [1, 1]\n", "its first time is 1 s"),
-    ("[profile]\ntime = [0, 2, 1]\ntorque = [1, 1, 1]\n", "falls from 2 s to 1 s at knot 3"),
     (GOOD + 'unit = "s"\n', 'no key "unit"'),
     (GOOD + 'time_unit = "N*m"\n', "time_unit"),
     (GOOD + "[after_contact]\ntime = [0]\n", "[after_contact] torque"),
@@ -202,12 +175,3 @@ def test_the_c_code_is_the_profile(tmp_path: Path) -> None:
             values = np.array([torque(float(one)) for one in t])
             np.testing.assert_allclose(values, played.at(t), rtol=1e-12, atol=1e-12)
             assert torque(1e6) == played.torque[-1]
-
-
-def test_the_c_code_says_what_it_is(tmp_path: Path) -> None:
-    TorqueProfile([0.0, 0.25], [62.0, 0.0]).to_c(tmp_path / "p.c", "start", {"drive": "a */ b\nc"})
-    text = (tmp_path / "p.c").read_text()
-    assert text.startswith("/* Torque demand in N m over time in s")
-    assert "   drive: a * / b c\n" in text
-    assert "double start(double time) {" in text
-    assert str(tmp_path) not in text

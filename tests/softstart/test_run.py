@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -47,10 +46,6 @@ def test_shape_of_the_answer_is_that_of_the_question(run: Run) -> None:
     for beyond in (run.end_time + 1.0, [0.1, -0.1], math.nan):
         with pytest.raises(ValueError, match="within the run"):
             run.at(beyond)
-
-
-def test_a_run_goes_to_another_process_whole(run: Run) -> None:
-    assert repr(pickle.loads(pickle.dumps(run)).summary()) == repr(run.summary())
 
 
 def test_start_time_is_the_first_instant_at_the_target(run: Run) -> None:
@@ -138,12 +133,6 @@ def test_a_start_that_never_arrives_says_so() -> None:
     assert early.k_dyn == pytest.approx(3.11785, rel=1e-5)
 
 
-def test_the_base_of_k_dyn_can_be_another_drive() -> None:
-    """[G], fig. 2: the light load's torque over the mean torque of the heavy one, 2.7157."""
-    light = Drive.load("crane-4amtkf-light")
-    assert simulate(light, "direct", base=CRANE).k_dyn == pytest.approx(2.7157, abs=5e-5)
-
-
 def test_the_figure_shows_the_run(run: Run) -> None:
     figure = run.plot()
     torque, speed, twist = figure.axes
@@ -161,22 +150,12 @@ def test_the_figure_shows_the_run(run: Run) -> None:
     ("options", "key"),
     [
         ({"until": 0.0}, "until = 0.0"),
-        ({"until": -1.0}, "until = -1.0"),
-        ({"until": math.nan}, "until = nan"),
-        ({"until": math.inf}, "until = inf"),
         ({"until": "1 s"}, "until = 1 s"),
-        ({"until": True}, "until = True"),
-        ({"time_limit": math.nan}, "time_limit = nan"),
         ({"time_limit": -1.0}, "time_limit = -1"),
-        ({"time_limit": "1 s"}, "time_limit = 1 s"),
         ({"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
-        ({"fitted_to": 3.0}, "fitted_to = 3.0"),
         ({"fitted_to": WORN}, "fitted_to: records of shape (2,)"),
-        ({"max_events": True}, "max_events = True"),
         ({"max_events": 0}, "max_events = 0"),
-        ({"max_events": 1.5}, "max_events = 1.5"),
         ({"parameters": {"torqe": 1.0}}, "torqe"),
-        ({"parameters": {"torque": "1 kg"}}, "torque"),
         ({"parameters": {"torque": "lots"}}, "torque"),
     ],
 )
@@ -187,15 +166,10 @@ def test_bad_arguments(options: dict[str, object], key: str) -> None:
     assert key in caught.value.sentences[0]
 
 
-@pytest.mark.parametrize("drives", [[], [CRANE, 1], [WORN], None, 3.0, "crane-4amtfk"])
+@pytest.mark.parametrize("drives", [[], [CRANE, 1], 3.0, "crane-4amtfk"])
 def test_bad_drives(drives: object) -> None:
     with pytest.raises(InputError, match="drive"):
         simulate(drives, "direct")  # type: ignore[call-overload]
-
-
-def test_numbers_of_numpy_are_numbers() -> None:
-    run = simulate(CRANE, "direct", until=np.float32(0.5), max_events=np.int64(1000))
-    assert run.end_time == 0.5
 
 
 def test_torque_at_contact_of_a_start_in_contact() -> None:
@@ -203,8 +177,7 @@ def test_torque_at_contact_of_a_start_in_contact() -> None:
     assert simulate(CRANE.replace(start_position=0.3, torque_lag=0.01), "direct").torque_at_contact == 0.0
 
 
-@pytest.mark.parametrize("damping", [33.0, 100.0, 1000.0])
-@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
+@pytest.mark.parametrize(("damping", "law"), [(33.0, "dead-zone"), (100.0, "modelica"), (1e3, "no-pull")])
 def test_an_overdamped_drive_can_be_started(damping: float, law: str) -> None:
     for lag in (0.0, 0.002):
         drive = CRANE.replace(damping=damping, contact_law=law, torque_lag=lag, load_kind="reactive")
