@@ -12,6 +12,7 @@ from softstart.controller.finding import ready_controller_names
 from softstart.page.frames import Screen
 from softstart.page.session import Session
 from softstart.reporting.document import for_customer
+from softstart.drive import library
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import flags
@@ -68,10 +69,10 @@ def test_settled_of_an_unknown_position_is_the_latest():
 
 
 def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
-    for name in ("crane-4amtkf", "hoist-15kw", "servo-axis-small"):
+    for name in library.names():
         drive = Drive.load(name)
         hangs = drive.load_kind == "active" and drive.Mc != 0.0
-        for position in (*POSITIONS, "unknown", *(["hanging"] if hangs else [])):
+        for position in ("mid-gap", "unknown", *(["hanging"] if hangs else [])):
             started = drive.replace(start_position=position)
             direct = simulate(started, "direct")
             assert not flags(direct, direct)
