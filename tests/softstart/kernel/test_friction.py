@@ -6,10 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces
-from tests.softstart.kernel.test_against_oracle import case_with_friction, run_of
 
 from softstart import Drive, InputError, Run, simulate
 
@@ -86,25 +84,6 @@ def test_the_speed_at_which_viscous_friction_takes_all() -> None:
     assert [end["w1"], end["w2"]] == pytest.approx([speed, speed], rel=1e-7)
     assert end["T"] == pytest.approx(drive.Mc + 0.2 * speed, rel=1e-7)
     assert 0.0 < run.settling_time(0.02) < 2.0
-
-
-@settings(max_examples=40, deadline=None)
-@given(SEEDS, st.floats(0.01, 3.0))
-def test_momentum_where_both_masses_lose_alike(seed: int, decay: float) -> None:
-    """With b1/J1 = b2/J2 = k: P = J1 w1 + J2 w2 obeys P' = u - Mc - k P, whatever the shaft does."""
-    drawn = case_with_friction(seed) | {"kind": "active", "friction": 0.0, "lag": 0.0, "rate": math.inf}
-    k = decay / drawn["t_end"]
-    drawn |= {"b1": k * drawn["J1"], "b2": k * drawn["J2"], "target": 1e-6, "w2_0": min(drawn["w2_0"], 0.0)}
-    run = run_of(drawn)
-    P = drawn["J1"] * drawn["w1_0"] + drawn["J2"] * drawn["w2_0"]
-    size = abs(P)
-    ends = [*(t for t, _ in drawn["torque_pieces"][1:]), drawn["t_end"]]
-    for (t, u), end in zip(drawn["torque_pieces"], ends, strict=True):
-        rest = (u - drawn["Mc"]) / k
-        P = rest + (P - rest) * math.exp(-k * (end - t))
-        size = max(size, abs(P), abs(u - drawn["Mc"]) * drawn["t_end"])
-    state = run.at(drawn["t_end"])
-    assert drawn["J1"] * state["w1"] + drawn["J2"] * state["w2"] == pytest.approx(P, abs=1e-11 * size)
 
 
 @pytest.mark.parametrize(

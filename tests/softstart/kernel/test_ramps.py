@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as some
 from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_against_oracle import case, compare_with_oracle
 
@@ -55,38 +53,6 @@ def test_ramps_against_the_oracle(block: int) -> None:
         compare_with_oracle(ramped(seed), seed)
 
 
-@pytest.mark.parametrize(
-    ("lag", "damping", "law"), [(0.0, 0.0, "no-pull"), (0.004, 0.6, "dead-zone"), (0.004, 0.6, "modelica")]
-)
-def test_steps_converge_to_the_ramp_with_order_two(lag: float, damping: float, law: Any) -> None:
-    """Held at the mean of the line over each step: the impulse is kept, the rest is of second order."""
-    drive = CRANE.replace(
-        torque_lag=lag,
-        damping=damping,
-        contact_law=law,
-        start_position=0.5 * CRANE.gap + 0.02,
-        target_speed=60.0,
-    )
-    end, slope = 0.2, 250.0
-    exact = simulate(drive, Pieces(pieces=((0.0, 8.0, slope),), end=end), until=end)
-
-    def error(count: int) -> Vector:
-        edges = np.linspace(0.0, end, count + 1)
-        steps = tuple((float(t), 8.0 + slope * (float(t) + 0.5 * end / count)) for t in edges[:-1])
-        run = simulate(drive, Pieces(pieces=steps), until=end)
-        mine, theirs = run.at(end), exact.at(end)
-        assert run.contacts == exact.contacts == 1
-        off = [float(mine[name] - theirs[name]) for name in ("theta", "v", "w2")]
-        return np.abs([*off, run.peak_torque - exact.peak_torque])
-
-    coarse, fine, finer = error(400), error(800), error(1600)
-    floor = 1e-11 * exact.peak_torque
-    for rougher, better in ((coarse, fine), (fine, finer)):
-        counts = rougher > floor
-        np.testing.assert_allclose((rougher / np.maximum(better, 1e-300))[counts], 4.0, rtol=0.05)
-    assert np.any(coarse > floor)
-
-
 def test_a_ramp_without_lag_or_limit_is_the_line_itself() -> None:
     run = simulate(CRANE, Pieces(pieces=((0.0, 5.0, 400.0), (0.1, 45.0, -100.0)), end=0.3), until=0.3)
     t = np.linspace(0.0, 0.3, 700)[:-1]
@@ -118,32 +84,6 @@ def test_the_limiter_meets_a_moving_line(torque: float, slope: float, meets: flo
     u = np.where(t < meets, 1000.0 * t, torque + slope * t)
     np.testing.assert_allclose(run.at(t)["u"], u, atol=1e-11)
     assert meets == 0.0 or np.abs(run.recorded.spans[:, 0] - meets).min() < 1e-15
-
-
-lines = some.tuples(some.floats(0.005, 0.05), some.floats(0.0, 60.0), some.floats(0.0, 60.0))
-
-
-@settings(max_examples=25, deadline=None)
-@given(some.lists(lines, min_size=1, max_size=4), some.floats(200.0, 5000.0))
-def test_the_limiter_is_a_limiter(drawn: list[tuple[float, float, float]], rate: float) -> None:
-    """Against the limiter as it stands in textbooks, one short step after the other."""
-    pieces, t = [], 0.0
-    for length, before, after in drawn:
-        pieces.append((t, before, (after - before) / length))
-        t += length
-    run = simulate(CRANE.replace(torque_rate=rate), Pieces(pieces=tuple(pieces), end=t), until=t)
-    count = 4000
-    grid = np.linspace(0.0, t, count + 1)
-    which = np.searchsorted([piece[0] for piece in pieces], grid[1:], side="left") - 1
-    start, before, slope = np.array(pieces)[which].T
-    demand = before + slope * (grid[1:] - start)
-    step = rate * t / count
-    followed, r = [], 0.0
-    for line in demand.tolist():
-        r += min(max(line - r, -step), step)
-        followed.append(r)
-    roughness = step + t / count * float(np.abs(slope).max())
-    np.testing.assert_allclose(run.at(grid[1:-1])["u"], followed[:-1], atol=2.0 * roughness)
 
 
 @dataclass(frozen=True)

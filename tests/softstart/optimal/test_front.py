@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from tests.kept import parts_in
-from tests.softstart.optimal.drives import CRANE, without_gaps
+from tests.softstart.optimal.drives import CRANE, QUICK, without_gaps
 
 from softstart import InputError, optimize, simulate
 from softstart.controller import ready_controller_names
@@ -86,10 +86,10 @@ def test_controllers_are_judged_at_their_own_start_time(front: Front) -> None:
 
 
 def test_start_times_that_are_too_short_are_marked() -> None:
-    front = pareto(CRANE, [0.2, 0.1, 0.3], terminal="synchronous", controllers=[])
+    front = pareto(QUICK, [0.06, 0.05, 0.1], controllers=[])
     assert [point.status for point in front.points] == ["INFEASIBLE", "INFEASIBLE", "OPTIMAL"]
     for point in front.points[:2]:
-        assert 0.21 * 60.0 / (62.0 - 7.16) < point.shortest_start_time <= 0.2499
+        assert 0.21 * 20.0 / (62.0 - 7.16) < point.shortest_start_time <= simulate(QUICK, "direct").start_time
         assert point.k_dyn is None
         assert f"{point.shortest_start_time:.6g}" in point.status_text
         assert f"{point.start_time_bound:g} s" in point.status_text
@@ -194,9 +194,11 @@ def test_table(tmp_path: Path, front: Front) -> None:
 
 
 def test_default_start_times() -> None:
-    times = default_start_times(CRANE, "synchronous", 5)
-    assert times[0] == pytest.approx(1.02 * 0.2498, rel=1e-3)
-    assert times[-1] == pytest.approx(1.6 * simulate(CRANE, "direct").start_time)
+    """From hardly more than the shortest start to well beyond that of constant torque."""
+    times, direct = default_start_times(QUICK), simulate(QUICK, "direct").start_time
+    assert 0.21 * 20.0 / (62.0 - 7.16) < times[0] < 1.021 * direct
+    assert optimize(QUICK, times[0], terminal="reached").end_time <= times[0]
+    assert times[-1] == pytest.approx(1.6 * direct)
     assert times == sorted(times)
 
 
