@@ -40,15 +40,17 @@ class Given:
     law: list[str]
     theta0: np.ndarray
     ground: np.ndarray
-    mean: np.ndarray
-    tones: list[tuple[int, float, float, float]] = field(default_factory=list)
-    restitution: np.ndarray | None = None  # NaN where elastic
-    motor: int = 0
+    tones: list[tuple[int, float, float, float]]
+    restitution: np.ndarray  # NaN where elastic
+    motor: int
     load: int = -1
-    efficiency: np.ndarray | None = None
-    gear: np.ndarray | None = None  # the mass at which the gear of each shaft sits
+    efficiency: Any = 1.0
+    gear: Any = -1  # the mass at which the gear of each shaft sits
     # of some masses points and torques of a load curve, and whether it is by angle, 0 where the load begins
     curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.efficiency, self.gear = np.broadcast_arrays(self.efficiency, self.gear, self.c)[:2]
 
 
 class ChainOracle:
@@ -61,11 +63,9 @@ class ChainOracle:
         self.y = np.concatenate([given.theta0, given.w0, [0.0]]).astype(float)  # and the load's angle
         self.side = np.zeros(self.n - 1)
         self.form = ["joined" if gap == 0 else "open" for gap in given.gap]
-        self.rigid = np.zeros(self.n - 1, bool) if given.restitution is None else ~np.isnan(given.restitution)
-        self.eta = np.ones(self.n - 1) if given.efficiency is None else given.efficiency
+        self.rigid, self.eta = ~np.isnan(given.restitution), given.efficiency
         self.rubs = given.reactive.copy()
-        if given.gear is not None:
-            self.rubs[given.gear[self.eta < 1]] = True
+        self.rubs[given.gear[self.eta < 1]] = True
         self.direction = np.where(self.rubs, np.sign(given.w0), 1.0)
         self.sign = np.ones(self.n - 1)  # of the torques of shafts with lossy gears
         self.events: list[tuple[float, str, int]] = []
@@ -102,12 +102,7 @@ class ChainOracle:
     def pushed(self, t: float, y: np.ndarray) -> np.ndarray:
         """The torque on each mass without friction of a reactive load or of gears."""
         T = self.torques(y)
-        q = (
-            np.append(0.0, T)
-            - np.append(T, 0.0)
-            - self.g.ground * y[self.n - 1 : 2 * self.n - 1]
-            + self.g.mean
-        )
+        q = np.append(0.0, T) - np.append(T, 0.0) - self.g.ground * y[self.n - 1 : 2 * self.n - 1]
         q[self.g.motor] += self.path.torque(t, self.span)[0]
         for i, omega, cosine, sine in self.g.tones:
             q[i] += cosine * math.cos(omega * t) + sine * math.sin(omega * t)
@@ -127,7 +122,7 @@ class ChainOracle:
         R = float(self.g.Mc[i]) if self.g.reactive[i] or not self.rubs[i] else 0.0
         T = self.torques(y)
         for k in (i - 1, i):
-            if 0 <= k < self.n - 1 and self.eta[k] < 1 and self.g.gear[k] == i:  # type: ignore[index]
+            if 0 <= k < self.n - 1 and self.eta[k] < 1 and self.g.gear[k] == i:
                 on_mass = T[k] if k < i else -T[k]
                 drives = direction * self.sign[k] * (1 if k < i else -1) > 0
                 passed = self.eta[k] * on_mass if drives else on_mass / self.eta[k]
@@ -195,7 +190,7 @@ class ChainOracle:
         if not overlap:
             self.y[k] = side * 0.5 * self.g.gap[k]
         if self.rigid[k]:
-            e, J = self.g.restitution[k], self.g.J  # type: ignore[index]
+            e, J = self.g.restitution[k], self.g.J
             impulse = (1 + e) * side * v / (1 / J[k] + 1 / J[k + 1])
             self.y[self.n - 1 + k] -= impulse / J[k]
             self.y[self.n + k] += impulse / J[k + 1]
