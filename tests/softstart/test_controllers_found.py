@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
@@ -156,30 +155,6 @@ def test_what_is_not_declared_is_not_seen() -> None:
     assert [m.load_speed for m in seen] == pytest.approx(states["w2"], abs=1e-12)
     contact = run.first_contact
     assert contact in [m.time for m in seen]  # asked at the very instant of contact
-
-
-def test_the_encoder_counts_and_the_torque_is_the_realised_one() -> None:
-    seen: list[Measured] = []
-
-    class Watch(PlainController):
-        name = "watch"
-
-        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
-            seen.append(measured)
-            return Command(100.0, measured.time + 0.001)  # above the largest torque, 64 N m
-
-    drive = CRANE.replace(torque_lag=0.002, encoder_lines=1024)
-    run = simulate(drive, Watch(), until=0.05)
-    count = 2 * 3.141592653589793 / 4096
-    states = run.at([m.time for m in seen])
-    for i, m in enumerate(seen):
-        assert abs(m.motor_angle - states["phi1"][i]) <= 0.5001 * count
-        assert m.motor_angle / count == pytest.approx(round(m.motor_angle / count), abs=1e-6)
-        assert m.motor_torque == pytest.approx(64.0 * -math.expm1(-m.time / 0.002), abs=1e-9)
-        if i:
-            before = seen[i - 1]
-            rate = (m.motor_angle - before.motor_angle) / (m.time - before.time)
-            assert m.motor_speed == pytest.approx(rate, abs=1e-9)
 
 
 @pytest.mark.slow

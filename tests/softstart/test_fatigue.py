@@ -125,17 +125,6 @@ def test_equivalent_torque_and_starts(slope: float) -> None:
     assert row.equivalent_torque >= ranges[0]
 
 
-def test_points_on_one_line_are_a_slope() -> None:
-    line = SNCurve(5.0, ((100.0, 1e6),))
-    points = SNCurve(None, tuple((t, 1e6 * (100.0 / t) ** 5.0) for t in (300.0, 120.0, 60.0)))
-    torque = np.geomspace(1.0, 1e4, 50)
-    np.testing.assert_allclose(points.cycles(torque), line.cycles(torque), rtol=1e-10)
-    np.testing.assert_allclose(points.torque(points.cycles(torque)), torque, rtol=1e-10)
-    kinked = SNCurve(None, ((300.0, 1e3), (100.0, 1e6), (50.0, 1e8)))
-    np.testing.assert_allclose(kinked.cycles([300.0, 100.0, 50.0]), [1e3, 1e6, 1e8], rtol=1e-12)
-    np.testing.assert_allclose(kinked.torque(kinked.cycles(torque)), torque, rtol=1e-10)
-
-
 def test_a_steady_torque_does_no_damage() -> None:
     run = simulate(HOIST.replace(release=1.0), "direct", until=0.5)  # held by its brake all the time
     assert worst_damage(run, SNCurve(6.6)).damage == 0.0

@@ -94,20 +94,22 @@ def test_both_methods_are_what_integration_gives(kind, seed):
         low = float(rng.uniform(0.1, 1.0)) * Ms
         high = low if reduced else Ms
         start = two_stages(low, high, **drive, Ms=Ms, kind=kind)
-        until = start.open_duration + 6 * math.pi / math.sqrt(drive["c"] / drive["J1"])
+        longest = 6 * math.pi / math.sqrt(drive["c"] / drive["J1"])
+        ends = math.isfinite(start.contact_duration)
+        until = start.open_duration + (1.0001 * start.contact_duration if ends else longest)
         pieces = [(0.0, low), (start.open_duration, high)]
         run = integrate(**drive, **rest, kind=kind, law="no-pull", torque_pieces=pieces, t_end=until)
-        contact = run.contacts[0]
-        assert contact.start == pytest.approx(start.open_duration, rel=1e-10)
-        assert contact.peak == pytest.approx(start.peak, rel=1e-10)
+        closed, opened, first_stop = (
+            next((time for time, kind in run.events if kind == word), math.inf)
+            for word in ("closed", "opened", "load-stops")
+        )
+        assert closed == pytest.approx(start.open_duration, rel=1e-10)
+        assert run.peak == pytest.approx(start.peak, rel=1e-10)
         if math.isnan(start.contact_duration):
-            first_stop = next(t for t, event in run.events if event == "load-stops")
             assert (kind, reduced) == ("reactive", True)
-            assert contact.end is None or first_stop < contact.end
-        elif math.isinf(start.contact_duration):
-            assert contact.end is None
+            assert first_stop < opened
         else:
-            assert contact.end - contact.start == pytest.approx(start.contact_duration, rel=1e-9)
+            assert opened - closed == pytest.approx(start.contact_duration, rel=1e-9)
 
 
 @settings(deadline=None)
@@ -200,20 +202,6 @@ def test_direct_starts_are_those_of_the_simulation(position):
         if gap and position != "driving-flank":  # whose grazes the plant may count
             closed = sum(event.kind in {"gap closed", "gap opened"} for event in run.events)
             assert start.gap_events(run.end_time) == closed
-
-
-def test_arrays_broadcast_and_floats_stay_floats():
-    low, gap = np.linspace(6, 62, 4)[:, None], np.array([0.0, 0.5, 2.0])
-    for kind in ("active", "reactive"):
-        table = two_stages(low, low, **CRANE | {"gap": gap}, kind=kind)
-        assert all(column.shape == (4, 3) for column in table)
-        for i, j in np.ndindex(4, 3):
-            M1 = float(low[i, 0])
-            one = two_stages(M1, M1, **CRANE | {"gap": float(gap[j])}, kind=kind)
-            assert all(type(value) is float for value in one)
-            assert one == pytest.approx([column[i, j] for column in table], rel=0, abs=0, nan_ok=True)
-    starts = DirectStarts(**CRANE | {"gap": gap}, target_speed=[[50.0], [90.0]])
-    assert starts.at(starts.start_time)["w2"] == pytest.approx(np.array([[50.0] * 3, [90.0] * 3]), rel=1e-13)
 
 
 @pytest.mark.parametrize(

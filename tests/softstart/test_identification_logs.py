@@ -61,19 +61,6 @@ def test_the_origin_of_the_clock_does_not_matter(log: Log) -> None:
 
 
 @pytest.mark.slow
-def test_uneven_samples_are_fitted_as_even_ones_are(log: Log) -> None:
-    generator = np.random.default_rng(8)
-    end = float(log.time[-1])
-    steps = generator.uniform(1e-3, 5e-3, 2 * int(end / 3e-3))
-    time = np.concatenate([[0.0], np.cumsum(steps)])
-    time = time[time < end]
-    uneven = replayed(time, demand_at(log, time), -0.4, seed=8)
-    found = identify(uneven, GUESS, searches=3)
-    assert holds(found)
-    assert found["gap"].half_width < 0.03
-
-
-@pytest.mark.slow
 def test_logs_with_clocks_and_sampling_of_their_own_are_fitted_together(log: Log) -> None:
     end = float(log.time[-1])
     each = []

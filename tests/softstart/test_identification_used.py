@@ -102,20 +102,6 @@ def test_the_drive_may_get_limits_and_no_other_gap(folder: Path, tmp_path: Path)
         Identification.load(folder).with_settings(["shaft.gap=0.3"])
 
 
-@pytest.mark.slow
-def test_friction_that_may_be_none_is_kept_drawn_and_compared(tmp_path: Path) -> None:
-    log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=4)
-    rubbed = identify(log, TRUTH, free=["+motor.friction"], searches=1)
-    one = rubbed["motor_friction"]
-    assert one.lower == 0.0 < one.upper
-    rubbed.save(tmp_path)
-    read = Identification.load(tmp_path)
-    assert read.estimates == rubbed.estimates
-    drawn = read.draws(4000).fields["motor_friction"]
-    assert drawn.min() >= 0.0
-    assert np.quantile(drawn, 0.975) == pytest.approx(one.upper, rel=0.05)
-
-
 # ---- compare --------------------------------------------------------------------------------------------
 
 

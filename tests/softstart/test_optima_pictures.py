@@ -1,7 +1,6 @@
 """Figures of optima: the data behind them."""
 
 import numpy as np
-import pytest
 
 from softstart import Drive
 from softstart.optimal.check import replayed
@@ -52,9 +51,9 @@ def test_one_profile_for_several_machines_is_drawn_from_all_runs():
     assert [worst.peak_time, worst.peak_torque] in [one[0].tolist() for one in drawn]
 
 
-def front(controllers, times=(0.24, 0.3, 0.5)):
+def front(controllers):
     points = [FrontPoint(0.22, "reached", "INFEASIBLE", "too short", shortest_start_time=0.235)]
-    for time in times:
+    for time in (0.24, 0.3, 0.5):
         k_dyn = 0.6 + 0.2 / (time - 0.1)
         points.append(FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=k_dyn, k_dyn_lower_bound=k_dyn - 0.01))
     optimal = FrontPoint(0.3, "reached", "OPTIMAL", "", k_dyn=1.0)
@@ -72,13 +71,3 @@ def test_a_front_is_drawn_from_its_points():
     assert drawn["no optimum"].get_xdata().tolist() == [0.22]
     for name, time, k in crowded:
         assert drawn[f"{name}, x{k:.2f}"].get_xydata().tolist() == [[time, k]]
-
-
-@pytest.mark.parametrize(
-    ("controllers", "times", "scale"),
-    [([("direct", 0.24, 9.0)], (0.24,), "log"), ([], (0.24,), "linear"), ([], (), "linear")],
-)
-def test_a_tall_front_has_a_logarithmic_axis_others_begin_at_zero(controllers, times, scale):
-    axes = front_figure(front(controllers, times)).axes[0]
-    assert axes.get_yscale() == scale
-    assert not times or (axes.get_ylim()[0] == 0.0) == (scale == "linear")

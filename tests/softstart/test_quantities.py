@@ -148,10 +148,7 @@ def test_quantities_of_a_users_own_pint_registry():
     ("unit", "forms"),
     [
         ("rad", ["rad", "mrad", "deg", "arcmin", "turn"]),
-        ("rad/s", ["rad/s", "rpm", "deg/s", "turn/s", "rad/min"]),
         ("N*m/rad", ["N*m/rad", "kN*m/rad", "N*m/deg", "kgf*m/rad", "lbf*in/deg"]),
-        ("kg*m^2", ["kg*m^2", "kg*cm^2", "g*cm^2", "lb*ft^2", "kgf*m*s^2"]),
-        ("W", ["W", "kW", "hp", "PS"]),
     ],
 )
 @settings(deadline=None)  # the first example imports pint
@@ -253,24 +250,8 @@ def test_a_list_that_can_be_read_in_two_ways_is_refused(text):
     assert len(sentence) < 400
 
 
-@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=6))
-def test_with_decimal_commas_a_list_is_read_right_or_not_at_all(numbers):
-    commas = [f"{number:.4f}".replace(".", ",") for number in numbers]
-    for between in ("; ", ";", ", ", ","):
-        text = between.join(commas)
-        with contextlib.suppress(InputError):
-            read = [to_si(part, "rad") for part in values_in(text)]
-            assert read == [float(f"{number:.4f}") for number in numbers]
-
-
 @pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", ""], ids=str)
 def test_a_whole_number_is_one(text):
     with pytest.raises(InputError, match="give a whole number of 1 or more"):
         whole_number(text, "--workers")
     assert whole_number(" 007 ", "--workers") == 7
-
-
-def test_a_product_of_a_thousand_units_is_refused_at_once():
-    with pytest.raises(InputError, match="is too long for a unit") as error:
-        to_si("1 " + "*".join(["kg"] * 5000), "kg")
-    assert len(str(error.value)) < 300

@@ -1,17 +1,13 @@
 """Settled times, flags, limits and the one recommendation of compare, page and report."""
 
-import html
 import math
 
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, InputError, PlainController, compare, report, simulate
+from softstart import Command, Drive, InputError, PlainController, compare, simulate
 from softstart.controller import Effort
 from softstart.controller.finding import ready_controller_names
-from softstart.page.frames import Screen
-from softstart.page.session import Session
-from softstart.reporting.document import for_customer
 from softstart.drive import library
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
@@ -160,32 +156,6 @@ def test_limits_that_nothing_keeps():
         "No strategy keeps the limits. Nearest: shaped, shaft torque "
     )
     assert found.recommendation.shown == ()
-
-
-@pytest.mark.slow
-def test_compare_page_and_report_say_the_same():
-    drive = CRANE.replace(permissible_torque=130.0, permissible_start_time=0.6)
-    found = compare(drive)
-    said = found.recommendation.text
-    assert Session(drive).recommendation().text == said
-    frames = list(Screen(Session(drive)).at_rest())
-    shown = {row["name"]: row for one in frames for row in (one or {}).get("rows", ())}
-    for row in found.rows:
-        assert shown[row.name].get("limits", "") == row.against_limits
-        assert bool(row.against_limits) == bool(drive.limits)
-        least = min((one.share for one in row.margins(drive.limits)), default=math.nan)
-        assert row.against_limits[:4] == ("" if math.isnan(least) else "kept" if least >= 0.0 else "exce")
-    assert [one["recommendation"] for one in frames if one and "recommendation" in one] == [said]
-    made = report(drive, budget=0.0)
-    assert made.summary()["recommendation"] == said
-    page = html.unescape(made.to_html().replace("K<sub>dyn</sub>", "K_dyn")).replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
-    assert for_customer(said) in page
-    for row in found.rows:
-        assert f">{row.against_limits}<" in page
-        for flag in row.flags:
-            assert flag.word in page
 
 
 def test_the_life_is_a_limit_like_the_others():

@@ -84,16 +84,6 @@ def test_settling_of_a_damped_drive() -> None:
         run.settling_time(0.0)
 
 
-def test_damping_takes_what_the_balance_says() -> None:
-    energy = simulate(DAMPED, "direct", until=2.0).energy
-    assert energy.dissipated > 0.0
-    assert abs(energy.residual) < 1e-10 * energy.motor
-    lossless = simulate(CRANE, "direct", until=2.0).energy
-    assert abs(lossless.dissipated) < 1e-10 * lossless.motor
-    total = energy.kinetic + energy.elastic + energy.load + energy.dissipated + energy.residual
-    assert total == pytest.approx(energy.motor, rel=1e-14)
-
-
 def test_csv_reads_back(run: Run, tmp_path: Path) -> None:
     run.to_csv(tmp_path / "start.csv")
     with (tmp_path / "start.csv").open(encoding="utf-8") as file:

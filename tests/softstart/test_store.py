@@ -10,7 +10,6 @@ import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
@@ -118,18 +117,6 @@ def test_a_part_of_another_computation_is_no_part(path):
         base.execute("REPLACE INTO parts SELECT * FROM other.parts WHERE key LIKE '[%'")
     with pytest.warns(DamagedWarning, match=r"part \[1, 0\] is damaged"):
         assert found_in(path) == [None, *PARTS[1:], None]
-
-
-@pytest.mark.parametrize("what", ["folder", "pipe", "link"])
-def test_something_else_in_the_place_of_the_file(tmp_path, what):
-    make = {
-        "folder": Path.mkdir,
-        "pipe": os.mkfifo,
-        "link": lambda place: place.symlink_to(tmp_path / "nowhere"),
-    }
-    make[what](tmp_path / "parts.sqlite")
-    refused(tmp_path / "parts.sqlite", "(another file|a file in a folder)")
-    assert not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")

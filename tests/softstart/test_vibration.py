@@ -31,15 +31,6 @@ def random_chain(rng: np.random.Generator, n: int, decades: float) -> tuple[Vect
     return 10 ** rng.uniform(-decades, decades, n), 10 ** rng.uniform(-decades, decades, n - 1)
 
 
-@pytest.mark.parametrize("n", [2, 3, 7, 20])
-def test_frequencies_are_those_of_a_dense_solver(n: int) -> None:
-    rng = np.random.default_rng(n)
-    for _ in range(20):
-        J, c = random_chain(rng, n, 0.7)
-        dense = np.sqrt(eigh(stiffness_matrix(c), np.diag(J), eigvals_only=True)[1:])
-        np.testing.assert_allclose(elastic_frequencies(J, c), dense, rtol=1e-10)
-
-
 def test_frequencies_of_equal_masses_and_springs() -> None:
     """Closed form: 2 sqrt(c/J) sin(k pi/(2 n))."""
     n = 200
@@ -205,14 +196,3 @@ def test_refused_where_the_node_is_not_between_motor_and_load() -> None:
         reduce_chain(Chain([Mass(1), Mass(1)], [Shaft(1)], Motor(1.0), load_mass="mass 1"))
     with pytest.raises(InputError, match="1 or more"):
         reduce_chain(chain, factor=0.5)
-
-
-def test_notes_say_what_is_left_out() -> None:
-    chain = Chain(
-        [Mass(1), Mass(1e-3, torque=1, kind="reactive", damping=0.1), Mass(1, torque=2)],
-        [Shaft(10), Shaft(10, efficiency=0.9)],
-    )
-    notes = " ".join(reduce_chain(chain).notes)
-    assert "both kinds" in notes
-    assert "damping to the ground" in notes
-    assert "0.9" in notes

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
+from tests.oracle import ChainOracle, Given
 from tests.oracle_torque import TorquePath
-from tests.softstart.chain.chain_oracle import ChainOracle, Given
 from tests.softstart.kernel.pieces import Pieces
 
 from softstart.chain import Chain, Mass, Motor, Shaft
