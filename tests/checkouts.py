@@ -57,8 +57,8 @@ def run_of(label: str, start: Callable[[], Any]) -> Values:
 
 
 def starts() -> Values:
-    """Each shipped drive under each controller: one start with its traces, and a batch of 45."""
-    from softstart import Drive, simulate
+    """Each drive and chain under each controller: a start with its traces; of drives also a batch of 45."""
+    from softstart import Chain, Drive, simulate
 
     for name in listed("drives"):
         drive = Drive.load(name)
@@ -69,6 +69,10 @@ def starts() -> Values:
             yield from run_of(label, lambda d=drive, k=controller: simulate(d, k))
             for key, values in simulate(others, controller, fitted_to=drive).data_vars.items():
                 yield f"{label} batch {key}", values.values
+    for name in CHAINS:
+        chain = Chain.load(name)
+        for controller in listed("controllers"):
+            yield from run_of(f"{name} {controller}", lambda c=chain, k=controller: simulate(c, k))
     drive = Drive.load("crane-4amtkf").replace(torque_lag=0.004, damping=1.5, load_kind="reactive")
     for law in ("no-pull", "dead-zone", "modelica"):
         other = drive.replace(contact_law=law, encoder_lines=1024, torque_noise=0.2, computing_delay=5e-4)
@@ -106,41 +110,6 @@ def optima() -> Values:
     yield "front", pareto(crane, [0.26, 0.28, 0.32]).summary()
 
 
-def chains() -> Values:
-    """Shipped chains: vibration, reduction, starts with traces, verification."""
-    from softstart import Chain, natural_vibration, reduce_chain, simulate, verify_on_chain
-
-    for name in CHAINS:
-        chain = Chain.load(name)
-        yield f"{name} vibration", natural_vibration(chain).summary()
-        yield f"{name} reduced", outcome(lambda c=chain: reduce_chain(c).summary())
-        for controller in listed("controllers"):
-            yield from run_of(f"{name} {controller}", lambda c=chain, k=controller: simulate(c, k))
-    crane = Chain.load("crane-4-mass")
-    yield "verification", verify_on_chain(crane, reduce_chain(crane).to_drive(), "ramp").summary()
-
-
-def machines() -> Values:
-    """Clutches, the engine, linear views, tuned gains and sweeps on one process and on two."""
-    from softstart import Clutch, Drive, Engine, balance, engage, linear_view, sweep, tune
-
-    crane = Drive.load("crane-4amtkf")
-    for name in CLUTCHES:
-        for law in ("linear", "quadratic-concave", "quadratic-convex", "exponential"):
-            run = engage(Clutch.load(name).replace(law=law))
-            yield f"{name} {law}", run.summary()
-    yield "balance", balance(Engine.load("vaz-11113")).summary()
-    for controller in listed("controllers"):
-        yield f"linear {controller}", linear_view(crane, controller).summary()
-    for workers in (1, 2):
-        options: dict[str, Any] = {"gaps": [0.5, 1.0], "inertias": ["5 J1", "2 J1"], "restarts": 2}
-        found = tune(crane, "shaped", **options, generations=12, certified=False, workers=workers)
-        yield f"tune {workers}", found.summary()
-        grid = {"gap": [0.0, 0.5, 1.0], "controller": ["ramp", "shaped"], "load.inertia": [0.07, 0.175]}
-        for key, values in sweep(crane, None, grid, workers=workers, chunk=5).data_vars.items():
-            yield f"sweep {workers} {key}", values.values
-
-
 def commands() -> Values:
     """Each command's --json, and the tables and parameter files that it writes with --out."""
     crane = ("--set", "start.target_speed=60")
@@ -152,7 +121,8 @@ def commands() -> Values:
         ("pareto", "--start-times", "1.1x,1.3x", "--controllers", "direct,ramp", *crane),
         ("tune", "--controller", "ramp", "--gaps", "0.5", "--inertias", "5J1", "--no-optimum"),
         ("sweep", "--controller", "ramp", "--axis", "shaft.gap=0.5:2:4"),
-        ("linear", "--controller", "state-feedback"),
+        *(("linear", "--controller", name) for name in listed("controllers")),
+        *(("reduce", name) for name in CHAINS),
         ("reduce", "--verify", "direct,shaped"),
         *(("clutch", name) for name in CLUTCHES),
         ("clutch", "--optimal", "--points", "3"),
@@ -170,9 +140,7 @@ def commands() -> Values:
                     yield f"{label} > {path.name}", path.read_text()
 
 
-PARTS: dict[str, Callable[[], Values]] = {
-    part.__name__: part for part in (starts, optima, chains, machines, commands)
-}
+PARTS: dict[str, Callable[[], Values]] = {part.__name__: part for part in (starts, optima, commands)}
 
 
 def outcome(work: Callable[[], Any]) -> Any:

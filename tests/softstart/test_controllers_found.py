@@ -1,4 +1,4 @@
-"""Finding controllers, plain controllers, and what happens when one misbehaves."""
+"""Finding controllers and entry points, plain controllers, and what happens when one misbehaves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,17 @@ from typing import Any
 
 import pytest
 
-from softstart import Command, Drive, InputError, Measured, PlainController, Sensor, SimulationError, simulate
+from softstart import (
+    Command,
+    Drive,
+    InputError,
+    Measured,
+    PlainController,
+    Sensor,
+    SimulationError,
+    plugins,
+    simulate,
+)
 from softstart.controller import (
     controller_class,
     controller_names,
@@ -184,3 +194,23 @@ def test_a_compiled_step_notices_a_change_in_what_it_calls(tmp_path):
     later = time.time() + 5.0
     os.utime(helper, (later, later))
     assert run() == "25.0"
+
+
+TABLE = '[tool.softstart.entry-points."softstart.test-group"]\nown = "math:pi"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ('[project]\nname = "softstart"\n' + TABLE, ["own"]),
+        ('[project]\nname = "another"\n' + TABLE, []),  # above an installed package
+        (None, []),
+    ],
+)
+def test_a_checkout_registers_what_its_project_file_names(tmp_path, monkeypatch, request, text, names):
+    request.addfinalizer(plugins.registered.cache_clear)
+    plugins.registered.cache_clear()
+    if text is not None:
+        (tmp_path / "pyproject.toml").write_text(text)
+    monkeypatch.setattr(plugins, "CHECKOUT", tmp_path / "pyproject.toml")
+    assert list(plugins.registered("softstart.test-group")) == names

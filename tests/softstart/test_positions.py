@@ -6,14 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
 from tests.twin import chain_of
 
 from softstart import Drive, InputError, compare, records, simulate
 from softstart.chain import reduce_chain
 from softstart.drive import UNKNOWN_POSITIONS
-from softstart.kernel.records import S_REF, S_SLOPE, S_START
 
 CRANE = Drive.load("crane-4amtkf")
 STRATEGIES = ("direct", "s-curve", "shaped")
@@ -73,30 +71,6 @@ def test_bad_input_is_told(given: dict[str, object], said: str) -> None:
     with pytest.raises(InputError) as error:
         CRANE.replace(**given)
     assert said in str(error.value)
-
-
-@pytest.mark.parametrize("where", ["hanging", "mid-gap"])
-@pytest.mark.parametrize("name", STRATEGIES)
-def test_the_hoist_by_the_independent_integrator(where: str, name: str) -> None:
-    """The torque that was played, handed to the oracle in pieces: same peak and start time."""
-    drive = HOIST.replace(start_position=where)
-    run = simulate(drive, name)
-    # without lag the torque is a line in each span
-    starts, ua, ub = (run.recorded.spans[:, i] for i in (S_START, S_REF, S_SLOPE))
-    pieces = list(zip(starts.tolist(), ua.tolist(), ub.tolist(), strict=True))
-    before = [(math.nan,) * 3, *pieces]
-    goes_on = [
-        abs(u - v - b * (t - s)) <= 1e-9 and a == b
-        for (t, u, a), (s, v, b) in zip(pieces, before, strict=False)
-    ]
-    changes = [piece for piece, same in zip(pieces, goes_on, strict=True) if not same]
-    other = integrate(
-        J1=0.19, J2=0.065, c=3200.0, d=1.5, gap=drive.gap, Mc=120.0, kind="active", law="no-pull",
-        theta0=drive.theta0, w1_0=0.0, w2_0=0.0, torque_pieces=changes, lag=0.0, rate=math.inf, u0=0.0,
-        t_end=run.end_time, target=drive.target_speed,
-    )  # fmt: skip
-    assert run.peak_torque == pytest.approx(other.peak, rel=1e-8)
-    assert run.start_time == pytest.approx(dict(map(reversed, other.events))["target"], rel=1e-8)
 
 
 def test_a_wider_gap_changes_nothing_for_what_hangs_and_stays_in_contact() -> None:

@@ -1,8 +1,15 @@
-"""Figures of optima: the data behind them."""
+"""What is drawn and what a notebook shows: the data behind it, well-formed, and never a script."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pytest
 
-from softstart import Drive
+from softstart import Chain, Drive, compare, fatigue, optimize, simulate
 from softstart.optimal.check import replayed
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
 from softstart.optimal.problem import Problem
@@ -71,3 +78,29 @@ def test_a_front_is_drawn_from_its_points():
     assert drawn["no optimum"].get_xdata().tolist() == [0.22]
     for name, time, k in crowded:
         assert drawn[f"{name}, x{k:.2f}"].get_xydata().tolist() == [[time, k]]
+
+
+NAMED = Drive.load("crane-4amtkf").replace(name="<script>alert(1)</script> & co")
+DAMPED = NAMED.replace(damping=1.0)
+
+MADE: dict[str, Callable[[], Any]] = {
+    "run": lambda: simulate(DAMPED, "ramp"),
+    "chain": lambda: simulate(Chain.load("crane-4-mass"), "ramp"),
+    "comparison": lambda: compare(DAMPED, ["direct", "ramp", "shaped"]),
+    "optimum": lambda: optimize(NAMED, 0.45),
+    "fatigue": lambda: fatigue([simulate(DAMPED, "direct"), simulate(DAMPED, "ramp")]),
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_cell_is_well_formed_and_shows_the_figures(name):
+    text = MADE[name]()._repr_html_()
+    assert "<script" not in text
+    assert text.count("<svg") == 1
+    page = ET.fromstring(f"<div>{text.replace('<br>', '<br/>')}</div>")
+    cells = ["".join(cell.itertext()) for cell in page.iter("td")]
+    assert len(cells) >= 6
+    if name != "chain":
+        assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; co" in text
+    if name in ("run", "comparison"):
+        assert any(cell.startswith(f"{simulate(DAMPED, 'ramp').k_dyn:.3f}") for cell in cells)
