@@ -16,16 +16,8 @@ CLASSES = [name for name in softstart.__all__ if inspect.isclass(getattr(softsta
 # raised by softstart: their text is all they have, and no paper is its source
 ERRORS = {"InfeasibleError", "InputError", "OptimumError", "SimulationError"}
 # others are returned, not called by users
-MADE_BY_USERS = {"Chain", "Clutch", "Command", "Drive", "Engine", "PeriodicTorque", "Problem", "TorqueProfile"}
-    "Chain",
-    "Clutch",
-    "Command",
-    "Drive",
-    "Engine",
-    "PeriodicTorque",
-    "Problem",
-    "TorqueProfile",
-]
+MADE_BY_USERS = {"Chain", "Clutch", "Command", "Drive", "Engine", "PeriodicTorque"}
+MADE_BY_USERS |= {"Problem", "TorqueProfile"}
 
 
 def sections(name: str) -> dict[str, str]:
