@@ -115,17 +115,24 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
 
 # ---- --tiers: which tests are slow ----------------------------------------------------------------------
 
+BEGUN = pytest.StashKey[float]()
+
+
+def spent() -> float:
+    """Processor time of this process and of its children that have ended, s."""
+    return sum(os.times()[:4])
+
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """The processor time of a test with its fixtures and its children, told with its last report."""
+    """The time of a test is that of its fixtures and of its children, too."""
     item.stash[BEGUN] = spent()
     return (yield)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
-    """Reports come from the workers of pytest-xdist too; what stands in `user_properties` comes with them."""
+    """The workers of pytest-xdist send their reports, and with them what stands in `user_properties`."""
     report: Any = yield
     if report.when == "teardown":
         slow = item.get_closest_marker("slow") is not None
@@ -137,23 +144,12 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     """The tests on the wrong side of the line; a fact about this machine, which fails nothing."""
     if not config.getoption("tiers"):
         return
+    reports = [one for kind in terminalreporter.stats.values() for one in kind if hasattr(one, "when")]
     told = [
-        (*value, report.nodeid)
-        for reports in terminalreporter.stats.values()
-        for report in reports
-        for name, value in getattr(report, "user_properties", ())
-        if name == "processor"
+        (*dict(one.user_properties)["processor"], one.nodeid) for one in reports if one.when == "teardown"
     ]
-    for slow, heading in ((False, "not marked slow, and take"), (True, "marked slow, and take less than")):
-        terminalreporter.section(f"tests that are {heading} {SLOW} s of processor time")
+    for slow, heading in ((False, "not marked slow: took"), (True, "marked slow: took less than")):
+        terminalreporter.section(f"{heading} {SLOW} s of processor time")
         for took, marked, nodeid in sorted(told, reverse=True):
             if marked == slow and (took < SLOW) == slow:
                 terminalreporter.line(f"{took:8.2f}  {nodeid}")
-
-
-BEGUN = pytest.StashKey[float]()
-
-
-def spent() -> float:
-    """Processor time of this process and of its children that have ended, s."""
-    return sum(os.times()[:4])

@@ -11,7 +11,7 @@ import pytest
 from tests.softstart import test_identification as identification
 from tests.softstart.test_identification import REVERSE
 
-from softstart import Drive, Identification, InputError, compare, identify, simulate, tune
+from softstart import Drive, Identification, InputError, compare, identify, plan_experiments, simulate, tune
 from softstart.identification.planning import made_up_log
 from softstart.start.comparison import LEFT_POSSIBLE
 
@@ -29,6 +29,21 @@ def folder(found: Identification, tmp_path_factory: pytest.TempPathFactory) -> P
     path = tmp_path_factory.mktemp("found")
     found.save(path)
     return path
+
+
+def test_each_interval_has_the_truth(found: Identification) -> None:
+    for one in found.shared:
+        off = abs(math.log(one.value / float(getattr(TRUTH, one.name))))
+        assert off < math.log(one.upper / one.lower), one.name  # twice the interval
+
+
+@pytest.mark.slow
+def test_a_plan_tells_the_intervals_that_a_fit_then_has(found: Identification) -> None:
+    plan = plan_experiments(TRUTH, log_period="4 ms", ripple=1.0, optimise=False)
+    for one in found.shared:
+        assert plan[REVERSE].widths[one.name] == pytest.approx(one.half_width, rel=0.35)
+    assert math.isinf(plan["start"].widths["gap"])
+    assert plan["shaking"].travel < 0.1 * plan["start"].travel
 
 
 # ---- drives that are left possible ----------------------------------------------------------------------
@@ -106,7 +121,7 @@ def test_the_drive_may_get_limits_and_no_other_gap(folder: Path, tmp_path: Path)
 
 
 def test_compare_has_the_intervals_of_single_starts(found: Identification) -> None:
-    table = compare(found, ["direct", "s-curve"])
+    table = compare(found, ["s-curve"])
     drives = list(found.draws().elements())
     for row in table.rows:
         assert row.run.drive == found.drive
@@ -119,7 +134,7 @@ def test_compare_has_the_intervals_of_single_starts(found: Identification) -> No
                 (min(ends[0], middle), max(ends[1], middle)), rel=1e-12
             )
         assert row.summary()["k_dyn_upper"] == row.intervals["k_dyn"][1]
-    plain = compare(found.drive, ["direct", "s-curve"])
+    plain = compare(found.drive, ["s-curve"])
     for one, two in zip(table.rows, plain.rows, strict=True):
         assert one.run.k_dyn == two.run.k_dyn
         assert two.intervals == {}
