@@ -128,9 +128,8 @@ class ChainOracle:
         n, g = self.n, self.g
         self.K, self.k = np.zeros((n - 1, 2 * n)), np.zeros((n - 1, 2 + len(g.tones) + len(g.curves)))
         for j, form in enumerate(self.form):
-            c, d = {"press": (g.c[j], g.d[j]), "joined": (g.c[j], g.d[j]), "stiff": (2 * g.c[j], 0.0)}.get(
-                form, (0.0, 0.0)
-            )
+            c = {"press": g.c[j], "joined": g.c[j], "stiff": 2 * g.c[j]}.get(form, 0.0)
+            d = g.d[j] if form in ("press", "joined") else 0.0
             self.K[j, j], self.K[j, n - 1 + j], self.K[j, n + j] = c, d, -d
             self.k[j, 0] = -0.5 * c * self.side[j] * g.gap[j]
         self.A, self.B = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, self.k.shape[1]))
@@ -142,13 +141,10 @@ class ChainOracle:
         by[:, 0] -= self.direction * np.where(g.reactive, g.Mc, 0.0)
         self.A[n - 1 : 2 * n - 1] = moves[:, None] * push / g.J[:, None]
         self.B[n - 1 : 2 * n - 1] = moves[:, None] * by / g.J[:, None]
-        self.names: list[tuple[str, int]] = []
-        rows: list[tuple[np.ndarray, np.ndarray]] = []
-        for name, place, row, by_input in self.rows():
-            self.names.append((name, place))
-            rows.append((row, by_input))
-        self.E = np.array([row for row, _ in rows]).reshape(-1, 2 * n)
-        self.F = np.array([by_input for _, by_input in rows]).reshape(-1, self.k.shape[1])
+        rows = list(self.rows())
+        self.names = [(name, place) for name, place, _, _ in rows]
+        self.E = np.array([row for _, _, row, _ in rows]).reshape(-1, 2 * n)
+        self.F = np.array([by_input for *_, by_input in rows]).reshape(-1, self.k.shape[1])
 
     def pushed(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The torque on each mass that moves in these directions, without friction of a reactive load."""

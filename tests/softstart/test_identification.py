@@ -379,16 +379,15 @@ def test_peak_and_travel_are_those_of_the_worst_position() -> None:
     """Torques under which a contact that is only just made has a peak a thousandth of the gap wide."""
     drive = random_unknown(7).replace(load_kind="reactive", load_torque=2.0)
     bench = Bench(drive, 1e-3, 1.0, NAMES[:5])
-    generator, missed = np.random.default_rng(7), 0.0
-    for _ in range(2):
-        durations = np.full(11, 0.8 * float(drive.elastic_period))
-        played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
-        places = np.concatenate([np.linspace(-1.0, 1.0, 1501), generator.uniform(-1.0, 1.0, 500)])
-        found, coarse = bench.loads(*played, places), bench.loads(*played, np.linspace(-1.0, 1.0, 65))
-        for i, most in enumerate(bench.load(*played)):
-            assert 0.998 * most <= found[i].max() <= (1.0 + 1e-9) * most
-            missed = max(missed, 1.0 - float(coarse[i].max()) / most)
-    assert missed > 0.005  # an even grid would not do
+    generator = np.random.default_rng(9)
+    durations = np.full(11, 0.8 * float(drive.elastic_period))
+    played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
+    places = np.concatenate([np.linspace(-1.0, 1.0, 1501), generator.uniform(-1.0, 1.0, 500)])
+    found, coarse = bench.loads(*played, places), bench.loads(*played, np.linspace(-1.0, 1.0, 65))
+    most = bench.load(*played)
+    for i in range(len(most)):
+        assert 0.998 * most[i] <= found[i].max() <= (1.0 + 1e-9) * most[i]
+    assert max(1.0 - float(coarse[i].max()) / most[i] for i in range(len(most))) > 0.005  # of an even grid
 
 
 def test_peak_and_travel_are_those_of_a_simulation() -> None:

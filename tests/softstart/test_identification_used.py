@@ -121,7 +121,7 @@ def test_the_drive_may_get_limits_and_no_other_gap(folder: Path, tmp_path: Path)
 
 
 def test_compare_has_the_intervals_of_single_starts(found: Identification) -> None:
-    table = compare(found, ["s-curve"])
+    table = compare(found, ["s-curve"], worst_case=())
     drives = list(found.draws().elements())
     for row in table.rows:
         assert row.run.drive == found.drive
@@ -134,7 +134,7 @@ def test_compare_has_the_intervals_of_single_starts(found: Identification) -> No
                 (min(ends[0], middle), max(ends[1], middle)), rel=1e-12
             )
         assert row.summary()["k_dyn_upper"] == row.intervals["k_dyn"][1]
-    plain = compare(found.drive, ["s-curve"])
+    plain = compare(found.drive, ["s-curve"], worst_case=())
     for one, two in zip(table.rows, plain.rows, strict=True):
         assert one.run.k_dyn == two.run.k_dyn
         assert two.intervals == {}
