@@ -1,4 +1,4 @@
-"""What an identification is used for: kept on disk, compared, tuned, reported, each with its intervals."""
+"""What an identification is used for: kept on disk, compared, tuned, each with its intervals."""
 
 from __future__ import annotations
 
