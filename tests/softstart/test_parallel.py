@@ -171,7 +171,7 @@ def test_workers_end_with_a_parent_that_was_killed(tmp_path: Path) -> None:
 
 def test_a_pool_tries_the_task_of_a_dead_process_once_more(importable: Any, tmp_path: Path) -> None:
     with Pool(2) as pool:
-        tasks = [str(tmp_path / name) for name in "abc"]
+        tasks = [str(tmp_path / name) for name in "ab"]
         assert sorted(pool.results(importable.dies_once, tasks)) == [(task, 7) for task in tasks]
         with pytest.raises(SimulationError, match=r"died 2 times \(signal 9\) while it computed kill"):
             list(pool.results(importable.failing, ["kill"]))

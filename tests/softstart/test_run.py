@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from tests.twin import chain_of
 
-from softstart import Chain, Drive, InputError, Run, SimulationError, Status, formulas, records, simulate
+from softstart import Drive, InputError, Run, SimulationError, Status, formulas, records, simulate
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
 from softstart.controller.base import Measured
 from softstart.controller.compiled import Vector
@@ -177,15 +177,13 @@ def test_a_start_that_is_too_long_is_given_up() -> None:
     batch = simulate([HEAVY, CRANE], "ramp")
     assert batch.status.values.tolist() == ["TOO_LONG", "REACHED"]
     assert math.isnan(batch.k_dyn[0])
-    with pytest.raises(SimulationError, match=r"more than 100,000 elastic periods.*Check the units"):
-        simulate(CRANE, "direct", until=1e9)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("machine", [HEAVY, chain_of(HEAVY)], ids=["drive", "chain"])
-def test_a_start_that_is_too_long_names_the_remedy(machine: Drive | Chain) -> None:
-    with pytest.raises(SimulationError, match=r"more than 100,000 elastic periods.*Check the units"):
-        simulate(machine, "ramp")
+def test_a_start_that_is_too_long_names_the_remedy() -> None:
+    for machine, until in ((HEAVY, None), (chain_of(HEAVY), None), (CRANE, 1e9)):
+        with pytest.raises(SimulationError, match=r"more than 100,000 elastic periods.*Check the units"):
+            simulate(machine, "ramp", until)
 
 
 @pytest.mark.slow
