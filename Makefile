@@ -5,7 +5,7 @@
 # and for those who work on it (CONTRIBUTING.md):
 #   make check                 lint, types, layers and the tests of what has changed: under two minutes
 #   make lint types layers     ruff, mypy, import-linter
-#   make slow                  the tests that `make test` leaves out: each takes 2 s of processor time or more
+#   make slow                  the tests that `make test` leaves out: each takes 0.5 s of processor time or more
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': its speed
 #   make pictures              the pictures of the README (needs chromium)

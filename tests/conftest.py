@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
-import sys
 import tempfile
 from collections.abc import Iterator
-from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -41,21 +40,24 @@ def without_local_constants() -> None:
 
 without_local_constants()
 
-PAGE = Path(__file__).parent / "page"
-DOCS = Path(__file__).parent / "docs"
+SLOW = 0.5  # s of processor time from which on a test belongs to `make slow`
+# folders whose tests run only with their option
+OPTIONAL = {
+    "page": ("--page", "with the tests of the page in Chromium, which need playwright (`make page`)"),
+    "docs": ("--docs-commands", "with the commands of the documentation (`make docs-commands`)"),
+}
 SHARED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--page`: with the tests in a real browser, which need Chromium and playwright (`make page`).
-
-    `--docs-commands`: run what the pages of the documentation tell to type (`make docs-commands`).
-    `--few-kernels`: compile what a test needs when it needs it, for a few tests from an empty cache.
-    """
-    parser.addoption("--page", action="store_true", help="with the tests of the page in Chromium")
-    parser.addoption("--docs-commands", action="store_true", help="with the commands of the documentation")
+    """Options of this suite: `pytest --help` says what each does."""
+    for option, meaning in OPTIONAL.values():
+        parser.addoption(option, action="store_true", help=meaning)
     parser.addoption("--rewrite", action="store_true", help="pages show what their commands print")
-    parser.addoption("--few-kernels", action="store_true", help="compile nothing before the first test")
+    parser.addoption("--few-kernels", action="store_true", help="compile what a test needs when it needs it")
+    parser.addoption(
+        "--tiers", action="store_true", help="say which tests should be marked slow and which should not"
+    )
 
 
 def pytest_configure() -> None:
@@ -65,18 +67,13 @@ def pytest_configure() -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Without `--page` the tests in a browser are not even imported; the pages' commands likewise.
-
-    Neither are the tests of the benchmarks where the benchmarks are not installed: they are not in the wheel.
-    """
-    if (
-        collection_path.name.startswith("test_benchmark")
-        and find_spec("softstart_studies.benchmarks") is None
-    ):
+    """What needs an option, or benchmarks that a wheel has not, is not even imported."""
+    if collection_path.name.startswith("test_benchmark"):
+        return find_spec("softstart_studies.benchmarks") is None or None
+    option, _ = OPTIONAL.get(collection_path.name, ("", ""))
+    if collection_path.parent == Path(__file__).parent and option and not config.getoption(option):
         return True
-    if collection_path == DOCS and not config.getoption("--docs-commands"):
-        return True
-    return True if collection_path == PAGE and not config.getoption("--page") else None
+    return None
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -85,29 +82,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if config.getoption("collectonly") or config.getoption("few_kernels"):
         return
     if folder := getattr(config, "workerinput", {}).get("kernels"):
-        halves = {f"assertions {i}": ((), partial(rewrite_assertions, config, i)) for i in range(2)}
-        kernels.compile_together(Path(folder), halves)
+        kernels.compile_together(Path(folder))
     elif config.getoption("dist", "no") == "no":
         kernels.compile_all()
-
-
-def rewrite_assertions(config: pytest.Config, half: int) -> None:
-    """Rewrite the tests' assertions as pytest does where it imports them: else each worker would, 10 s long.
-
-    pytest has no public name for it; where these are others, each worker does it.
-    """
-    try:
-        rewrite = import_module("_pytest.assertion.rewrite")
-        state = config.stash[rewrite.assertstate_key]
-        for path in sorted(Path(__file__).parent.rglob("test_*.py"))[half::2]:
-            cache = rewrite.get_cache_dir(path) / (path.stem + rewrite.PYC_TAIL)
-            if sys.dont_write_bytecode or rewrite._read_pyc(path, cache) is not None:
-                continue
-            source, code = rewrite._rewrite_test(path, config)
-            if rewrite.try_makedirs(cache.parent):
-                rewrite._write_pyc(state, code, source, cache)
-    except (ImportError, AttributeError, TypeError):
-        return
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -134,3 +111,45 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
         gc.collect()
         gc.freeze()
         gc.enable()
+
+
+# ---- --tiers: which tests are slow ----------------------------------------------------------------------
+
+BEGUN = pytest.StashKey[float]()
+
+
+def spent() -> float:
+    """Processor time of this process and of its children that have ended, s."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """The time of a test is that of its fixtures and of its children, too."""
+    item.stash[BEGUN] = spent()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """The workers of pytest-xdist send their reports, and with them what stands in `user_properties`."""
+    report: Any = yield
+    if report.when == "teardown":
+        slow = item.get_closest_marker("slow") is not None
+        report.user_properties.append(("processor", (spent() - item.stash[BEGUN], slow)))
+    return report  # type: ignore[no-any-return]
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """The tests on the wrong side of the line; a fact about this machine, which fails nothing."""
+    if not config.getoption("tiers"):
+        return
+    reports = [one for kind in terminalreporter.stats.values() for one in kind if hasattr(one, "when")]
+    told = [
+        (*dict(one.user_properties)["processor"], one.nodeid) for one in reports if one.when == "teardown"
+    ]
+    for slow, heading in ((False, "not marked slow: took"), (True, "marked slow: took less than")):
+        terminalreporter.section(f"{heading} {SLOW} s of processor time")
+        for took, marked, nodeid in sorted(told, reverse=True):
+            if marked == slow and (took < SLOW) == slow:
+                terminalreporter.line(f"{took:8.2f}  {nodeid}")

@@ -9,14 +9,11 @@ tests of their output would trip over.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
 from softstart.kernel.jit import compile_now
-
-Parts = dict[str, tuple[tuple[str, ...], Callable[[], None]]]
 
 PATIENCE = 900.0  # s that a worker waits for another one which compiles
 
@@ -27,11 +24,6 @@ def steps() -> None:
         compile_now(import_module(one.name))
 
 
-def kernel(name: str) -> Callable[[], None]:
-    """The entry points of a module of the kernel."""
-    return lambda: compile_now(import_module(f"softstart.kernel.{name}"))
-
-
 def controllers() -> None:
     """Every controller in a single start and in a batch."""
     from softstart import Drive, TorqueProfile, records, simulate
@@ -40,30 +32,29 @@ def controllers() -> None:
     crane = Drive.load("crane-4amtkf")
     profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
     for controller in (profile, *map(make_controller, ready_controller_names())):
-        assert simulate(crane, controller).energy.residual < 1e-6
+        simulate(crane, controller)
         simulate(records(crane, gap=[0.5, 2.0]), controller)
 
 
 def plain() -> None:
     """A controller that is called from Python."""
-    from tests import twin as twins
+    from tests.twin import plain as twin_of
 
     from softstart import Drive, records, simulate
-    from softstart.controller import CompiledController, make_controller
+    from softstart.controller import make_controller
 
-    crane, direct = Drive.load("crane-4amtkf"), make_controller("direct")
-    assert isinstance(direct, CompiledController)
-    twin = twins.plain(direct, crane)
-    assert simulate(crane, twin).k_dyn == simulate(crane, "direct").k_dyn
+    crane = Drive.load("crane-4amtkf")
+    twin = twin_of(make_controller("direct"), crane)
+    simulate(crane, twin)
     simulate(records(crane, gap=[0.5, 2.0]), twin)
 
 
 # what must be compiled before, and what compiles it; the longest are taken first
-PARTS: Parts = {
-    "start": ((), kernel("start")),
+PARTS = {
+    "start": ((), lambda: compile_now(import_module("softstart.kernel.start"))),
     "steps": ((), steps),
-    "replay": (("start",), kernel("replay")),
-    "sensitivity": (("replay",), kernel("sensitivity")),
+    "replay": (("start",), lambda: compile_now(import_module("softstart.kernel.replay"))),
+    "sensitivity": (("replay",), lambda: compile_now(import_module("softstart.kernel.sensitivity"))),
     "controllers": (("replay", "steps"), controllers),
     "plain": (("controllers",), plain),
 }
@@ -71,32 +62,27 @@ PARTS: Parts = {
 
 def compile_all() -> None:
     """All parts, in this process alone."""
-    for name in PARTS:
-        PARTS[name][1]()
+    for _, compile_part in PARTS.values():
+        compile_part()
 
 
-def compile_together(folder: Path, others: Parts | None = None) -> None:
-    """All parts, with the other workers that are given the same folder; returns when none is left.
-
-    `others` are parts that are no kernels: for a worker that would wait.
-    """
-    parts = PARTS | (others or {})
-    until = time.monotonic() + PATIENCE
-    while not done(folder, parts) and time.monotonic() < until:
-        ready = (name for name, (needs, _) in parts.items() if done(folder, needs))
-        name = next((name for name in ready if take(folder, name)), "")
+def compile_together(folder: Path) -> None:
+    """All parts, with the other workers that are given the same folder; returns when none is left."""
+    latest = time.monotonic() + PATIENCE
+    while time.monotonic() < latest:
+        done = {name for name in PARTS if (folder / f"{name}.done").exists()}
+        if done == set(PARTS):
+            return
+        name = next(
+            (name for name, (needs, _) in PARTS.items() if done.issuperset(needs) and take(folder, name)), ""
+        )
         if not name:
             time.sleep(0.1)
             continue
         try:
-            parts[name][1]()
+            PARTS[name][1]()
         finally:
             (folder / f"{name}.done").touch()
-
-
-def done(folder: Path, names: Iterable[str]) -> bool:
-    """Whether these parts are compiled."""
-    return all((folder / f"{name}.done").exists() for name in names)
 
 
 def take(folder: Path, name: str) -> bool:

@@ -1,522 +1,492 @@
-"""An independent answer for one start of a drive with a gap: DOP853 between located events. For tests only.
+"""An independent answer for one start of a chain or drive: DOP853 between located events. For tests only.
 
-Nothing here is shared with the plant under test. Between events the drive is integrated by scipy's DOP853.
-Every event is a linear function of the state that rises through zero; it is bracketed by samples of the step,
-found on the step's interpolant, and then polished with genuine Runge-Kutta steps, since the interpolant is of
-lower order. After an event the integration restarts in the new mode.
+Nothing here is shared with the kernel under test. Between events everything is affine in the state y (twists,
+speeds, angle of the load) and in the inputs p (1, motor torque, exciting torques, load curves): the torques
+T = K y + k p, the motion y' = A y + B p, and the events, which are rows that rise through zero. A rise is
+bracketed by samples of the step's interpolant and then located on genuine Runge-Kutta steps of their own.
+After an event the integration restarts in the new mode.
 
-Modes. Gap open: T = 0. On a flank (`side` +1 or -1, overlap z >= 0 on that side): "press" T = c z + d z',
-"stiff" T = 2 c z (`modelica` while d z' > c z), "loose" T = 0 though z > 0 (`no-pull` and `modelica` while
-c z + d z' <= 0). Load: `direction` 0 is stuck, else the sign of the speed that friction opposes; 1 if active.
-
-Corners defined here:
+Modes of a shaft: "open"; "press" T = c z + d z' on a flank; "stiff" T = 2 c z (`modelica` while d z' > c z);
+"loose" T = 0 though the flanks overlap; "joined", a spring without a gap. A rigid gap is "open" and strikes.
+Directions of a mass: 0 stuck, else the sign of the speed that friction opposes; 1 if the load is active.
 
 - "closed" and "opened" are the instants at which a flank begins and ceases to act: "loose" counts as opened.
-  A loose flank that passes back into the gap is no event.
 - A start with overlap begins in contact without an event. A start exactly on a flank closes at t = 0 if it
-  moves into it, or is pushed into it from rest. A load that is moved at once has "load-starts" at t = 0.
-- A reactive load whose speed passes zero without resting gives "load-stops" and "load-starts" at one instant.
-- `modelica` has the cut of ElastoBacklash, T = max(0, ...). Its special case of gap <= 1e-10 rad is left out.
-- Before the first torque piece the demand is u0. With rate = inf and lag = 0, u jumps with the demand.
-- Coulomb friction of the motor holds it at rest as long as |u - T| <= friction ("motor-stops" and
-  "motor-starts"); b1 and b2 are viscous friction of motor and load.
-- With `release` a brake holds the motor (w1 = 0, w1_0 must be 0) until that instant, or, for infinity, until
-  u >= T for the first time ("released"; at t = 0 if it is so from the start).
+  moves or is pushed into it. A load that is moved at once has "load-starts" at t = 0.
+- Before the first torque piece the demand is u0. Without slew limit and lag u jumps with the demand.
+- With `release` a brake holds the motor until that instant or, for infinity, until u >= T ("released").
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
-from tests.oracle_cases import random_case
 from tests.oracle_torque import TorquePath
 
-__all__ = ["Contact", "Start", "integrate", "random_case"]
-
-EVENT_CAP = 5000
 FIRST_STEP = np.array([1e-4, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0])  # a new mode may be left again at once
 LATER_STEPS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+PRECISE = 4 * np.finfo(float).eps
 
 
 @dataclass
-class Contact:
-    """One contact stage; `end` is None if the run ended in it, `peak` has the sign of T."""
+class Given:
+    """A chain at its motor shaft, in SI; `tones` are (mass, frequency, cosine, sine) of exciting torques."""
 
-    side: int
-    start: float
-    end: float | None = None
-    peak: float = 0.0
-    peak_time: float = 0.0
+    J: np.ndarray
+    Mc: np.ndarray
+    reactive: np.ndarray
+    w0: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+    gap: np.ndarray
+    law: list[str]
+    theta0: np.ndarray
+    ground: np.ndarray
+    tones: list[tuple[int, float, float, float]]
+    restitution: np.ndarray  # NaN where elastic
+    motor: int
+    load: int = -1
+    efficiency: Any = 1.0
+    gear: Any = -1  # the mass at which the gear of each shaft sits
+    # of some masses points and torques of a load curve, and whether it is by angle, 0 where the load begins
+    curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] = field(default_factory=dict)
 
-
-@dataclass
-class Start:
-    """What became of a start. `work`: motor, shaft (integral of T v) and load, J, if asked for."""
-
-    peak: float
-    peak_time: float
-    events: list[tuple[float, str]]
-    contacts: list[Contact]
-    theta: float
-    w1: float
-    w2: float
-    phi2: float
-    u: float
-    T: float
-    work: tuple[float, float, float] | None
-
-
-@dataclass(frozen=True)
-class Drive:
-    """Parameters in SI units."""
-
-    J1: float
-    J2: float
-    c: float
-    d: float
-    gap: float
-    Mc: float
-    reactive: bool
-    law: str
-    friction: float = 0.0
-    b1: float = 0.0
-    b2: float = 0.0
+    def __post_init__(self) -> None:
+        self.efficiency, self.gear = np.broadcast_arrays(self.efficiency, self.gear, self.c)[:2]
 
 
-@dataclass
-class Mode:
-    """What is latched between events."""
-
-    side: int = 0
-    form: str = "open"
-    direction: int = 1
-    held: bool = False
-    rubs: int = 0  # sign of the motor speed that its friction opposes
-    stuck: bool = False  # the motor is held by its friction
-
-
-def integrate(
-    *,
-    J1: float,
-    J2: float,
-    c: float,
-    d: float,
-    gap: float,
-    Mc: float,
-    kind: str,
-    law: str,
-    theta0: float,
-    w1_0: float,
-    w2_0: float,
-    torque_pieces: list[tuple[float, float]],
-    lag: float,
-    rate: float,
-    u0: float,
-    t_end: float,
-    target: float | None = None,
-    rtol: float = 1e-11,
-    energy: bool = False,
-    release: float = 0.0,
-    friction: float = 0.0,
-    b1: float = 0.0,
-    b2: float = 0.0,
-) -> Start:
-    """Integrate one start from t = 0 to t_end; see the module for its modes and corners."""
-    drive = Drive(J1, J2, c, d, gap, Mc, kind == "reactive", law, friction, b1, b2)
-    path = TorquePath(torque_pieces, lag, rate, u0, t_end)
-    return _Run(drive, path, (theta0, w1_0 - w2_0, w2_0), target, rtol, energy, release).go()
-
-
-class _Run:
-    """The state of one start on its way, and what has been noted of it."""
+class ChainOracle:
+    """One start on its way; afterwards `t`, `theta`, `w`, `T`, `peaks` and `events` (time, kind, place)."""
 
     def __init__(
         self,
-        drive: Drive,
+        given: Given,
         path: TorquePath,
-        start: tuple[float, float, float],
-        target: float | None,
-        rtol: float,
-        energy: bool,
-        release: float,
+        target: float = math.inf,
+        rtol: float = 1e-12,
+        release: float = 0.0,
+        most: int = 500,
     ):
-        self.drive, self.path, self.target, self.rtol, self.energy = drive, path, target, rtol, energy
-        theta, v, w2 = start
-        Omega = math.sqrt(self.drive.c / self.drive.J1 + self.drive.c / self.drive.J2)
-        self.period = 2 * math.pi / Omega
-        torque = max(abs(self.drive.Mc), 1e-300, *(max(abs(s[2]), abs(s[4])) for s in path.spans))
-        speed = max(abs(v), Omega * torque / self.drive.c, abs(theta) * Omega)
-        speed = max(speed, math.sqrt(self.drive.gap * torque * (1 / self.drive.J1 + 1 / self.drive.J2)))
-        self.scale = np.array([speed / Omega, speed, speed])
-        self.t, self.span = 0.0, path.spans[0]
-        self.y = np.array([theta, v, w2, 0.0] + [0.0] * (3 if energy else 0))
-        self.atol = (
-            1e-3
-            * rtol
-            * np.array([speed / Omega, speed, speed, speed / Omega] + [torque * speed / Omega] * 3)
-        )
-        self.atol = self.atol[: len(self.y)]
-        self.held_until = release
-        self.mode = Mode(held=release > 0.0)
-        self.stand_or_slide(v + w2)
-        self.events: list[tuple[float, str]] = []
-        self.contacts: list[Contact] = []
-        self.peak, self.peak_time = 0.0, 0.0
+        self.g, self.path, self.target, self.rtol, self.release = given, path, target, rtol, release
+        self.most = most  # events
+        self.n, self.load = given.J.size, given.load % given.J.size
+        self.t, self.leaps, self.span = 0.0, 0, path.spans[0]
+        self.y = np.concatenate([given.theta0, given.w0, [0.0]]).astype(float)
+        self.side = np.zeros(self.n - 1)
+        self.form = ["joined" if gap == 0 else "open" for gap in given.gap]
+        self.rigid, self.eta = ~np.isnan(given.restitution), given.efficiency
+        self.rubs = given.reactive.copy()
+        self.rubs[given.gear[self.eta < 1]] = True
+        self.held = release > 0.0
+        self.direction = np.where(self.rubs, np.sign(given.w0), 1.0)
+        if self.held:
+            self.direction[given.motor] = 0.0
+        self.sign = np.ones(self.n - 1)  # of the torques of shafts with lossy gears
+        self.events: list[tuple[float, str, int]] = []
+        self.peaks = np.zeros(self.n - 1)
+        elastic = np.where(self.rigid, 0.0, given.c)
+        rate = np.sqrt(2 * np.max((np.append(elastic, 0) + np.append(0, elastic)) / given.J))
+        rate = max([rate, *(tone[1] for tone in given.tones)])
+        self.period = 2 * math.pi / rate if rate > 0 else path.t_end
+        twist = max(np.abs(given.gap).max(), np.abs(given.theta0).max(), 1e-6)
+        speed = max(twist * rate, 1e-6)
+        self.size = np.concatenate([np.full(self.n - 1, twist), np.full(self.n, speed), [twist]])
+        for k in range(self.n - 1):
+            if self.form[k] == "open" and abs(self.y[k]) > 0.5 * given.gap[k]:
+                self.touch(k, math.copysign(1.0, self.y[k]), overlap=True)
+        self.along = {i: self.abscissa(i, curve[2]) for i, curve in given.curves.items()}
+        self.set_mode()
+        self.sign[self.torques(self.y) < 0] = -1.0
 
-    # ---- the drive in its present mode ----
+    # ---- mechanics ----
 
-    def stiffness(self) -> tuple[float, float]:
-        """T = kq q + kv v; q is the twist from the flank in contact, or theta while the gap is open."""
-        return {"press": (self.drive.c, self.drive.d), "stiff": (2 * self.drive.c, 0.0)}.get(
-            self.mode.form, (0.0, 0.0)
-        )
+    def abscissa(self, i: int, by_angle: bool) -> np.ndarray:
+        """The row of the speed or the angle of mass i, on which its load curve depends."""
+        row = np.zeros(2 * self.n)
+        if not by_angle:
+            row[self.n - 1 + i] = 1.0
+            return row
+        row[-1] = 1.0
+        row[i : self.load] = 1.0
+        row[self.load : i] = -1.0
+        return row
 
-    def torque(self) -> float:
-        kq, kv = self.stiffness()
-        return float(kq * self.y[0] + kv * self.y[1])
+    def inputs(self, t: Any, y: np.ndarray) -> np.ndarray:
+        """1, motor torque, each exciting torque, each torque of a load curve."""
+        found = [1.0 + 0.0 * t, self.path.torque(t, self.span)[0] + 0.0 * t]
+        found += [a * np.cos(omega * t) + b * np.sin(omega * t) for _, omega, a, b in self.g.tones]
+        found += [np.interp(self.along[i] @ y, *self.g.curves[i][:2]) for i in self.along]
+        return np.array(found)
 
-    def rhs(self) -> Any:
-        kq, kv = self.stiffness()
-        J1, J2, energy = self.drive.J1, self.drive.J2, self.energy
-        moves, friction = self.mode.direction != 0, self.mode.direction * self.drive.Mc
-        path, span, held = self.path, self.span, self.mode.held or self.mode.stuck
-        drag, b1, b2 = self.mode.rubs * self.drive.friction, self.drive.b1, self.drive.b2
+    def set_mode(self) -> None:
+        """K, k, A and B of the present mode, and the rows of its events."""
+        n, g = self.n, self.g
+        self.K, self.k = np.zeros((n - 1, 2 * n)), np.zeros((n - 1, 2 + len(g.tones) + len(g.curves)))
+        for j, form in enumerate(self.form):
+            c = {"press": g.c[j], "joined": g.c[j], "stiff": 2 * g.c[j]}.get(form, 0.0)
+            d = g.d[j] if form in ("press", "joined") else 0.0
+            self.K[j, j], self.K[j, n - 1 + j], self.K[j, n + j] = c, d, -d
+            self.k[j, 0] = -0.5 * c * self.side[j] * g.gap[j]
+        self.A, self.B = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, self.k.shape[1]))
+        for j in range(n - 1):
+            self.A[j, n - 1 + j], self.A[j, n + j] = 1.0, -1.0
+        self.A[-1, n - 1 + self.load] = 1.0
+        moves = self.direction != 0
+        push, by = self.pushed(self.direction)
+        by[:, 0] -= self.direction * np.where(g.reactive, g.Mc, 0.0)
+        self.A[n - 1 : 2 * n - 1] = moves[:, None] * push / g.J[:, None]
+        self.B[n - 1 : 2 * n - 1] = moves[:, None] * by / g.J[:, None]
+        rows = list(self.rows())
+        self.names = [(name, place) for name, place, _, _ in rows]
+        self.E = np.array([row for _, _, row, _ in rows]).reshape(-1, 2 * n)
+        self.F = np.array([by_input for *_, by_input in rows]).reshape(-1, self.k.shape[1])
 
-        def derivative(t: float, y: np.ndarray) -> list[float]:
-            q, v, w2, *_ = y.tolist()
-            u, T = path.torque(t, span)[0], kq * q + kv * v
-            a2 = (T - friction - b2 * w2) / J2 if moves else 0.0
-            rates = [v, (0.0 if held else (u - drag - b1 * (v + w2) - T) / J1) - a2, a2, w2]
-            return [*rates, u * (v + w2), T * v, friction * w2] if energy else rates
+    def pushed(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The torque on each mass that moves in these directions, without friction of a reactive load."""
+        n, g = self.n, self.g
+        passed = np.zeros((n, n - 1))
+        for k in range(n - 1):
+            for i, sign in ((k, -1.0), (k + 1, 1.0)):
+                drives = direction[i] * self.sign[k] * sign > 0
+                lossy = g.gear[k] == i
+                passed[i, k] = sign * ((self.eta[k] if drives else 1.0 / self.eta[k]) if lossy else 1.0)
+        push, by = passed @ self.K, passed @ self.k
+        push[:, n - 1 : 2 * n - 1] -= np.diag(g.ground)
+        by[:, 0] -= np.where(g.reactive, 0.0, g.Mc)
+        by[g.motor, 1] += 1.0
+        for place, i in enumerate([*(tone[0] for tone in g.tones), *g.curves]):
+            by[i, 2 + place] += 1.0 if place < len(g.tones) else -1.0
+        return push, by
 
-        return derivative
+    def rows(self) -> Any:
+        """Name, place and row of each event; it happens where the row rises through zero."""
+        g, n = self.g, self.n
+        constant = np.eye(1, self.k.shape[1])[0]
+        for k, form in enumerate(self.form):
+            half, s, c, d, law = 0.5 * g.gap[k], self.side[k], g.c[k], g.d[k], g.law[k]
+            spring, damper = np.array([c * s, 0.0, -c * half]), np.array([0.0, d * s, 0.0])
+            table = {
+                "upper": np.array([1.0, 0.0, -half]), "lower": np.array([-1.0, 0.0, -half]),
+                "leave": -spring, "pass": -spring, "drop": -spring - damper, "rejoin": spring + damper,
+                "stiffen": damper - spring, "soften": spring - damper,
+            }  # fmt: skip
+            names = {"open": ["upper", "lower"], "stiff": ["soften"], "loose": ["pass", "rejoin"]}.get(
+                form, []
+            )
+            if form == "press":
+                names = ["leave" if law == "dead-zone" or d == 0 else "drop"]
+                names += ["stiffen"] if law == "modelica" and d > 0 else []
+            for name in names:
+                twist, rate, one = table[name]
+                row = np.zeros(2 * n)
+                row[k], row[n - 1 + k], row[n + k] = twist, rate, -rate
+                yield name, k, row, one * constant
+            dead = form == "press" and law == "dead-zone" and d > 0
+            if self.eta[k] < 1 and (dead or form == "joined"):
+                yield "turn", k, -self.sign[k] * self.K[k], -self.sign[k] * self.k[k]
+        speeds = np.eye(2 * n)[n - 1 : 2 * n - 1]
+        for i in reversed(range(n)):  # at t = 0 the load starts before the motor
+            if self.held and i == g.motor:
+                if math.isinf(self.release):
+                    push, by = self.pushed(self.direction)
+                    yield "let go", i, push[i], by[i]
+            elif self.rubs[i] and self.direction[i] == 0:
+                for name, way in (("forward", 1.0), ("back", -1.0)):
+                    push, by = self.pushed(np.where(np.arange(n) == i, way, self.direction))
+                    yield name, i, way * push[i], way * by[i] - (g.Mc[i] if g.reactive[i] else 0.0) * constant
+            elif self.rubs[i]:
+                yield "stop", i, -self.direction[i] * speeds[i], 0.0 * constant
+        for i, (points, _, _) in g.curves.items():  # where the curve bends the integration starts again
+            for point in points:
+                for way in (1.0, -1.0):
+                    yield "bend", i, way * self.along[i], -way * point * constant
+        if self.target < math.inf:
+            yield "target", self.load, speeds[self.load], -self.target * constant
 
-    def slope_functional(self) -> np.ndarray:
-        """dT/dt as coefficients of (q, v, w2, u, 1)."""
-        kq, kv = self.stiffness()
-        motor = 0.0 if self.mode.held or self.mode.stuck else 1 / self.drive.J1
-        load = 1 / self.drive.J2 if self.mode.direction else 0.0
-        mobility = motor + load
-        friction = self.mode.direction * self.drive.Mc / self.drive.J2
-        friction -= motor * self.mode.rubs * self.drive.friction
-        b1, b2 = self.drive.b1 * motor, self.drive.b2 * load
-        by_v = kq - kv * kv * mobility - kv * b1
-        return np.array([-kv * kq * mobility, by_v, kv * (b2 - b1), kv * motor, kv * friction])
+    def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
+        return np.asarray(self.A @ y + self.B @ self.inputs(t, y))
 
-    def event_functionals(self) -> tuple[list[str], np.ndarray]:
-        """Names, and coefficients of (q, v, w2, u, 1): each fires when it rises through zero."""
-        side, form, c, d = self.mode.side, self.mode.form, self.drive.c, self.drive.d
-        table: dict[str, tuple[float, float, float, float, float]] = {}
-        if form == "open":
-            table["upper"] = (1, 0, 0, 0, -self.drive.gap / 2)
-            table["lower"] = (-1, 0, 0, 0, -self.drive.gap / 2)
-        elif form == "stiff":
-            table["soften"] = (side * c, -side * d, 0, 0, 0)
-        elif form == "loose":
-            table["pass"] = (-side, 0, 0, 0, 0)
-            table["rejoin"] = (side * c, side * d, 0, 0, 0)
-        elif self.drive.law == "dead-zone" or d == 0:
-            table["leave"] = (-side, 0, 0, 0, 0)
-        else:
-            table["drop"] = (-side * c, -side * d, 0, 0, 0)
-            if self.drive.law == "modelica":
-                table["stiffen"] = (-side * c, side * d, 0, 0, 0)
-        if self.drive.reactive and self.mode.direction:
-            table["stop"] = (0, 0, -self.mode.direction, 0, 0)
-        elif self.drive.reactive:
-            kq, kv = self.stiffness()
-            table["break forward"] = (kq, kv, 0, 0, -self.drive.Mc)
-            table["break backward"] = (-kq, -kv, 0, 0, -self.drive.Mc)
-        if self.mode.held and math.isinf(self.held_until):
-            kq, kv = self.stiffness()
-            table["let go"] = (-kq, -kv, 0, 1, 0)
-        if self.mode.stuck:
-            kq, kv = self.stiffness()
-            table["motor forward"] = (-kq, -kv, 0, 1, -self.drive.friction)
-            table["motor backward"] = (kq, kv, 0, -1, -self.drive.friction)
-        elif self.mode.rubs:
-            table["motor stop"] = (0, -self.mode.rubs, -self.mode.rubs, 0, 0)
-        if self.target is not None:
-            table["target"] = (0, 0, 1, 0, -self.target)
-        return list(table), np.array(list(table.values()), dtype=float)
+    def torques(self, y: np.ndarray) -> np.ndarray:
+        return np.asarray(self.K @ y + self.k[:, 0])
 
     # ---- what happens at an instant ----
 
-    def happened(self, kind: str) -> None:
-        self.events.append((self.t, kind))
-        if len(self.events) > EVENT_CAP:
-            raise RuntimeError(f"more than {EVENT_CAP} events at t = {self.t}")
+    def happened(self, kind: str, place: int) -> None:
+        self.events.append((float(self.t), kind, place))
+        if len(self.events) > self.most:
+            raise RuntimeError("too many events")
 
-    def touch(self, side: int, *, overlap: bool = False) -> None:
-        """Enter contact with a flank: at its surface, or at the start of the run with overlap."""
-        self.y[0] = self.y[0] - side * self.drive.gap / 2 if overlap else 0.0
-        spring, damper = side * self.drive.c * self.y[0], side * self.drive.d * self.y[1]
-        self.mode.side, self.mode.form = side, "press"
-        if self.drive.law == "modelica" and self.drive.d > 0 and (damper > spring or not overlap):
-            self.mode.form = "stiff"
-        if overlap and self.drive.law != "dead-zone" and spring + damper <= 0:
-            self.mode.form = "loose"
-            return
-        self.contacts.append(Contact(side, self.t, peak_time=self.t))
+    def touch(self, k: int, side: float, overlap: bool = False) -> None:
+        self.side[k] = side
+        v = side * (self.y[self.n - 1 + k] - self.y[self.n + k])
         if not overlap:
-            self.happened("closed")
+            self.y[k] = side * 0.5 * self.g.gap[k]
+        if self.rigid[k]:
+            self.strike(k, side * v)
+            return
+        spring = self.g.c[k] * (side * self.y[k] - 0.5 * self.g.gap[k]) if overlap else 0.0
+        damper = self.g.d[k] * v
+        if overlap and self.g.law[k] != "dead-zone" and spring + damper < 0:
+            self.form[k] = "loose"
+            return
+        self.form[k] = "stiff" if self.g.law[k] == "modelica" and damper > spring else "press"
+        self.sign[k] = side if spring + damper >= 0 else -side
+        if not overlap:
+            self.happened("closed", k)
 
-    def part(self, form: str) -> None:
-        self.contacts[-1].end = self.t
-        self.mode.form = form
-        self.happened("opened")
-        if form == "open":
-            self.release()
+    def strike(self, k: int, v: float) -> None:
+        """An impact of a rigid gap."""
+        J = self.g.J
+        impulse = (1 + self.g.restitution[k]) * v / (1 / J[k] + 1 / J[k + 1])
+        self.y[self.n - 1 + k] -= impulse / J[k]
+        self.y[self.n + k] += impulse / J[k + 1]
+        self.happened("impact", k)
+        for i in (k, k + 1):
+            direction = np.sign(self.y[self.n - 1 + i])
+            if self.rubs[i] and direction != self.direction[i]:
+                if self.direction[i] != 0:
+                    self.happened("load-stops" if self.g.reactive[i] else "gear-holds", i)
+                self.happened("load-starts" if self.g.reactive[i] else "gear-lets-go", i)
+                self.direction[i] = direction
 
-    def release(self) -> None:
-        self.y[0] = self.mode.side * self.drive.gap / 2
-        self.mode.side, self.mode.form = 0, "open"
-
-    def begin_move(self, direction: int) -> None:
-        self.mode.direction = direction
-        self.happened("load-starts")
-
-    def apply(self, name: str) -> None:
+    def apply(self, name: str, k: int) -> None:
         if name in ("upper", "lower"):
-            self.touch(1 if name == "upper" else -1)
+            self.touch(k, 1.0 if name == "upper" else -1.0)
         elif name in ("leave", "drop"):
-            self.part("open" if name == "leave" else "loose")
+            self.happened("opened", k)
+            overlap = self.side[k] * self.y[k] - 0.5 * self.g.gap[k]
+            self.form[k] = "loose" if name == "drop" and overlap > 0 else "open"
+            if name == "leave":
+                self.y[k] = self.side[k] * 0.5 * self.g.gap[k]
         elif name == "pass":
-            self.release()
+            self.form[k] = "open"
+            self.y[k] = self.side[k] * 0.5 * self.g.gap[k]
         elif name == "rejoin":
-            self.mode.form = "press"
-            self.contacts.append(Contact(self.mode.side, self.t, peak_time=self.t))
-            self.happened("closed")
+            self.form[k] = "press"
+            self.sign[k] = self.side[k]
+            self.happened("closed", k)
         elif name in ("stiffen", "soften"):
-            self.mode.form = "stiff" if name == "stiffen" else "press"
+            self.form[k] = "stiff" if name == "stiffen" else "press"
         elif name == "stop":
-            self.y[2], self.mode.direction = 0.0, 0
-            self.happened("load-stops")
+            self.y[self.n - 1 + k] = 0.0
+            self.happened("load-stops" if self.g.reactive[k] else "gear-holds", k)
+            self.direction[k] = 0.0
+        elif name in ("forward", "back"):
+            self.direction[k] = 1.0 if name == "forward" else -1.0
+            self.happened("load-starts" if self.g.reactive[k] else "gear-lets-go", k)
         elif name == "let go":
-            self.mode.held = False
-            self.happened("released")
-            self.stand_or_slide(0.0)
-        elif name == "motor stop":
-            self.y[1] = -self.y[2]
-            self.happened("motor-stops")
-            self.stand_or_slide(0.0)
-        elif name.startswith("motor"):
-            self.slide(1 if name.endswith("forward") else -1)
-        elif name.startswith("break"):
-            self.begin_move(1 if name.endswith("forward") else -1)
-        else:
-            self.target = None
-            self.happened("target")
-
-    def stand_or_slide(self, w1: float) -> None:
-        """The friction of the motor opposes its speed, or holds it."""
-        if self.drive.friction > 0.0 and not self.mode.held:
-            self.mode.rubs, self.mode.stuck = int(np.sign(w1)), w1 == 0.0
-
-    def slide(self, direction: int) -> None:
-        self.mode.stuck, self.mode.rubs = False, direction
-        self.happened("motor-starts")
-
-    def settle(self) -> None:
-        """Changes that follow at once from where the drive is: flank touched, stuck mass overcome."""
-        self.release_if_due()
-        if self.mode.form == "open":
-            grows = bends = 0.0
-            if not self.mode.held and not self.mode.stuck:
-                grows = self.path.torque(self.t, self.span)[1]
-                if self.path.lag > 0.0:  # a ramp behind a lag begins with u = u' = 0
-                    bends = (self.span[3] - grows) / self.path.lag
-            changes = (self.y[1], self.rhs()(self.t, self.y)[1], grows, bends)
-            heading = next((x for x in changes if x != 0), 0.0)
-            for side in (1, -1):
-                if side * self.y[0] >= self.drive.gap / 2 and side * heading > 0:
-                    self.touch(side)
-                    break
-        if self.mode.direction == 0 and abs(self.torque()) > self.drive.Mc:
-            self.begin_move(1 if self.torque() > 0 else -1)
-        self.release_if_due()
-        pushed = self.path.torque(self.t, self.span)[0] - self.torque()
-        if self.mode.stuck and abs(pushed) > self.drive.friction:
-            self.slide(1 if pushed > 0 else -1)
-
-    def release_if_due(self) -> None:
-        """Torque proved, or the instant has come."""
-        proved = math.isinf(self.held_until) and self.path.torque(self.t, self.span)[0] >= self.torque()
-        if self.mode.held and (proved or self.t >= self.held_until):
-            self.apply("let go")
-
-    def note_torque(self) -> None:
-        T = self.torque()
-        if self.mode.form in ("press", "stiff") and abs(T) > abs(self.contacts[-1].peak):
-            self.contacts[-1].peak, self.contacts[-1].peak_time = T, self.t
-        if abs(T) > self.peak:
-            self.peak, self.peak_time = abs(T), self.t
+            self.held = False
+            self.direction[k] = 0.0 if self.rubs[k] else 1.0
+            self.happened("released", k)
+        elif name == "turn":
+            self.sign[k] = -self.sign[k]
+        elif name == "target":
+            self.target = math.inf
+            self.happened("target", k)
 
     # ---- time ----
 
-    def begin(self) -> None:
-        theta, w2 = float(self.y[0]), float(self.y[2])
-        self.mode.direction = int(np.sign(w2)) if self.drive.reactive else 1
-        if abs(theta) > self.drive.gap / 2:
-            self.touch(1 if theta > 0 else -1, overlap=True)
-        if self.target is not None and w2 >= self.target:
-            self.apply("target")
-
-    def go(self) -> Start:
-        self.begin()
+    def go(self) -> ChainOracle:
         for span in self.path.spans:
             self.span = span
-            while span[1] - self.t > 1e-14 * span[1]:  # an event may fall on the border
-                self.settle()
-                self.note_torque()
-                self.run_mode()
-        u, y = float(self.path.torque(self.path.t_end, self.span)[0]), self.y.tolist()
-        theta = y[0] + self.mode.side * self.drive.gap / 2
-        work = (y[4], y[5], y[6]) if self.energy else None
-        return Start(
-            self.peak,
-            self.peak_time,
-            self.events,
-            self.contacts,
-            theta,
-            y[1] + y[2],
-            y[2],
-            y[3],
-            u,
-            self.torque(),
-            work,
-        )
+            while span[1] - self.t > 1e-14 * span[1]:
+                self.leap()
+                self.leaps += 1
+                if self.leaps > 4 * self.most:
+                    raise RuntimeError("too many changes of mode")
+        self.set_mode()
+        self.theta, self.w = self.y[: self.n - 1], self.y[self.n - 1 : 2 * self.n - 1]
+        self.T = self.torques(self.y)
+        return self
 
-    def run_mode(self) -> None:
+    def note(self, y: np.ndarray) -> None:
+        T = self.torques(y)
+        self.peaks = np.where(np.abs(T) > np.abs(self.peaks), T, self.peaks)
+
+    def leap(self) -> None:
         """Go on in the present mode until an event changes it or the torque span ends."""
-        rhs, end = self.rhs(), self.span[1]
-        if self.mode.held:
-            end = min(end, self.held_until)
-        names, functionals = self.event_functionals()
-        slope = self.slope_functional()
-        size = np.abs(functionals[:, :3]) @ self.scale + np.abs(functionals[:, 4])
-        before = self.values(functionals, np.array([self.t]), self.y[:, None])[:, 0]
-        waiting = np.abs(before) <= 1e-13 * size  # just fired, or exactly on its border
+        self.set_mode()
+        self.note(self.y)
+        end = self.span[1]
+        inputs = self.inputs(self.t, self.y)
+        before = self.E @ self.y + self.F @ inputs
+        rounding = 1e-11 * (np.abs(self.E) @ np.abs(self.y) + np.abs(self.F) @ np.abs(inputs))
+        bends = np.array([name == "bend" for name, _ in self.names], bool)  # begin positive without harm
+        if self.held and math.isfinite(self.release):
+            if self.t >= self.release:
+                self.apply("let go", self.g.motor)
+                return
+            end = min(end, self.release)
+        for i in np.flatnonzero(~bends):
+            # as friction overcome by a torque that has jumped
+            if before[i] > rounding[i] or (self.names[i][0] == "let go" and before[i] >= 0):
+                self.apply(*self.names[i])
+                return
+        waiting = np.abs(before) <= rounding
         before[waiting] = 0.0
-        h = min(1e-4 * self.period, end - self.t)
         solver = DOP853(
-            rhs, self.t, self.y, end, max_step=self.period / 8, rtol=self.rtol, atol=self.atol, first_step=h
-        )
-        fractions, slope_before = FIRST_STEP, 0.0
-        drift = self.drift(functionals, self.t, np.asarray(rhs(self.t, self.y)))
+            self.rhs, self.t, self.y, end, max_step=self.period / 6, rtol=self.rtol,
+            atol=self.rtol * 1e-2 * self.size, first_step=min(1e-4 * self.period, end - self.t),
+        )  # fmt: skip
+        fractions = FIRST_STEP
         while solver.status == "running":
             t_old, y_old = solver.t, solver.y
-            message = solver.step()
+            solver.step()
             if solver.status == "failed":
-                raise RuntimeError(f"DOP853 failed at t = {t_old}: {message}")
-            dense = solver.dense_output()
+                raise RuntimeError(f"DOP853 failed at t = {t_old}")
+            step = Step(self, t_old, y_old, solver.dense_output())
             times = t_old + (solver.t - t_old) * fractions
             times[-1] = solver.t
-            states = dense(times)
-            values = self.values(functionals, times, states)
-            step = _Step(rhs, t_old, y_old, dense, self)
+            grid = np.append(t_old, times)
+            states = np.column_stack([y_old, step.dense(times)])
+            values = self.E @ states + self.F @ self.inputs(grid, states)
+            values[:, 0] = before
             if fractions is FIRST_STEP:
-                at_once = waiting & np.all(values >= 0, axis=1) & (values[:, -1] > 0)
+                at_once = waiting & ~bends & np.all(values >= 0, axis=1) & (values[:, -1] > 0)
                 if np.any(at_once):
-                    self.apply(names[int(np.argmax(at_once))])
+                    self.apply(*self.names[int(np.argmax(at_once))])
                     return
-            found = None
-            history = np.column_stack([before, values])
-            grid = np.concatenate([[t_old], times])
-            rises = (history[:, :-1] < 0) & (history[:, 1:] >= 0)
-            for i in np.flatnonzero(rises.any(axis=1)):
-                k = int(np.argmax(rises[i]))
-                instant = step.root(functionals[i], grid[k], grid[k + 1])
-                if found is None or instant < found[0]:
-                    found = (instant, names[i])
-            # f may be above zero for a moment between two samples: then it has a maximum within the step
-            drift_before, drift = drift, self.drift(functionals, solver.t, solver.f)
-            tops = (drift_before > 0) & (drift < 0) & np.all(history < 0, axis=1)
-            tops &= before + drift_before * (solver.t - t_old) >= 0
-            for i in np.flatnonzero(tops):
-                top = step.top(functionals[i], solver.t)
-                if step.value(functionals[i], top, step.state(top)) >= 0:
-                    instant = step.root(functionals[i], t_old, top)
-                    if found is None or instant < found[0]:
-                        found = (instant, names[i])
-            if self.mode.form in ("press", "stiff"):
-                slopes = self.values(slope[None, :], times, states)[0]
-                bends = np.concatenate([[slope_before], slopes])
-                for k in np.flatnonzero(bends[:-1] * bends[1:] < 0):
-                    instant = step.root(slope, grid[k], grid[k + 1])
-                    if found is None or instant < found[0]:
-                        self.t, self.y = instant, step.state(instant)
-                        self.note_torque()
-                slope_before = slopes[-1]
-            if found is not None:
+            found = (math.inf, -1)
+            for i, j in step.crossings(values, upwards=True):
+                found = min(found, (step.root(self.E[i], self.F[i], grid[j], grid[j + 1]), i))
+            KA, KB = self.K @ self.A, self.K @ self.B
+            for i, j in step.crossings(KA @ states + KB @ self.inputs(grid, states), upwards=False):
+                when = step.root(KA[i], KB[i], grid[j], grid[j + 1])
+                if when < found[0]:
+                    self.note(step.state(when))
+            if found[1] >= 0:
                 self.t, self.y = found[0], step.state(found[0])
-                self.note_torque()
-                self.apply(found[1])
+                self.note(self.y)
+                self.apply(*self.names[found[1]])
                 return
             before, fractions = values[:, -1], LATER_STEPS
         self.t, self.y = end, solver.y.copy()
-        self.note_torque()
-
-    def drift(self, functionals: np.ndarray, t: float, rates: np.ndarray) -> np.ndarray:
-        """d/dt of the functionals, with the derivative of the state."""
-        du = self.path.torque(t, self.span)[1]
-        return np.asarray(functionals[:, :3] @ rates[:3] + functionals[:, 3] * du)
-
-    def values(self, functionals: np.ndarray, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        u = self.path.torque(times, self.span)[0] * np.ones_like(times)
-        return functionals[:, :3] @ states[:3] + np.outer(functionals[:, 3], u) + functionals[:, 4:]
+        self.note(self.y)
 
 
-class _Step:
-    """One accepted step, re-entered: states in it by a Runge-Kutta step of their own, and roots on them."""
+@dataclass
+class Step:
+    """One accepted step, entered again: states by a Runge-Kutta step of their own, and roots on them."""
 
-    def __init__(self, rhs: Any, t: float, y: np.ndarray, dense: Any, run: _Run):
-        self.rhs, self.t, self.y, self.dense, self.run = rhs, t, y, dense, run
+    run: ChainOracle
+    t: float
+    y: np.ndarray
+    dense: Any
 
     def state(self, t: float) -> np.ndarray:
         h = t - self.t
-        stages = np.zeros((DOP853.n_stages, len(self.y)))
+        stages = np.zeros((DOP853.n_stages, self.y.size))
         for i in range(DOP853.n_stages):
-            stages[i] = self.rhs(self.t + DOP853.C[i] * h, self.y + h * (DOP853.A[i, :i] @ stages[:i]))
-        return self.y + h * (DOP853.B @ stages)
+            stages[i] = self.run.rhs(self.t + DOP853.C[i] * h, self.y + h * (DOP853.A[i, :i] @ stages[:i]))
+        return np.asarray(self.y + h * (DOP853.B @ stages))
 
-    def value(self, functional: np.ndarray, t: float, y: np.ndarray) -> float:
-        u = self.run.path.torque(t, self.run.span)[0]
-        return float(functional[:3] @ y[:3] + functional[3] * u + functional[4])
+    @staticmethod
+    def crossings(values: np.ndarray, upwards: bool) -> list[tuple[int, int]]:
+        """Rows and the samples before which they first rise through zero; or those of each change of sign."""
+        if upwards:
+            rises = (values[:, :-1] < 0) & (values[:, 1:] >= 0)
+            return [(int(i), int(np.argmax(rises[i]))) for i in np.flatnonzero(rises.any(axis=1))]
+        return [(int(i), int(j)) for i, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0)]
 
-    def top(self, functional: np.ndarray, end: float) -> float:
-        """Where the functional, rising at the start of the step and falling at its end, is largest."""
+    def root(self, row: np.ndarray, by_input: np.ndarray, low: float, high: float) -> float:
+        """Where a row is zero: found on the interpolant, then on genuine steps, as it is of lower order."""
 
-        def drift(t: float) -> float:
-            rates = np.asarray(self.rhs(t, self.state(t)))
-            return float(self.run.drift(functional[None, :], t, rates)[0])
+        def value(t: float, y: np.ndarray) -> float:
+            return float(row @ y + by_input @ self.run.inputs(t, y))
 
-        if not drift(self.t) > 0 > drift(end):  # but for rounding
-            return end
-        return float(brentq(drift, self.t, end, xtol=1e-300, rtol=4 * np.finfo(float).eps))
-
-    def root(self, functional: np.ndarray, low: float, high: float) -> float:
         def interpolated(t: float) -> float:
-            return self.value(functional, t, self.dense(t))
+            return value(t, self.dense(t))
 
         at_low, at_high = interpolated(low), interpolated(high)
         if at_low * at_high < 0:
-            t = brentq(interpolated, low, high, xtol=1e-300, rtol=4 * np.finfo(float).eps)
+            t = float(brentq(interpolated, low, high, xtol=1e-300, rtol=PRECISE))
         else:
             t = low if abs(at_low) < abs(at_high) else high
-        for _ in range(4):
-            y = self.state(t)
-            rates, (_, du) = np.asarray(self.rhs(t, y)), self.run.path.torque(t, self.run.span)
-            gradient = float(functional[:3] @ rates[:3] + functional[3] * du)
-            change = -self.value(functional, t, y) / gradient if gradient != 0 else 0.0
+        near = 1e-4 * (high - low)
+        slope = (interpolated(t + near) - interpolated(t - near)) / (2 * near)
+        for _ in range(5):
+            change = -value(t, self.state(t)) / slope if slope else 0.0
             if not abs(change) <= 1e-3 * (high - low):  # a grazing root: the interpolant's is as good
                 break
             t += change
             if abs(change) <= 2e-16 * abs(t):
                 break
         return t
+
+
+# ---- a drive --------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Start:
+    """What became of the start of a drive."""
+
+    peak: float
+    events: list[tuple[float, str]]
+    theta: float
+    w1: float
+    w2: float
+    phi2: float
+    u: float
+    T: float
+
+
+def integrate(
+    *, J1: float, J2: float, c: float, d: float, gap: float, Mc: float, kind: str, law: str, theta0: float,
+    w1_0: float, w2_0: float, torque_pieces: list[Any], lag: float, rate: float, u0: float, t_end: float,
+    target: float | None = None, rtol: float = 1e-12, release: float = 0.0, friction: float = 0.0,
+    b1: float = 0.0, b2: float = 0.0,
+) -> Start:  # fmt: skip
+    """A start of two masses; `friction` is Coulomb friction of the motor, b1 and b2 viscous friction."""
+    one, two = np.full(1, c), np.array([J1, J2])
+    given = Given(
+        two, np.array([friction, Mc]), np.array([friction > 0.0, kind == "reactive"]), np.array([w1_0, w2_0]),
+        one, np.full(1, d), np.full(1, gap), [law], np.full(1, theta0), np.array([b1, b2]), [],
+        np.full(1, math.nan), 0,
+    )  # fmt: skip
+    path = TorquePath(torque_pieces, lag, rate, u0, t_end)
+    run = ChainOracle(given, path, math.inf if target is None else target, rtol, release, 5000).go()
+    events = [
+        (time, name.replace("load", "motor") if place == 0 else name) for time, name, place in run.events
+    ]
+    (theta, w1, w2, phi2), u = run.y.tolist(), float(path.torque(t_end, run.span)[0])
+    return Start(float(abs(run.peaks[0])), events, theta, w1, w2, phi2, u, float(run.T[0]))
+
+
+def random_case(rng: np.random.Generator) -> dict[str, Any]:
+    """Arguments of `integrate` for a start drawn at random, a few to ten elastic periods long."""
+
+    def decades(low: float, high: float) -> float:
+        return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+    J1 = decades(1e-3, 1e2)
+    J2 = J1 * decades(0.1, 100)
+    period, twist = decades(5e-3, 1.0), decades(1e-3, 0.3)  # twist: of the shaft under the starting torque
+    Omega = 2 * math.pi / period
+    c = Omega**2 * J1 * J2 / (J1 + J2)
+    zeta = 0.0 if rng.random() < 0.25 else float(rng.uniform(0, 1.5))
+    Ms, speed, t_end = c * twist, Omega * twist, period * float(rng.uniform(3, 10))
+    gap = 0.0 if rng.random() < 0.05 else twist * decades(1e-3, 100)
+    place = rng.random()
+    theta0 = 0.0 if place < 0.25 else gap * float(rng.uniform(-0.5, 0.5))
+    if place > 0.75:
+        theta0 = float(rng.choice([-1, 1])) * (gap / 2 + twist * float(rng.uniform(0, 2)))
+    w1, w2 = (0.0 if rng.random() < 0.5 else speed * float(rng.normal()) for _ in range(2))
+    starts = [0.0, *sorted(float(t) for t in rng.uniform(0, t_end, rng.integers(0, 4)))]
+    return {
+        "J1": J1, "J2": J2, "c": c, "d": 2 * zeta * c / Omega, "gap": gap,
+        "Mc": Ms * float(rng.uniform(0, 0.9)),
+        "kind": str(rng.choice(["active", "reactive"])),
+        "law": str(rng.choice(["no-pull", "dead-zone", "modelica"])),
+        "theta0": theta0, "w1_0": w1, "w2_0": w2,
+        "torque_pieces": [(t, Ms * float(rng.uniform(-0.3, 1.2))) for t in starts],
+        "lag": 0.0 if rng.random() < 0.5 else decades(2e-4, 2e-2),
+        "rate": math.inf if rng.random() < 0.5 else Ms / (period * decades(0.05, 3)),
+        "u0": 0.0 if rng.random() < 0.6 else Ms * float(rng.uniform(-0.3, 1.0)), "t_end": t_end,
+        "target": Ms / (J1 + J2) * t_end * float(rng.uniform(0.05, 0.8)),
+    }  # fmt: skip

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -27,10 +26,7 @@ def drawn() -> list[tuple[int, float]]:
 def test_the_suite_draws_the_same_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a module with other numbers was loaded in between, which hypothesis would try on its own."""
     before = drawn()
-    path = tmp_path / "numbers_beside.py"
-    path.write_text(f"NUMBERS = {list(range(1000, 1400))}\nSHARES = {[k / 1024 for k in range(1, 400)]}\n")
-    spec = importlib.util.spec_from_file_location("numbers_beside", path)
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "numbers_beside", module)
-    spec.loader.exec_module(module)
+    (tmp_path / "numbers_beside.py").write_text(f"NUMBERS = {list(range(1000, 1400))}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    import_module("numbers_beside")
     assert drawn() == before

@@ -13,23 +13,10 @@ from tests.oracle import Start, integrate, random_case
 from tests.oracle_torque import TorquePath
 
 CRANE: dict[str, Any] = {
-    "J1": 0.035,
-    "J2": 0.175,
-    "c": 368.465,
-    "d": 0.0,
-    "gap": 2.0,
-    "Mc": 7.16,
-    "kind": "active",
-    "law": "no-pull",
-    "theta0": 0.0,
-    "w1_0": 0.0,
-    "w2_0": 0.0,
-    "torque_pieces": [(0.0, 62.0)],
-    "lag": 0.0,
-    "rate": math.inf,
-    "u0": 0.0,
-    "t_end": 1.0,
-}
+    "J1": 0.035, "J2": 0.175, "c": 368.465, "d": 0.0, "gap": 2.0, "Mc": 7.16, "kind": "active",
+    "law": "no-pull", "theta0": 0.0, "w1_0": 0.0, "w2_0": 0.0, "torque_pieces": [(0.0, 62.0)], "lag": 0.0,
+    "rate": math.inf, "u0": 0.0, "t_end": 1.0,
+}  # fmt: skip
 
 
 def kinds(run: Start) -> list[str]:
@@ -43,35 +30,29 @@ def kinds(run: Start) -> list[str]:
         (-1.0, 336.94171218858844, 16, -0.99664341243459861),
     ],
 )
-@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
-def test_the_50_digit_anchors(law, theta0, peak, events, twist):
-    # rtol 1e-11 a step; about 100 steps and 10 impacts later the twist is good to some 1e-11
-    run = integrate(**{**CRANE, "theta0": theta0, "law": law})
+def test_the_50_digit_anchors(theta0, peak, events, twist):
+    # rtol 1e-12 a step; about 100 steps and 10 impacts later the twist is good to some 1e-11
+    run = integrate(**CRANE | {"theta0": theta0})
     assert run.peak == pytest.approx(peak, rel=1e-12)
     assert len(run.events) == events
     assert run.theta == pytest.approx(twist, abs=1e-10)
+    # energy: the constant torques work along the angles, the spring keeps what it is given
+    phi1, z = run.theta - theta0 + run.phi2, max(0.0, abs(run.theta) - 1.0)
+    kinetic = (0.035 * run.w1**2 + 0.175 * run.w2**2) / 2
+    assert kinetic + 368.465 * z**2 / 2 == pytest.approx(62.0 * phi1 - 7.16 * run.phi2, rel=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_energy_balance_and_finer_tolerance(seed):
+@pytest.mark.parametrize("seed", range(8))
+def test_a_finer_tolerance_changes_nothing(seed):
     case = random_case(np.random.default_rng(seed))
-    run, finer = integrate(**case), integrate(**case, rtol=1e-13, energy=True)
+    run, finer = integrate(**case, rtol=1e-11), integrate(**case, rtol=1e-13)
     assert kinds(run) == kinds(finer)
     assert run.peak == pytest.approx(finer.peak, rel=1e-10)
     for (t, _), (t_finer, _) in zip(run.events, finer.events, strict=True):
         assert t == pytest.approx(t_finer, abs=1e-9 * case["t_end"])
 
-    motor, shaft, load = finer.work
-    J1, J2 = case["J1"], case["J2"]
-    gained = (J1 * (finer.w1**2 - case["w1_0"] ** 2) + J2 * (finer.w2**2 - case["w2_0"] ** 2)) / 2
-    size = abs(motor) + abs(shaft) + abs(load) + abs(gained)
-    assert gained == pytest.approx(motor - shaft - load, abs=1e-11 * size)
-    if case["d"] == 0:  # then the shaft's work is the energy of the spring, whatever happened on the way
-        z0, z1 = (max(0.0, abs(theta) - case["gap"] / 2) for theta in (case["theta0"], finer.theta))
-        assert shaft == pytest.approx(case["c"] * (z1**2 - z0**2) / 2, abs=1e-11 * size)
 
-
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(6))
 def test_against_a_crude_stepper_without_events(seed):
     # The stepper is first order with 1e5 steps, so 1e-2 of the peak is its own error: this is about meaning.
     case = random_case(np.random.default_rng(1000 + seed)) | {"target": None}
@@ -112,21 +93,10 @@ def crude(case: dict[str, Any], steps: int) -> tuple[float, float, float]:
     return peak, theta, u
 
 
-def test_momentum_of_an_active_drive():
-    pieces = [(0.0, 62.0), (0.11, 20.0), (0.3, -15.0)]
-    run = integrate(
-        **CRANE | {"d": 2.0, "law": "dead-zone", "torque_pieces": pieces, "t_end": 0.5, "gap": 0.3}
-    )
-    impulse = 62 * 0.11 + 20 * 0.19 - 15 * 0.2 - 7.16 * 0.5
-    assert 0.035 * run.w1 + 0.175 * run.w2 == pytest.approx(impulse, rel=1e-11)
-
-
-@pytest.mark.parametrize(("lag", "rate"), [(0.02, 300.0), (0.02, math.inf), (0.0, 300.0), (3e-4, 2000.0)])
+@pytest.mark.parametrize(("lag", "rate"), [(0.02, 300.0), (0.02, math.inf), (0.0, 300.0)])
 def test_torque_path_solves_the_limiter_and_the_lag(lag, rate):
-    pieces = [(0.1, 50.0), (0.2, -10.0), (0.5, 40.0)]
-    path = TorquePath(pieces, lag, rate, 5.0, 1.0)
-    assert path.spans[0][0] == 0
-    assert path.spans[-1][1] == 1
+    path = TorquePath([(0.1, 50.0), (0.2, -10.0), (0.5, 40.0)], lag, rate, 5.0, 1.0)
+    assert (path.spans[0][0], path.spans[-1][1]) == (0.0, 1.0)
     u = 5.0
     for span, after in itertools.pairwise([*path.spans, None]):
         start, end, reference, slope, _ = span
@@ -144,40 +114,28 @@ def test_torque_path_solves_the_limiter_and_the_lag(lag, rate):
             assert reference + slope * (end - start) == pytest.approx(after[2], abs=1e-12)
 
 
-def test_gap_of_zero_and_a_load_of_its_own_is_a_linear_oscillator():
-    # gap 0, dead-zone: T = c theta + d v at all times, whatever events are passed
+def test_gap_of_zero_is_a_linear_oscillator():
     J1, J2, c, d = 0.4, 5.6, 5895.0, 20.0
-    run = integrate(
-        **CRANE
-        | {"J1": J1, "J2": J2, "c": c, "d": d, "gap": 0.0, "law": "dead-zone", "Mc": 0.0, "theta0": 0.01}
-        | {"torque_pieces": [(0.0, 0.0)], "t_end": 0.3}
-    )
+    changes = {"gap": 0.0, "law": "dead-zone", "Mc": 0.0, "theta0": 0.01, "torque_pieces": [(0.0, 0.0)]}
+    run = integrate(**CRANE | changes | {"J1": J1, "J2": J2, "c": c, "d": d, "t_end": 0.3})
     mass = J1 * J2 / (J1 + J2)
     decay = d / (2 * mass)
     w = math.sqrt(c / mass - decay**2)
     expected = 0.01 * math.exp(-decay * 0.3) * (math.cos(0.3 * w) + decay / w * math.sin(0.3 * w))
     assert run.theta == pytest.approx(expected, abs=1e-12)
     assert run.peak == pytest.approx(c * 0.01, rel=1e-12)
-    crossings = int(0.3 * w / math.pi + 0.5)
-    assert kinds(run) == ["opened", "closed"] * crossings
 
 
 def test_stuck_load_breaks_away_where_the_torque_passes_the_friction():
     run = integrate(**CRANE | {"kind": "reactive", "gap": 0.5, "t_end": 0.04})
     assert kinds(run) == ["closed", "load-starts"]
     closed, starts = (t for t, _ in run.events)
-    ws = math.sqrt(368.465 / 0.035)
     B = math.sqrt(0.5 * 62 / 0.035) * math.sqrt(368.465 * 0.035)
-    angle = ws * (starts - closed)
+    angle = math.sqrt(368.465 / 0.035) * (starts - closed)
     assert closed == pytest.approx(math.sqrt(0.5 * 0.035 / 62), rel=1e-12)
     assert 62 * (1 - math.cos(angle)) + B * math.sin(angle) == pytest.approx(7.16, rel=1e-9)
-
-
-def test_friction_above_the_torque_keeps_the_load_where_it_is():
-    run = integrate(**CRANE | {"kind": "reactive", "Mc": 300.0, "gap": 0.5, "t_end": 0.5})
-    assert run.w2 == 0
-    assert run.phi2 == 0
-    assert set(kinds(run)) == {"closed", "opened"}
+    held = integrate(**CRANE | {"kind": "reactive", "Mc": 300.0, "gap": 0.5, "t_end": 0.5})
+    assert (held.w2, held.phi2, set(kinds(held))) == (0.0, 0.0, {"closed", "opened"})
 
 
 def test_load_that_is_thrown_back_reverses_without_resting():
@@ -190,19 +148,15 @@ def test_load_that_is_thrown_back_reverses_without_resting():
 
 
 def test_start_on_a_flank():
-    assert kinds(integrate(**CRANE | {"theta0": 1.0, "t_end": 0.01})) == ["closed"]
-    assert integrate(**CRANE | {"theta0": 1.0, "t_end": 0.01}).events[0][0] == 0
-    assert kinds(integrate(**CRANE | {"theta0": -1.0, "t_end": 0.01})) == []
+    assert integrate(**CRANE | {"theta0": 1.0, "t_end": 0.01}).events == [(0.0, "closed")]
+    assert integrate(**CRANE | {"theta0": -1.0, "t_end": 0.01}).events == []
     # pushed into it from rest by a torque that only begins to grow
     growing = CRANE | {"theta0": 1.0, "kind": "reactive", "lag": 0.01, "t_end": 0.003}
     assert integrate(**growing).events[0] == (0.0, "closed")
-
-
-def test_start_in_contact_has_no_event_and_damping_acts_at_once():
-    run = integrate(**CRANE | {"theta0": 1.1, "d": 2.0, "w1_0": 5.0, "t_end": 1e-3})
-    assert kinds(run) == []
-    assert run.contacts[0].start == 0
-    assert run.peak >= 368.465 * 0.1 + 2 * 5
+    # in contact there is no event, and damping acts at once
+    pressed = integrate(**CRANE | {"theta0": 1.1, "d": 2.0, "w1_0": 5.0, "t_end": 1e-3})
+    assert pressed.events == []
+    assert pressed.peak >= 368.465 * 0.1 + 2 * 5
 
 
 def test_no_pull_flank_lets_go_with_overlap_and_takes_hold_again():
@@ -210,28 +164,25 @@ def test_no_pull_flank_lets_go_with_overlap_and_takes_hold_again():
     pieces = [(0.0, 62.0), (0.3, -400.0), (0.301, 300.0)]
     run = integrate(**CRANE | {"d": 12.0, "theta0": 1.0, "torque_pieces": pieces, "t_end": 0.35})
     assert kinds(run) == ["closed", "opened", "closed"]
-    opened, closed = run.events[1][0], run.events[2][0]
-    assert 0.3 < opened < closed
+    closed = run.events[2][0]
+    assert 0.3 < run.events[1][0] < closed
     held = integrate(**CRANE | {"d": 12.0, "theta0": 1.0, "torque_pieces": pieces, "t_end": closed})
     assert held.theta > 1.0
     assert pytest.approx(0.0, abs=1e-9) == held.T
 
 
-def test_dead_zone_pulls_and_the_contact_keeps_the_sign():
-    pieces = [(0.0, 62.0), (0.3, -600.0)]
-    run = integrate(
-        **CRANE | {"d": 6.0, "law": "dead-zone", "theta0": 1.0, "torque_pieces": pieces, "t_end": 0.305}
-    )
-    assert kinds(run) == ["closed", "opened"]
-    assert run.contacts[0].peak < 0
-    assert run.peak == -run.contacts[0].peak
-    assert run.peak_time == run.contacts[0].end  # the pull is strongest as it lets go
-
-
-def test_modelica_law_limits_damping_by_the_spring():
+def test_dead_zone_pulls_and_modelica_limits_damping_by_the_spring():
+    pulled = CRANE | {
+        "d": 6.0,
+        "law": "dead-zone",
+        "theta0": 1.0,
+        "torque_pieces": [(0.0, 62.0), (0.3, -600.0)],
+    }
+    opened = integrate(**pulled | {"t_end": 0.305}).events[1]
+    assert opened[1] == "opened"
+    assert integrate(**pulled | {"t_end": opened[0] * (1 - 1e-9)}).T < -10.0
     hard = CRANE | {"d": 6.0, "law": "modelica", "t_end": 0.034}
-    closing = integrate(**hard).events[0][0]
-    just_in = integrate(**hard | {"t_end": closing + 1e-5})
+    just_in = integrate(**hard | {"t_end": integrate(**hard).events[0][0] + 1e-5})
     assert pytest.approx(2 * 368.465 * (just_in.theta - 1.0), rel=1e-12) == just_in.T
 
 
@@ -240,5 +191,4 @@ def test_mirror_image():
     mirrored = case | {"theta0": -0.1, "w1_0": -3.0, "w2_0": -1.0, "torque_pieces": [(0.0, -62.0)]}
     run, image = integrate(**case), integrate(**mirrored)
     assert run.events == image.events
-    assert image.theta == -run.theta
-    assert [contact.peak for contact in image.contacts] == [-contact.peak for contact in run.contacts]
+    assert (image.theta, image.peak) == (-run.theta, run.peak)

@@ -1,8 +1,7 @@
-"""Finding controllers, plain controllers, and what happens when one misbehaves."""
+"""Finding controllers and entry points, plain controllers, and what happens when one misbehaves."""
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
@@ -12,9 +11,18 @@ from typing import Any
 
 import pytest
 
-from softstart import Command, Drive, InputError, Measured, PlainController, Sensor, SimulationError, simulate
+from softstart import (
+    Command,
+    Drive,
+    InputError,
+    Measured,
+    PlainController,
+    Sensor,
+    SimulationError,
+    plugins,
+    simulate,
+)
 from softstart.controller import (
-    compiled_step,
     controller_class,
     controller_names,
     make_controller,
@@ -22,24 +30,14 @@ from softstart.controller import (
 )
 
 CRANE = Drive.load("crane-4amtkf")
-ALL = {
-    "direct",
-    "reduced-first-stage",
-    "reduced-two-stage",
-    "acceleration-delay",
-    "current-limit-feedback",
-    "ramp",
-    "s-curve",
-}
-NEEDY = {"profile"}  # run only when they are given something
 
 
 def test_the_strategies_are_found() -> None:
-    assert set(controller_names()) >= ALL | NEEDY
-    assert set(ready_controller_names()) >= ALL
-    assert not NEEDY & set(ready_controller_names())
-    for name in ALL | NEEDY:
-        assert controller_class(name).name == name
+    """All but those that need something given run at once, each under its own name."""
+    names, ready = set(controller_names()), set(ready_controller_names())
+    assert names - ready == {"profile"}
+    assert {"direct", "acceleration-delay", "current-limit-feedback", "s-curve"} <= ready
+    assert all(controller_class(name).name == name for name in names)
 
 
 LOOSE = """
@@ -86,12 +84,6 @@ def loose(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_loose_file_works_without_numba(loose: Path) -> None:
-    run = simulate(CRANE, f"{loose}:Mine")
-    assert run.k_dyn == simulate(CRANE, "direct").k_dyn
-    assert run.controller.name == "mine"
-
-
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -101,7 +93,6 @@ def test_a_loose_file_works_without_numba(loose: Path) -> None:
         ("{}", "say which class"),
         ("nowhere.py:Mine", "nowhere.py: there is no such file"),
         ("dirct", 'did you mean "direct"'),
-        ("xyz", "softstart controllers"),
         ("", "no controller of this name"),
     ],
 )
@@ -110,17 +101,6 @@ def test_wrong_names(loose: Path, name: str, words: str) -> None:
         make_controller(name.format(loose))
     assert len(caught.value.sentences) == 1
     assert words in caught.value.sentences[0]
-
-
-def test_the_module_of_a_file_is_named_by_its_content(loose: Path) -> None:
-    # not by a hash that differs between processes: compiled steps on disk look for their module by name
-    there = loose.parent / "elsewhere" / loose.name
-    there.parent.mkdir()
-    there.write_bytes(loose.read_bytes())
-    name = controller_class(f"{loose}:Mine").__module__
-    assert controller_class(f"{there}:Mine").__module__ == name
-    there.write_text(loose.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
-    assert controller_class(f"{there}:Mine").__module__ != name
 
 
 def test_a_file_that_does_not_run(tmp_path: Path) -> None:
@@ -135,9 +115,7 @@ def test_a_file_that_does_not_run(tmp_path: Path) -> None:
     [
         (Command(float("nan")), SimulationError, "NaN or with a past instant"),
         (Command(1.0, 0.0), SimulationError, "NaN or with a past instant"),
-        (Command(1.0, float("nan")), SimulationError, "NaN or with a past instant"),
         (None, InputError, "answer with Command"),
-        (("a", 1.0, ()), InputError, "answer with Command"),
     ],
 )
 def test_a_controller_that_answers_nonsense(answer: object, error: type[Exception], words: str) -> None:
@@ -189,49 +167,7 @@ def test_what_is_not_declared_is_not_seen() -> None:
     assert contact in [m.time for m in seen]  # asked at the very instant of contact
 
 
-def test_the_encoder_counts_and_the_torque_is_the_realised_one() -> None:
-    seen: list[Measured] = []
-
-    class Watch(PlainController):
-        name = "watch"
-
-        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
-            seen.append(measured)
-            return Command(100.0, measured.time + 0.001)  # above the largest torque, 64 N m
-
-    drive = CRANE.replace(torque_lag=0.002, encoder_lines=1024)
-    run = simulate(drive, Watch(), until=0.05)
-    count = 2 * 3.141592653589793 / 4096
-    states = run.at([m.time for m in seen])
-    for i, m in enumerate(seen):
-        assert abs(m.motor_angle - states["phi1"][i]) <= 0.5001 * count
-        assert m.motor_angle / count == pytest.approx(round(m.motor_angle / count), abs=1e-6)
-        assert m.motor_torque == pytest.approx(64.0 * -math.expm1(-m.time / 0.002), abs=1e-9)
-        if i:
-            before = seen[i - 1]
-            rate = (m.motor_angle - before.motor_angle) / (m.time - before.time)
-            assert m.motor_speed == pytest.approx(rate, abs=1e-9)
-
-
-def test_a_step_compiled_before_the_interface_changed_is_compiled_again(tmp_path: Path) -> None:
-    """Its file has not changed, but the indices in it have: numba would go on with the old ones."""
-    source = tmp_path / "own.py"
-    kept = tmp_path / "__pycache__"
-    kept.mkdir()
-    source.write_text(
-        "def step(parameters, measured, state, command):\n    command[0] = 1.0\n", encoding="utf-8"
-    )
-    (kept / "own.step-1.py311.nbi").write_bytes(b"")
-    (kept / "other.step-1.py311.nbi").write_bytes(b"")
-    for path in kept.iterdir():
-        os.utime(path, (0.0, 0.0))
-    space: dict[str, Any] = {}
-    exec(compile(source.read_text(encoding="utf-8"), str(source), "exec"), space)
-    compiled_step(space["step"])
-    assert not any(path.stat().st_mtime == 0.0 for path in kept.glob("own.*"))
-    assert (kept / "other.step-1.py311.nbi").exists()
-
-
+@pytest.mark.slow
 def test_a_compiled_step_notices_a_change_in_what_it_calls(tmp_path):
     (tmp_path / "helper_of_a_step.py").write_text(
         "from numba import njit\n\n@njit(cache=True)\ndef answer():\n    return 10.0\n"
@@ -258,3 +194,23 @@ def test_a_compiled_step_notices_a_change_in_what_it_calls(tmp_path):
     later = time.time() + 5.0
     os.utime(helper, (later, later))
     assert run() == "25.0"
+
+
+TABLE = '[tool.softstart.entry-points."softstart.test-group"]\nown = "math:pi"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ('[project]\nname = "softstart"\n' + TABLE, ["own"]),
+        ('[project]\nname = "another"\n' + TABLE, []),  # above an installed package
+        (None, []),
+    ],
+)
+def test_a_checkout_registers_what_its_project_file_names(tmp_path, monkeypatch, request, text, names):
+    request.addfinalizer(plugins.registered.cache_clear)
+    plugins.registered.cache_clear()
+    if text is not None:
+        (tmp_path / "pyproject.toml").write_text(text)
+    monkeypatch.setattr(plugins, "CHECKOUT", tmp_path / "pyproject.toml")
+    assert list(plugins.registered("softstart.test-group")) == names

@@ -16,7 +16,7 @@ from softstart import Drive, Identification, InputError, Log, compare, identify,
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.identification.fitting import Fitter, Point, Sizes
-from softstart.identification.model import FILTER, LogModel, edges, filtered
+from softstart.identification.model import FILTER, LogModel, filtered
 from softstart.identification.planning import Bench, Experiment, Plan, made_up_log, steps_of
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
@@ -74,43 +74,28 @@ def test_a_measured_torque_is_joined_by_lines() -> None:
     assert speed == pytest.approx(cumulative_trapezoid(torque, time, initial=0.0) / 0.035, rel=1e-12)
 
 
-def test_a_torque_error_moves_the_signal_as_its_response_says(log: Log) -> None:
-    model = LogModel.of(log, TRUTH.replace(start_position="mid-gap"))
-    values = {"position": -0.6}
-    response = model.responses(values)
-    assert response.shape == (log.time.size, log.time.size)
-    error = 1e-3 * np.random.default_rng(1).standard_normal(log.time.size)
-    moved = played(log, log.torque + error, values)["phi"][:, 0]
-    moved = moved - played(log, log.torque, values)["phi"][:, 0]
-    assert response @ error == pytest.approx(moved, abs=2e-3 * float(np.max(np.abs(moved))))
-    assert np.all(np.triu(response, 1)[:-1] == 0.0)  # no error moves what came before it
-
-
-RUBBED = {"motor_friction": 1.0, "motor_viscous_friction": 0.02, "load_viscous_friction": 0.02}
+VISCOUS = {"motor_friction": 1.0, "motor_viscous_friction": 0.02, "load_viscous_friction": 0.02}
 
 
 @pytest.mark.parametrize(
-    ("changes", "values"),
+    ("kind", "changes", "values"),
     [
-        ({}, {}),
-        ({"torque_lag": 0.0}, {}),
-        ({"contact_law": "dead-zone"}, {}),
-        ({"contact_law": "modelica"}, {"gap": 0.02}),
-        ({"torque_rate": 2000.0}, {}),
-        ({"damping": 0.0, "load_kind": "active"}, {}),
-        ({"motor_friction": 5.0, "load_torque": 12.0}, {}),
-        (RUBBED, {}),
-        ({}, {"computing_delay": 1.7e-3}),
+        ("demand", {}, {"computing_delay": 1.7e-3}),
+        ("speed", {"torque_lag": 0.0}, {}),
+        ("measured", {"contact_law": "dead-zone"}, {}),
+        ("demand", {"contact_law": "modelica", "torque_rate": 2000.0}, {"gap": 0.02}),
+        ("measured", {"damping": 0.0, "load_kind": "active"}, {}),
+        ("demand", {"motor_friction": 5.0, "load_torque": 12.0}, {}),
+        ("speed", VISCOUS, {}),
     ],
 )
-@pytest.mark.parametrize("kind", ["demand", "measured", "speed"])
 def test_responses_to_torque_errors_are_those_of_finite_differences(
     log: Log, changes: dict[str, Any], values: dict[str, float], kind: str
 ) -> None:
     """Across impacts, parting flanks, breakaway and stops of load and motor."""
-    time = log.time[::2]
+    time = log.time[::3]
     signal: dict[str, Any] = {"speed" if kind == "speed" else "angle": time**2.1}
-    blank = Log(time, log.torque[::2], torque_is="measured" if kind == "measured" else "demand", **signal)
+    blank = Log(time, log.torque[::3], torque_is="measured" if kind == "measured" else "demand", **signal)
     model = LogModel.of(blank, TRUTH.replace(**changes, start_position="mid-gap"))
     values = {"position": -0.6} | values | ({"speed_filter": 3e-3} if kind == "speed" else {})
     response = model.responses(values)
@@ -121,37 +106,6 @@ def test_responses_to_torque_errors_are_those_of_finite_differences(
     assert response == pytest.approx(np.array(differences).T, abs=1e-6 * float(np.max(np.abs(response))))
 
 
-@pytest.mark.parametrize(
-    ("counts", "exponent"),
-    [(3.0, 1.0), (12.0, 1.0), (40.0, 1.0), (3.0, 2.0), (12.0, 2.0), (40.0, 2.0), (97.0, 2.0), (700.0, 2.0)],
-)
-def test_a_fit_to_rounded_angles_scatters_as_its_weights_say(counts: float, exponent: float) -> None:
-    """Of an offset and a speed or an acceleration, in 100 samples over this many counts.
-
-    Not so where each sample is just one count further than the last: the errors then are one slow sawtooth.
-    Only a constant speed keeps that up, and a torque error ends it.
-    """
-    time = np.linspace(0.0, 1.0, 100)
-    generator, found, predicted, errors = np.random.default_rng(0), [], [], []
-    for _ in range(400):
-        angle = counts * generator.uniform(0.97, 1.03) * time**exponent
-        phase = generator.uniform()
-        told, variance = edges(time, np.floor(angle + phase), 1.0)
-        rows = np.isfinite(variance)
-        shapes = np.column_stack([np.ones(100), time**exponent])[rows]
-        root = np.sqrt(variance[rows])
-        weighted = shapes / root[:, None]
-        covariance = np.linalg.inv(weighted.T @ weighted)
-        errors.append((told - angle - phase + 0.5)[rows] / root)
-        found.append(covariance @ weighted.T @ errors[-1])
-        predicted.append(np.diag(covariance))
-    square, mean = np.mean(np.square(found), axis=0), np.mean(predicted, axis=0)
-    assert np.all(square < 1.2 * mean)  # of 400
-    if counts > 100.0:  # each sample has a count of its own: nothing is given away
-        assert np.mean(np.square(np.concatenate(errors))) > 0.95
-        assert np.all(square > 0.75 * mean)
-
-
 def fit_of(log: Log, drive: Drive, position: float, offset: float) -> tuple[Fitter, Vector]:
     """The fit of a log, and its numbers at the true drive."""
     unknowns = unknowns_of(NAMES, drive, [log], [True])
@@ -160,7 +114,7 @@ def fit_of(log: Log, drive: Drive, position: float, offset: float) -> tuple[Fitt
     return Fitter([LogModel.of(log, drive.replace(start_position="mid-gap"))], unknowns), np.array(x)
 
 
-@pytest.mark.parametrize(("experiment", "lines"), [("start", 64.0), (REVERSE, 64.0), (REVERSE, 1024.0)])
+@pytest.mark.parametrize(("experiment", "lines"), [("start", 64.0), (REVERSE, 1024.0)])
 def test_the_truth_is_as_likely_as_the_covariance_says(experiment: str, lines: float) -> None:
     """Of 16 logs of 4 ms: weighted squares, and what the best linear step takes off them, are chi-square."""
     drive = TRUTH.replace(encoder_lines=lines)
@@ -197,6 +151,7 @@ def test_a_filter_of_the_speed_is_exact_for_lines() -> None:
 # ---- the fit --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_parameter_is_found_from_a_guess_off_by_factors(found) -> None:  # type: ignore[no-untyped-def]
     assert found.agreed >= 2
     for name in NAMES:
@@ -210,12 +165,14 @@ def test_every_parameter_is_found_from_a_guess_off_by_factors(found) -> None:  #
     assert len(found.notes) == 1  # only that the scale of the torque cannot be found
 
 
+@pytest.mark.slow
 def test_values_do_not_depend_on_the_guess(found, log: Log) -> None:  # type: ignore[no-untyped-def]
     other = identify(log, TRUTH.replace(gap=0.04, stiffness=700.0, load_inertia=0.1), searches=3)
     for name in NAMES:
         assert other[name].value == pytest.approx(found[name].value, rel=0.1 * found[name].half_width)
 
 
+@pytest.mark.slow
 def test_a_speed_of_encoder_differences_tells_what_the_angle_tells(found) -> None:  # type: ignore[no-untyped-def]
     speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
     other = identify(speed, GUESS, searches=3)
@@ -225,6 +182,7 @@ def test_a_speed_of_encoder_differences_tells_what_the_angle_tells(found) -> Non
         assert other[name].half_width == pytest.approx(found[name].half_width, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_other_units_of_torque_scale_what_they_must_and_nothing_else(found, log: Log) -> None:  # type: ignore[no-untyped-def]
     off = 0.9
     low = identify(Log(log.time, off * log.torque, angle=log.values, torque_is="demand"), GUESS, searches=3)
@@ -250,15 +208,11 @@ def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> 
     assert alone["motor_inertia"].known
 
 
-RUBBED = TRUTH.replace(motor_friction=1.0)
-
-
-@pytest.fixture(scope="module")
-def rubbed() -> Log:
-    return made_up_log(RUBBED, REVERSE, log_period=2e-3, ripple=1.0, seed=7, position=0.2)
-
-
-def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it(rubbed: Log) -> None:
+@pytest.mark.slow
+def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it() -> None:
+    rubbed = made_up_log(
+        TRUTH.replace(motor_friction=1.0), REVERSE, log_period=2e-3, ripple=1.0, seed=7, position=0.2
+    )
     notes = identify(rubbed, TRUTH, searches=1).notes
     (note,) = [one for one in notes if "Coulomb friction of the motor" in one]
     assert "--free +motor.friction" in note
@@ -271,32 +225,6 @@ def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it(rubbed
     assert len(found.notes) == 1  # nothing is left that the model has not
 
 
-def test_friction_of_the_drive_is_found_where_nothing_is_said(rubbed: Log) -> None:
-    found = identify(rubbed, RUBBED.replace(motor_friction=4.0), searches=1)
-    assert found["motor_friction"].lower < 1.0 < found["motor_friction"].upper
-    assert found.drive.motor_friction == found["motor_friction"].value
-
-
-def test_friction_that_is_none_has_an_interval_from_zero(log: Log) -> None:
-    found = identify(log, TRUTH, free=["+motor_viscous_friction"], searches=1)
-    one = found["motor_viscous_friction"]
-    assert one.lower == 0.0
-    assert one.value < one.upper < 0.05
-
-
-@pytest.mark.parametrize(
-    ("free", "names"),
-    [
-        (["gap", "shaft.stiffness"], {"gap", "stiffness"}),
-        (["+load.viscous_friction"], {*NAMES, "load_viscous_friction"}),
-    ],
-)
-def test_parameters_are_named_as_in_the_file_and_a_plus_adds_one(
-    log: Log, free: list[str], names: set[str]
-) -> None:
-    assert {one.name for one in identify(log, TRUTH, free=free, searches=1).shared} == names
-
-
 @pytest.fixture(scope="module")
 def solved(log: Log) -> tuple[Fitter, Point]:
     """The most likely parameters of the log."""
@@ -305,7 +233,7 @@ def solved(log: Log) -> tuple[Fitter, Point]:
     return fitter, fitter.valued(best, best)
 
 
-@pytest.mark.parametrize("name", ["gap", "damping", "position"])
+@pytest.mark.parametrize("name", ["gap", "position"])
 def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(
     solved: tuple[Fitter, Point], name: str
 ) -> None:
@@ -321,47 +249,16 @@ def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(
         assert other.value - best.value == pytest.approx(fitter.threshold(best), rel=0.12)
 
 
-def test_the_slope_of_the_likelihood_is_that_of_differences(solved: tuple[Fitter, Point]) -> None:
-    """Each difference with all responses computed anew about the torque error that is most likely there."""
-    fitter, best = solved
-    residual, jacobian = best.white
-    deviations = np.sqrt(np.diag(fitter.covariance(best)))
-    exact = jacobian.T @ residual + best.drift
-    for i, move in enumerate(0.2 * deviations):
-        ahead, back = (
-            fitter.settled(best.x + sign * move * np.eye(exact.size)[i], best.errors, best.sizes).likelihood
-            for sign in (1.0, -1.0)
-        )
-        assert exact[i] * deviations[i] == pytest.approx(0.25 * (ahead - back) / 0.2, abs=0.01)
-
-
-def test_the_bias_by_the_torque_error_is_gone(solved: tuple[Fitter, Point]) -> None:
-    """The least squares with weights that do not move are 0.05 to 0.7 standard errors off."""
-    fitter, best = solved
-    plain, _ = fitter.step(best._replace(drift=np.zeros(best.x.size)))
-    shares = -plain / np.sqrt(np.diag(fitter.covariance(best)))
-    assert 0.05 < shares[0] < 0.7  # the motor's inertia, in standard errors
-    assert 0.02 < shares[1] < 0.7  # and that of the load
-
-
 @pytest.fixture(scope="module")
 def coarse() -> Log:
     return made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
 
 
-@pytest.mark.parametrize("other", ["clipped", "not realised", "cogging"])
-def test_where_another_machine_made_the_log_no_interval_is_stated(
-    coarse: Log, other: str, tmp_path: Path
-) -> None:
-    torque, angle = coarse.torque, coarse.values
-    if other == "clipped":
-        torque = np.clip(torque, -20.0, 25.0)
-    else:
-        waves = 9.0 * coarse.time if other == "not realised" else 5.0 * angle
-        resisting = 8.0 * np.sin(waves)
-        states = played(coarse, torque - resisting, {"position": -0.6})
-        angle = np.floor(states["phi"][:, 0] / coarse.count + 0.3) * coarse.count
-    found = identify(Log(coarse.time, torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
+def test_where_another_machine_made_the_log_no_interval_is_stated(coarse: Log, tmp_path: Path) -> None:
+    """One with a cogging torque."""
+    states = played(coarse, coarse.torque - 8.0 * np.sin(5.0 * coarse.values), {"position": -0.6})
+    angle = np.floor(states["phi"][:, 0] / coarse.count + 0.3) * coarse.count
+    found = identify(Log(coarse.time, coarse.torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
     assert not found.stated
     assert any("Something else moves this drive" in note for note in found.notes)
     assert any("no interval is stated" in note for note in found.notes)
@@ -383,18 +280,10 @@ def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None
     assert "at the limit of the search" in [cell for row in estimates_table(found).rows for cell in row]
 
 
-@pytest.mark.parametrize("wrong", [pytest.param("cut", marks=pytest.mark.slow), "rpm"])
-def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -> None:
-    kept = np.r_[0:150, 200 : log.time.size] if wrong == "cut" else np.arange(log.time.size)
-    time, torque = log.time[: kept.size], log.torque[kept]
-    if wrong == "cut":
-        bad = Log(time, torque, angle=log.values[kept], torque_is="demand")
-    else:
-        turned = played(log, log.torque, {"position": -0.6})["w"][:, 0]
-        bad = Log(time, torque, speed=turned * 30.0 / math.pi, torque_is="demand")
-    notes = identify(bad, TRUTH, searches=1).notes
-    told = "Something else moves this drive" if wrong == "cut" else "look at the units of the log"
-    assert any(told in note for note in notes)
+def test_a_wrong_unit_of_speed_is_noticed(log: Log) -> None:
+    turned = played(log, log.torque, {"position": -0.6})["w"][:, 0]
+    bad = Log(log.time, log.torque, speed=turned * 30.0 / math.pi, torque_is="demand")
+    assert any("look at the units of the log" in note for note in identify(bad, TRUTH, searches=1).notes)
 
 
 @pytest.mark.slow
@@ -415,21 +304,6 @@ def test_a_filtered_speed_is_named_or_found(log: Log) -> None:
 # ---- logs -----------------------------------------------------------------------------------------------
 
 
-def test_a_file_with_units_commas_and_other_names(log: Log, tmp_path: Path) -> None:
-    rows = [
-        f"{1e3 * t:.6f};{-u:.9f};{math.degrees(a):.12f}".replace(".", ",")
-        for t, u, a in zip(log.time, log.torque, log.values, strict=True)
-    ]
-    path = tmp_path / "inverter.csv"
-    path.write_text("\n".join(["t [ms];M_act [N*m];phi [deg]", *rows]), encoding="utf-8")
-    names = {"time": "t", "torque": "-M_act", "angle": "phi"}
-    read = Log.load(path, columns=names, torque_is="demand")
-    assert read.time == pytest.approx(log.time, abs=1e-9)
-    assert read.torque == pytest.approx(log.torque, abs=1e-8)
-    assert read.values == pytest.approx(log.values, abs=1e-12)
-    assert read.count == pytest.approx(2.0 * math.pi / 4096.0, rel=1e-6)
-
-
 def test_an_angle_may_wrap_and_lack_samples(log: Log) -> None:
     values = np.mod(log.values + 1.0, 2.0 * math.pi)
     values[50] = math.nan
@@ -446,12 +320,10 @@ def test_an_angle_may_wrap_and_lack_samples(log: Log) -> None:
         (lambda t, u, y: (t[::-1], u, y), "it must rise"),
         (lambda t, u, y: (t[:10], u[:10], y[:10]), "10 samples; a fit needs 30 or more"),
         (lambda t, u, y: (t, -u, y), "has the wrong sign"),
-        (lambda t, u, y: (t, 0.0 * u, y), "the torque is 0 in every sample"),
         (lambda t, u, y: (t, u, 0.0 * y), "the angle never changes"),
         (lambda t, u, y: (t[100:], u[100:], y[100:]), "begin the log at standstill"),
         (lambda t, u, y: (np.where(t > 0.3, t + 1.0, t), u, y), "there is no sample from"),
         (lambda t, u, y: (t, np.where((t > 0.1) & (t < 0.11), math.nan, u), y), "cut the log there"),
-        (lambda t, u, y: (t, u[:-1], y), "give one number a sample"),
     ],
 )
 def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -> None:  # type: ignore[no-untyped-def]
@@ -460,40 +332,23 @@ def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -
         Log(time, torque, angle=angle, torque_is="demand")
 
 
-def test_units_that_cannot_be_right_are_refused(log: Log) -> None:
-    slow = Log(1e3 * log.time, log.torque, angle=log.values, torque_is="demand")
-    with pytest.raises(InputError, match="look at the units"):
-        identify(slow, TRUTH)
-
-
-@pytest.mark.parametrize(
-    ("free", "sentence"),
-    [
-        (["gpa"], "did you mean gap"),
-        (["position"], "nothing to find"),
-        ([FILTER, "gap"], "an angle has no filter"),
-    ],
-)
-def test_what_cannot_be_found_is_refused(log: Log, free: list[str], sentence: str) -> None:
-    with pytest.raises(InputError, match=sentence):
-        identify(log, TRUTH, free=free)
-
-
-def test_a_lag_cannot_be_found_from_a_measured_torque(log: Log) -> None:
-    measured = Log(log.time, log.torque, angle=log.values)
-    with pytest.raises(InputError, match="log the demand"):
-        identify(measured, TRUTH, free=["gap", "torque_lag"])
+def test_what_cannot_be_found_is_refused(log: Log) -> None:
+    demand, measured, slow = (
+        Log(factor * log.time, log.torque, angle=log.values, torque_is=torque_is)  # type: ignore[arg-type]
+        for factor, torque_is in ((1.0, "demand"), (1.0, "measured"), (1e3, "demand"))
+    )
+    for each, free, sentence in (
+        (demand, ["gpa"], "did you mean gap"),
+        (demand, ["position"], "nothing to find"),
+        (demand, [FILTER, "gap"], "an angle has no filter"),
+        (measured, ["gap", "torque_lag"], "log the demand"),
+        (slow, None, "look at the units"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            identify(each, TRUTH, free=free)
 
 
 # ---- plans ----------------------------------------------------------------------------------------------
-
-
-def test_a_plan_tells_the_intervals_that_a_fit_then_has(found) -> None:  # type: ignore[no-untyped-def]
-    plan = plan_experiments(TRUTH, log_period="2 ms", ripple=1.0, optimise=False)
-    for name in NAMES:
-        assert plan[REVERSE].widths[name] == pytest.approx(found[name].half_width, rel=0.35)
-    assert math.isinf(plan["start"].widths["gap"])
-    assert plan["shaking"].travel < 0.1 * plan["start"].travel
 
 
 @pytest.fixture(scope="module")
@@ -524,21 +379,19 @@ def test_peak_and_travel_are_those_of_the_worst_position() -> None:
     """Torques under which a contact that is only just made has a peak a thousandth of the gap wide."""
     drive = random_unknown(7).replace(load_kind="reactive", load_torque=2.0)
     bench = Bench(drive, 1e-3, 1.0, NAMES[:5])
-    generator, missed = np.random.default_rng(7), 0.0
-    for _ in range(8):
-        durations = np.full(11, 0.8 * float(drive.elastic_period))
-        played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
-        places = np.concatenate([np.linspace(-1.0, 1.0, 3001), generator.uniform(-1.0, 1.0, 1000)])
-        found, coarse = bench.loads(*played, places), bench.loads(*played, np.linspace(-1.0, 1.0, 65))
-        for i, most in enumerate(bench.load(*played)):
-            assert 0.998 * most <= found[i].max() <= (1.0 + 1e-9) * most
-            missed = max(missed, 1.0 - float(coarse[i].max()) / most)
-    assert missed > 0.005  # an even grid would not do
+    generator = np.random.default_rng(9)
+    durations = np.full(11, 0.8 * float(drive.elastic_period))
+    played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
+    places = np.concatenate([np.linspace(-1.0, 1.0, 1501), generator.uniform(-1.0, 1.0, 500)])
+    found, coarse = bench.loads(*played, places), bench.loads(*played, np.linspace(-1.0, 1.0, 65))
+    most = bench.load(*played)
+    for i in range(len(most)):
+        assert 0.998 * most[i] <= found[i].max() <= (1.0 + 1e-9) * most[i]
+    assert max(1.0 - float(coarse[i].max()) / most[i] for i in range(len(most))) > 0.005  # of an even grid
 
 
-@pytest.mark.parametrize("load_kind", ["active", "reactive"])
-def test_peak_and_travel_are_those_of_a_simulation(load_kind: str) -> None:
-    drive = TRUTH.replace(load_kind=load_kind, start_position="mid-gap")
+def test_peak_and_travel_are_those_of_a_simulation() -> None:
+    drive = TRUTH.replace(start_position="mid-gap")
     bench = Bench(drive, 1e-3, 1.0, NAMES)
     profile, end = steps_of(np.full(4, 0.1), np.array([30.0, -20.0, -40.0, 25.0]))
     wide = drive.replace(minimum_torque=-100.0, maximum_torque=100.0)
@@ -563,37 +416,14 @@ def test_a_load_that_is_to_rest_does_not_move_at_all() -> None:
     made_up_log(TRUTH, one, log_period=8e-3, ripple=0.2)  # a log that `identify` would take
 
 
-@pytest.mark.slow
-def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_one(planned: Plan) -> None:
-    one, generator = planned["planned"], np.random.default_rng(7)
-    bench = Bench(TRUTH, 8e-3, 1.0, NAMES)
-    durations = np.full(9, one.end / 9.0)
-    scores = []
-    for _ in range(60):
-        levels = generator.uniform(-0.65, 1.0, 9) * float(TRUTH.Ms)
-        levels *= 0.999 * 70.0 / max(70.0, bench.load(*steps_of(durations, levels))[0])
-        other = bench.experiment("random", durations, levels)
-        scores.append(other.score if other.peak <= 70.0 else math.inf)
-    # a local optimum: draws may find another one, but few do
-    assert sum(score < one.score for score in scores) <= 2
-
-
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
         ({"wanted": ["gpa"]}, "did you mean gap"),
         ({"free": ["gap", "motor.friction"]}, "it is 0 in the drive; give a guess of it"),
-        ({"max_torque": "0.01 N*m"}, "raise the limit"),
-        ({"max_travel": 0.0}, "give a value above 0"),
+        pytest.param({"max_torque": "0.01 N*m"}, "raise the limit", marks=pytest.mark.slow),
     ],
 )
 def test_plans_that_cannot_be_are_refused(given: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         plan_experiments(TRUTH, log_period="8 ms", **given)
-
-
-def test_a_plan_tells_the_interval_of_friction(rubbed: Log) -> None:
-    plan = plan_experiments(RUBBED, log_period="2 ms", ripple=1.0, optimise=False)
-    one = identify(rubbed, RUBBED, searches=1)["motor_friction"]
-    assert plan[REVERSE].widths["motor_friction"] == pytest.approx(0.5 * (one.upper - one.lower), rel=0.4)
-    assert "motor_friction" not in plan_experiments(TRUTH, optimise=False)[REVERSE].widths

@@ -51,8 +51,7 @@ def logged(chain: Chain, drive: Drive) -> Log:
     return chain_log(chain, played).changed(torque=plan.torque)
 
 
-@pytest.mark.parametrize("torque_is", ["demand", "measured"])
-@pytest.mark.parametrize("signal", ["angle", "speed"])
+@pytest.mark.parametrize(("torque_is", "signal"), [("demand", "angle"), ("measured", "speed")])
 def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: str) -> None:
     drive = Drive.load("crane-4amtkf").replace(
         damping=0.3,
@@ -82,19 +81,11 @@ def test_a_chain_is_found_through_its_reduction() -> None:
     assert found.drive.name.endswith("reduced to two masses")
 
 
-@pytest.mark.parametrize("second", [0.005, 0.02, 0.04])
-def test_a_second_gap_at_a_light_mass_adds_to_the_first_and_does_no_harm_at_the_motor(second: float) -> None:
-    """Shafts behind the second gap have peaks of their own, up to 8 % larger."""
-    chain, drive = stiff_behind_the_gap(others=second), reduced_drive(stiff_behind_the_gap())
-    found = identify(logged(chain, drive), drive, searches=1)
-    assert found["gap"].value == pytest.approx(0.08 + second, rel=0.04)
-    for strategy in ("direct", "s-curve"):
-        of_motor = float(simulate(chain, strategy).k_dyns[0])
-        assert float(simulate(found.drive.design_drive, strategy).k_dyn) == pytest.approx(of_motor, rel=0.02)
-
-
-@pytest.mark.parametrize("light", [0.008, 0.016])  # a quarter and a half of the rotor
-@pytest.mark.parametrize("second", [0.005, 0.02, 0.04])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("second", "light"),  # a quarter and a half of the rotor
+    [(0.005, 0.016), (0.02, 0.008), (0.04, 0.008), (0.02, 0.016)],
+)
 def test_a_second_gap_at_a_middle_mass_is_noticed_or_does_no_harm_at_the_motor(
     second: float, light: float
 ) -> None:

@@ -12,19 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.patience import patient
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.parallel import (
     DiedError,
     Pool,
     Progress,
     Worker,
-    checked_workers,
     on_one_thread,
-    why_not_sendable,
 )
 
 HERE = Path(__file__).parent
@@ -62,16 +58,14 @@ def failing(kind: str) -> Any:
         raise LocalError("of a class that nobody else knows")
     if kind == "unsendable":
         return lambda: None
-    if kind == "exit":
-        os._exit(3)
     os.kill(os.getpid(), signal.SIGKILL)
     return None
 
 
 def sleeping(file: str) -> None:
-    other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
+    other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(600)"])
     Path(file).write_text(f"{os.getpid()} {other.pid}")
-    time.sleep(60)
+    time.sleep(600)
 
 
 def reporting(*, progress: Progress) -> str:
@@ -94,8 +88,9 @@ def alive(pid: int) -> bool:
         return False
 
 
-def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
-    latest = time.monotonic() + patient(seconds)
+def until(what: Callable[[], bool]) -> None:
+    """Wait for what comes on any machine: processes end that would else sleep for ten minutes."""
+    latest = time.monotonic() + 300.0
     while not what():
         assert time.monotonic() < latest
         time.sleep(0.01)
@@ -127,7 +122,6 @@ def test_a_worker_runs_functions_one_after_another(importable: Any) -> None:
         ("input", InputError, "gap = -1"),
         ("local", RuntimeError, "LocalError: of a class that nobody else knows"),
         ("unsendable", Exception, "lambda"),
-        ("exit", DiedError, "exit code 3"),
         ("kill", DiedError, "signal 9"),
     ],
 )
@@ -148,10 +142,8 @@ def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> N
     worker.submit(importable.sleeping, str(file))
     until(lambda: file.exists() and " " in file.read_text())
     pids = [int(word) for word in file.read_text().split()]
-    began = time.monotonic()
     worker.kill()
-    assert time.monotonic() - began < patient(1.0)
-    until(lambda: not any(map(alive, pids)), 1.0)
+    until(lambda: not any(map(alive, pids)))
 
 
 PARENT = """
@@ -161,7 +153,7 @@ import test_parallel
 from softstart.parallel import Worker
 worker = Worker()
 worker.submit(test_parallel.sleeping, sys.argv[2])
-time.sleep(60)
+time.sleep(600)
 """
 
 
@@ -174,12 +166,12 @@ def test_workers_end_with_a_parent_that_was_killed(tmp_path: Path) -> None:
         parent.kill()
         parent.wait()
     pids = [int(word) for word in file.read_text().split()]
-    until(lambda: not any(map(alive, pids)), 2.0)
+    until(lambda: not any(map(alive, pids)))
 
 
 def test_a_pool_tries_the_task_of_a_dead_process_once_more(importable: Any, tmp_path: Path) -> None:
     with Pool(2) as pool:
-        tasks = [str(tmp_path / name) for name in "abc"]
+        tasks = [str(tmp_path / name) for name in "ab"]
         assert sorted(pool.results(importable.dies_once, tasks)) == [(task, 7) for task in tasks]
         with pytest.raises(SimulationError, match=r"died 2 times \(signal 9\) while it computed kill"):
             list(pool.results(importable.failing, ["kill"]))
@@ -187,7 +179,6 @@ def test_a_pool_tries_the_task_of_a_dead_process_once_more(importable: Any, tmp_
 
 def test_a_pool_that_is_left_stops_what_runs(importable: Any, tmp_path: Path) -> None:
     files = [tmp_path / name for name in "ab"]
-    began = time.monotonic()
 
     def tasks() -> Any:
         yield from map(str, files)
@@ -196,18 +187,7 @@ def test_a_pool_that_is_left_stops_what_runs(importable: Any, tmp_path: Path) ->
 
     with Pool(2) as pool, pytest.raises(KeyboardInterrupt):
         list(pool.results(importable.sleeping, tasks()))
-    assert time.monotonic() - began < patient(20.0)
     assert not any(alive(int(file.read_text().split()[0])) for file in files)
-
-
-def test_numbers_of_workers() -> None:
-    assert checked_workers(3) == 3
-    assert checked_workers(None) >= 1
-    for wrong in (0, -1, 2.0, True, "2", 5000):
-        with pytest.raises(InputError, match=r"workers = .*whole number from 1 to 1024"):
-            checked_workers(wrong)
-    with pytest.raises(InputError, match="give one of the two"):
-        checked_workers(2, "tcp://x:1")
 
 
 def test_libraries_of_linear_algebra_compute_on_one_thread_and_then_as_before() -> None:
@@ -228,36 +208,17 @@ def test_a_command_has_set_one_thread_before_numpy_is_imported() -> None:
     assert told.stdout.split() == ["False", "1"]
 
 
-def test_what_another_process_cannot_load() -> None:
-    assert why_not_sendable(lambda: None)
-    assert why_not_sendable(Drive) == ""
-
-
-SCRIPTS = {
-    "tune a controller of its own": (
-        "from dataclasses import dataclass\n"
-        "from softstart import Command, PlainController, tune\n"
-        "@dataclass(frozen=True)\n"
-        "class Wait(PlainController):\n"
-        "    wait: float = 0.06\n"
-        "    def step(self, measured, state):\n"
-        "        return Command(15.0 if measured.time < self.wait else 62.0, measured.time + 0.005)\n"
-        "tuned = tune('crane-4amtkf', Wait(), ['1x'], ['1x', '2x'], free={'wait': (0.03, 0.1)},\n"
-        "             generations=2, population=5, restarts=1, certified=False)\n"
-        "print(tuned.robust.cells.k_dyn.size)\n"
-    ),
-    "sweep": (
-        "from softstart import sweep\n"
-        "print(sweep('crane-4amtkf', 'ramp', {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_a_plain_script_needs_no_guard(name: str, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_a_plain_script_needs_no_guard(tmp_path: Path) -> None:
+    """It may even make the controller that its workers play."""
     script = tmp_path / "mine.py"
-    script.write_text(SCRIPTS[name])
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False
+    script.write_text(
+        "from softstart import Command, PlainController, sweep\n"
+        "class Full(PlainController):\n"
+        "    def step(self, measured, state):\n"
+        "        return Command(62.0)\n"
+        "print(sweep('crane-4amtkf', Full(), {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
     )
+    line = [sys.executable, "-W", "error", str(script)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "2\n")

@@ -5,7 +5,6 @@ import math
 import subprocess
 import sys
 from decimal import Decimal
-from fractions import Fraction
 
 import numpy as np
 import pint
@@ -16,13 +15,9 @@ from hypothesis import strategies as st
 from softstart import quantities
 from softstart.errors import InputError
 from softstart.quantities import (
-    OTHER_NOUNS,
     QUANTITIES,
     TYPED,
-    nearest,
-    read_unit,
     shortest,
-    show,
     to_si,
     values_in,
     whole_number,
@@ -30,72 +25,40 @@ from softstart.quantities import (
 
 READ = [
     ("0.5", "rad", 0.5),
-    ("0.5 rad", "rad", 0.5),
     ("500mrad", "rad", 0.5),
     ("90 deg", "rad", math.pi / 2),
     ("90°", "rad", math.pi / 2),
     ("60 arcmin", "rad", math.pi / 180),
-    ("3600 arcsec", "rad", math.pi / 180),
-    ("0.25 turn", "rad", math.pi / 2),
     ("880 rpm", "rad/s", 880 * 2 * math.pi / 60),
-    ("880 r/min", "rad/s", 880 * 2 * math.pi / 60),
     ("0.88 krpm", "rad/s", 880 * 2 * math.pi / 60),
-    ("180 deg/s", "rad/s", math.pi),
-    ("2 turn/s", "rad/s", 4 * math.pi),
-    ("5 rad s-1", "rad/s", 5.0),
     ("5 rad·s⁻¹", "rad/s", 5.0),
     ("350 kg*cm^2", "kg*m^2", 0.035),
-    ("0.035 kg m2", "kg*m^2", 0.035),
     ("0.035 kg·m²", "kg*m^2", 0.035),
-    *((f"2 {one}", "kg*m^2", 2.0) for one in ("kgm2", "kgm²", "kg*m2", "kg-m2", "Nms²")),
+    *((f"2 {one}", "kg*m^2", 2.0) for one in ("kgm2", "kg-m2", "Nms²")),
     *((f"2 {one}", "kg*m^2", 2e-4) for one in ("kgcm2", "kgcm²")),
     *((f"2 {one}", "kg*m^2", 2e-7) for one in ("g*cm2", "gcm2")),
-    *(
-        (f"1460 {one}", "rad/s", 1460 * math.pi / 30)
-        for one in ("1/min", "min-1", "min⁻¹", "min^-1", "U/min")
-    ),
+    *((f"1460 {one}", "rad/s", 1460 * math.pi / 30) for one in ("1/min", "min⁻¹", "U/min")),
     ("0.1 kgf*m*s^2", "kg*m^2", 0.980665),
     ("2 N*m*s^2/rad", "kg*m^2", 2.0),
     ("62 N*m", "N*m", 62.0),
     ("62 Nm", "N*m", 62.0),
-    ("62 N.m", "N*m", 62.0),
-    ("62 N-m", "N*m", 62.0),
     ("0.062 kNm", "N*m", 62.0),
-    ("6200 Ncm", "N*m", 62.0),
     ("1.5 Nms/rad", "N*m*s/rad", 1.5),  # not the plural of Nm/rad
-    ("62 Nm/rad", "N*m/rad", 62.0),
     ("95 %", "1", 0.95),
-    ("1 kgf*m", "N*m", 9.80665),
     ("1 lbf*ft", "N*m", 1.3558179483314004),
-    ("3 J/rad", "N*m", 3.0),
     ("5 kgf*m/rad", "N*m/rad", 49.03325),
-    ("1 N*m/deg", "N*m/rad", 180 / math.pi),
     ("2.5 N*m/arcmin", "N*m/rad", 2.5 * 180 * 60 / math.pi),
-    ("1.5 N*m*s/rad", "N*m*s/rad", 1.5),
-    ("1 N*m/(rad/s)", "N*m*s/rad", 1.0),
     ("1 N*m/rpm", "N*m*s/rad", 60 / (2 * math.pi)),
     ("9 ms", "s", 0.009),
     ("2 min", "s", 120.0),
     ("2.2 kW", "W", 2200.0),
     ("1 hp", "W", 745.6998715822702),
-    ("1 PS", "W", 735.49875),
-    ("3 N*m/s", "W", 3.0),
-    ("5e2 N*m/s", "N*m/s", 500.0),
     ("\N{MINUS SIGN}5 N*m", "N*m", -5.0),
-    ("+.5 rad", "rad", 0.5),
     ("4096", "1", 4096.0),
-    ("1 kHz", "Hz", 1000.0),
-    ("2 ft", "m", 0.6096),
     ("82 mm", "m", 0.082),
-    ("0.68 kg", "kg", 0.68),
-    ("45 g*m", "kg*m", 0.045),
     ("10 bar", "Pa", 1e6),
-    ("0.9 MPa", "Pa", 9e5),
-    ("300 mbar", "Pa", 3e4),
     (3, "rad", 3.0),
     (np.float32(0.5), "rad", 0.5),
-    (np.int64(2), "rad", 2.0),
-    (Fraction(1, 2), "rad", 0.5),
     (Decimal("0.5"), "rad", 0.5),
     (np.array(0.5), "rad", 0.5),
 ]
@@ -114,60 +77,27 @@ REFUSED = [
         "rad/s",
         'Hz is a frequency, which may count turns or radians; write "50 turn/s" or "50 rad/s"',
     ),
-    ("1.5 kHz", "rad/s", 'write "1500 turn/s"'),
-    (
-        "50 1/s",
-        "rad/s",
-        '1/s is a frequency, which may count turns or radians; write "50 turn/s" or "50 rad/s"',
-    ),
-    ("5 s⁻¹", "rad/s", 'or "5 rad/s"'),
     ("5 Nms", "N*m", "Nms is an angular momentum, not a torque"),
-    ("5 m/s", "rad/s", "m/s is a speed along a line, not a speed"),
-    ("50 rad/s", "Hz", "rad/s is a speed, not a frequency"),
     ("5 N*m", "N*m/rad", 'N*m is a torque, but a stiffness is per angle; write "5 N*m/rad" or "5 N*m/deg"'),
-    ("5 kgf*m", "N*m/rad", 'write "5 kgf*m/rad"'),
-    ("5 N/m", "N*m/rad", "N/m is a stiffness along a line, not a stiffness"),
-    ("5 N*m*s", "N*m*s/rad", 'a damping is per angle; write "5 N*m*s/rad"'),
     ("5 N*m/rad", "N*m", 'N*m/rad is a stiffness, not a torque; write "5 N*m"'),
     ("5 J", "N*m", 'J is an energy, not a torque; write "5 N*m"'),
-    ("5 N", "N*m", "N is a force, not a torque"),
-    ("5 W", "N*m/s", "W is a power, not a rate of torque"),
-    ("5 J", "W", "J is an energy, not a power"),
-    ("5 kg", "kg*m^2", "kg is a mass, not an inertia"),
     ("5 kgf*m^2", "kg*m^2", "kgf*m^2 is a flywheel moment (GD^2); divide it by 4 g"),
     ("0.5 m", "rad", 'm is a length, not an angle; write an angle as "0.5 rad"'),
-    ("0.5 s", "rad", "s is a time, not an angle"),
-    ("5 deg m", "rad", "deg m is not a unit of an angle"),
-    ("5 rad", "1", "rad is an angle, not a plain number"),
     ("5 radd", "rad", 'unknown unit "radd" (did you mean "rad"?)'),
     ("880 RPM", "rad/s", 'unknown unit "RPM" (did you mean "rpm"?)'),
-    ("5 xyzzy", "rad", 'unknown unit "xyzzy"; write an angle'),
     ("5 %", "rad", '"%" is no unit'),
     ("5 rad^99", "rad", '"rad^99" is no unit'),
-    ("5 (rad", "rad", '"(rad" is no unit'),
-    ("5 rad/", "rad", '"rad/" is no unit'),
-    ("5 rad**rad", "rad", '"rad**rad" is no unit'),
-    ("2*3 rad", "rad", '"*3 rad" is no unit'),
     ("0,5 rad", "rad", "a comma may divide decimals or thousands"),
-    ("1,500.0 rad", "rad", "a comma may divide decimals or thousands"),
-    ("half a turn", "rad", "this is not a number with a unit"),
     ("rad", "rad", "this is not a number with a unit"),
     ("", "rad", "this is not a number with a unit"),
-    ("nan rad", "rad", "this is not a number"),
     (math.nan, "rad", "this is not a number"),
-    ("inf rad", "rad", "it must be finite"),
     ("1e999 rad", "rad", "it must be finite"),
-    ("1e308 krpm", "rad/s", "it must be finite"),
     ("1e-323 mrad", "rad", "the number is too small"),
     (10**400, "rad", "the number is too large"),
     (True, "rad", "true and false are not quantities"),
-    (np.bool_(True), "rad", "true and false are not quantities"),
     (None, "rad", "there is no value"),
-    (1j, "rad", "a complex number is not a quantity"),
     ({}, "rad", "a table is not a quantity"),
-    (b"1", "rad", "a bytes is not a quantity"),
     ([], "rad", "an empty list holds no value"),
-    ([[1, 2], [3]], "rad", "the rows of a list must all have the same length"),
 ]
 
 
@@ -179,13 +109,6 @@ def test_is_refused(value, unit, reason):
     assert sentence.startswith("key")
     assert reason in sentence
     assert sentence.endswith(".")
-
-
-def test_every_noun_belongs_to_one_kind_of_unit():
-    kinds = [read_unit(unit) for unit in [*QUANTITIES, *OTHER_NOUNS]]
-    assert not any(isinstance(kind, str) for kind in kinds)
-    dimensions = [kind.dimensions for kind in kinds]
-    assert len(set(dimensions)) == len(dimensions)
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=str)
@@ -202,14 +125,6 @@ def test_arrays_keep_their_shape_and_name_the_bad_element():
         to_si(np.array([0.0, 1.0, math.nan]), "rad", name="gap")
     with pytest.raises(InputError, match=r"^gap\[0\] = True"):
         to_si(np.array([True]), "rad", name="gap")
-
-
-def test_an_array_is_copied():
-    given_array = np.array([1.0, -0.0])
-    found = to_si(given_array, "rad")
-    given_array[0] = 5.0
-    assert found[0] == 1.0
-    assert not np.signbit(found[1])
 
 
 def test_infinity_only_where_it_is_let_through():
@@ -233,10 +148,7 @@ def test_quantities_of_a_users_own_pint_registry():
     ("unit", "forms"),
     [
         ("rad", ["rad", "mrad", "deg", "arcmin", "turn"]),
-        ("rad/s", ["rad/s", "rpm", "deg/s", "turn/s", "rad/min"]),
         ("N*m/rad", ["N*m/rad", "kN*m/rad", "N*m/deg", "kgf*m/rad", "lbf*in/deg"]),
-        ("kg*m^2", ["kg*m^2", "kg*cm^2", "g*cm^2", "lb*ft^2", "kgf*m*s^2"]),
-        ("W", ["W", "kW", "hp", "PS"]),
     ],
 )
 @settings(deadline=None)  # the first example imports pint
@@ -281,11 +193,6 @@ def test_any_text_is_read_or_refused(text, unit):
             assert math.isfinite(to_si(value, unit))
 
 
-def test_a_wrong_unit_in_the_code_is_a_sentence_too():
-    with pytest.raises(InputError, match='unit = "furlong": unknown unit "furlong"'):
-        to_si("1 m", "furlong")
-
-
 def test_ordinary_units_do_not_import_pint():
     code = (
         "import sys; from softstart.quantities import to_si; to_si(1.0, 'rad'); to_si('2', 'rad');"
@@ -304,29 +211,13 @@ def test_ordinary_units_are_those_of_pint(monkeypatch):
         assert to_si(f"0.37 {unit}", unit) == to_si(f"0.37 ({unit})", unit) == 0.37
 
 
-def test_helpers():
-    assert nearest("Gap", ["gap", "gip"]) == "gap"
-    assert nearest("load", []) is None
-    assert show(np.array([1.0, 2.0])) == "[1.0, 2.0]"
-    assert show(np.zeros(100)) == "an array of shape (100,)"
-    assert show(["x"], toml=True) == '["x"]'
-    assert len(show("x" * 1000)) < 80
-
-
 # what a hand types into an option or a field, and the numbers that are meant
 LISTS = [
-    ("0.5", [0.5]),
     ("0.5,1,2", [0.5, 1, 2]),
-    ("1, 2, 4", [1, 2, 4]),
-    ("1;2;4", [1, 2, 4]),
     ("0,5; 1; 2,25", [0.5, 1, 2.25]),
     ("0,000; 1,500", [0, 1.5]),
-    ("1e-3,2e-3", [1e-3, 2e-3]),
     ("-1.5,-2", [-1.5, -2]),
     ("1,5,2.5", [1, 5, 2.5]),  # a decimal point: then the commas divide values
-    ("1.125,2.5", [1.125, 2.5]),
-    ("0.25,1.125,2", [0.25, 1.125, 2]),
-    ("1.125, 2", [1.125, 2]),
     ("0.125,2", [0.125, 2]),
 ]
 
@@ -339,20 +230,12 @@ def test_a_list_is_read_as_it_is_meant(text, numbers):
 # each can be read in two ways, or has a mark too many
 DOUBTFUL = {
     "0,1,0,2": '"0, 1, 0, 2" for 4 values, or "0.1, 0.2" for 2',
-    "0,5": '"0, 5" for 2 values, or "0.5" for 1',
     "1.5, 2,5": '"1.5, 2, 5" for 3 values, or "1.5, 2.5" for 2',
-    "0,5x, 1x": '"0, 5x, 1x" for 3 values, or "0.5x, 1x" for 2',
     "0,5 rad,1 rad": '"0.5 rad, 1 rad"',
-    "1,2,4": '"1, 2, 4" for 3 values, or "1.2, 4" for 2',
     "1,500; 2,000": "may divide thousands",
     "1.000,5": '"1.000, 5" for 2 values, or "1000.5" for 1',
-    "12.345.678,9 rad": '"12.345.678, 9 rad" for 2 values, or "12345678.9 rad" for 1',
-    "1,000,000; 0,5": "may divide thousands",
     "1,5; 2.5": "has a comma",
-    "1.234,5; 2": "has a comma",
     "1,,2": "a place in the list is empty",
-    "1;;2": "a place in the list is empty",
-    "": "a place in the list is empty",
     "1," * 5000 + "1": "a comma may divide values or decimals",
 }
 
@@ -367,24 +250,8 @@ def test_a_list_that_can_be_read_in_two_ways_is_refused(text):
     assert len(sentence) < 400
 
 
-@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=6))
-def test_with_decimal_commas_a_list_is_read_right_or_not_at_all(numbers):
-    commas = [f"{number:.4f}".replace(".", ",") for number in numbers]
-    for between in ("; ", ";", ", ", ","):
-        text = between.join(commas)
-        with contextlib.suppress(InputError):
-            read = [to_si(part, "rad") for part in values_in(text)]
-            assert read == [float(f"{number:.4f}") for number in numbers]
-
-
-@pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", "\N{ARABIC-INDIC DIGIT FIVE}", "", "1e3"], ids=str)
+@pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", ""], ids=str)
 def test_a_whole_number_is_one(text):
     with pytest.raises(InputError, match="give a whole number of 1 or more"):
         whole_number(text, "--workers")
     assert whole_number(" 007 ", "--workers") == 7
-
-
-def test_a_product_of_a_thousand_units_is_refused_at_once():
-    with pytest.raises(InputError, match="is too long for a unit") as error:
-        to_si("1 " + "*".join(["kg"] * 5000), "kg")
-    assert len(str(error.value)) < 300

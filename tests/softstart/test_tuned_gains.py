@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, compare, pareto, records, simulate, sweep, tune
-from softstart.cli.main import main
+from softstart import Drive, InputError, records, simulate, sweep, tune
 from softstart.controller import make_controller
 from softstart.controller.tuned import (
     Gain,
-    GainSchedule,
     RobustFile,
     RobustGains,
     ScheduleFile,
@@ -39,13 +37,8 @@ SCHEDULE = scheduled(SAVED, "here")
 
 
 def same(a, b):
-    assert (a.controller, a.gaps, a.load_inertias, a.fixed) == (
-        b.controller,
-        b.gaps,
-        b.load_inertias,
-        b.fixed,
-    )
-    assert list(a.gains) == list(b.gains)
+    assert (a.controller, a.gaps, a.load_inertias) == (b.controller, b.gaps, b.load_inertias)
+    assert (a.fixed, list(a.gains)) == (b.fixed, list(b.gains))
     for name, gain in a.gains.items():
         assert gain.scale == b.gains[name].scale
         assert np.array_equal(gain.values, b.gains[name].values)
@@ -60,9 +53,6 @@ def test_a_schedule_is_read_back_to_the_bit(tmp_path, ending):
     text = schedule_text(SAVED, {"seed": 0}) if ending == "toml" else schedule_csv(SAVED, {"k_dyn": TORQUES})
     path.write_text(text, "utf-8")
     same(read_gain_file(path), SAVED)
-    made = make_controller(str(path))
-    assert made.name == "ramp (mine)"
-    assert simulate(CRANE, made).k_dyn == simulate(CRANE, SCHEDULE).k_dyn
 
 
 @given(
@@ -97,33 +87,14 @@ def test_between_the_nodes_and_outside():
     assert SCHEDULE.gains_at(0.0, 9.0) == {"time": TIMES[0, 1], "initial": TORQUES[0, 1]}
 
 
-@given(gap=st.floats(0.0, 5.0), inertia=st.floats(0.01, 1.0))
-def test_gains_stay_between_those_of_the_nodes(gap, inertia):
-    found = SCHEDULE.gains_at(gap, inertia)
-    assert TIMES.min() * (1 - 1e-12) <= found["time"] <= TIMES.max() * (1 + 1e-12)
-    assert TORQUES.min() - 1e-9 <= found["initial"] <= TORQUES.max() + 1e-9
-
-
-def test_a_single_cell():
-    one = GainSchedule(
-        "one", make_controller("ramp"), (0.5,), (0.1,), (("time", "linear", np.array([[0.2]])),)
-    )
-    assert [one.gains_at(gap, 0.2)["time"] for gap in (0.1, 0.5, 3.0)] == [0.2, 0.2, 0.2]
-
-
 # where they are played ------------------------------------------------------------------------------------
-
-
-def batch():
-    gaps, inertias = (a.ravel() for a in np.meshgrid([0.3, 0.8, 2.0], [0.07, 0.2], indexing="ij"))
-    return records(CRANE, gap=gaps, load_inertia=inertias)
 
 
 @pytest.mark.parametrize(
     "gains", [SCHEDULE, RobustGains("set", make_controller("ramp", {"time": 0.1}), CRANE)]
 )
 def test_batches_start_as_single_drives_do(gains):
-    drives = batch()
+    drives = records(CRANE, gap=[0.3, 0.8, 2.0, 0.3], load_inertia=[0.07, 0.2, 0.07, 0.2])
     together = simulate(drives, gains)
     for k, drive in enumerate(drives.elements()):
         run = simulate(drive, gains)
@@ -144,54 +115,6 @@ def test_a_schedule_goes_by_what_is_declared_and_a_set_by_its_own_drive():
         assert run.k_dyn == same_run.k_dyn == simulate(other, gains, fitted_to=other).k_dyn
 
 
-def test_compare_and_pareto_take_files(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(schedule_text(SAVED), "utf-8")
-    rows = compare(CRANE, ["ramp", str(path)]).rows
-    assert [row.run.controller.name for row in rows] == ["ramp", "ramp (mine)"]
-    worn = simulate(CRANE.replace(gap=2.0), SCHEDULE, fitted_to=CRANE, base=CRANE)
-    assert rows[1].k_dyn_worn_gap == worn.k_dyn
-    front = pareto(CRANE, [0.35], controllers=[str(path)])
-    assert front.controllers[0].name == "ramp (mine)"
-    assert front.controllers[0].k_dyn == rows[1].run.k_dyn
-
-
-LOOSE = """
-from dataclasses import dataclass
-from softstart import Command, PlainController
-from softstart.controller import parameter
-
-@dataclass(frozen=True)
-class Wait(PlainController):
-    wait: float | None = parameter("s", "how long", "60 ms", multiples=(0.5, 4.0))
-    def defaults(self, drive):
-        return {"wait": 0.06}
-    def step(self, measured, state):
-        assert isinstance(self.wait, float)
-        return Command(15.0 if measured.time < self.wait else 62.0, measured.time + 0.005)
-"""
-
-
-def test_a_loose_plain_controller_goes_the_whole_way(tmp_path):
-    (tmp_path / "mine.py").write_text(LOOSE, "utf-8")
-    name = f"{tmp_path / 'mine.py'}:Wait"
-    options = {"generations": 1, "population": 5, "restarts": 1, "certified": False, "workers": 1}
-    tuned = tune(CRANE, name, [0.5, 1.0], ["1x"], **options)
-    for what in ("schedule", "robust"):
-        tuned.to_toml(tmp_path / f"{what}.toml", what)
-    tuned.to_csv(tmp_path / "schedule.csv")
-    drives = records(CRANE, gap=[0.5, 0.75, 1.0])
-    made = {
-        file: make_controller(str(tmp_path / file), allow_code=True)
-        for file in ("schedule.toml", "schedule.csv", "robust.toml")
-    }
-    schedule = simulate(drives, made["schedule.toml"])
-    assert np.array_equal(schedule.k_dyn, simulate(drives, made["schedule.csv"]).k_dyn)
-    assert schedule.k_dyn[[0, 2]].to_numpy().tolist() == tuned.schedule.k_dyn[:, 0].to_numpy().tolist()
-    robust = simulate(drives, made["robust.toml"])
-    assert robust.k_dyn[[0, 2]].to_numpy().tolist() == tuned.robust.cells.k_dyn[:, 0].to_numpy().tolist()
-
-
 def test_what_tune_writes_does_what_tune_says(tmp_path):
     options = {"generations": 2, "population": 6, "restarts": 1, "certified": False, "workers": 1}
     tuned = tune(CRANE, "acceleration-delay", [0.5, 1.0], ["2 J1", "1x"], **options)
@@ -207,11 +130,6 @@ def test_what_tune_writes_does_what_tune_says(tmp_path):
     assert isinstance(made, RobustGains)
     assert made.nominal == CRANE
     assert made.parameters == tuned.robust.parameters
-    only = tune(CRANE, "ramp", [0.5], ["1x"], schedule=False, **options)
-    only.to_toml(tmp_path / "only.toml")
-    assert isinstance(make_controller(str(tmp_path / "only.toml")), RobustGains)
-    with pytest.raises(InputError, match="no schedule was tuned"):
-        only.to_csv(tmp_path / "none.csv")
 
 
 # refusals -------------------------------------------------------------------------------------------------
@@ -221,31 +139,16 @@ TOML, CSV = schedule_text(SAVED), schedule_csv(SAVED)
 BAD = {
     "missing.toml": (None, ["there is no such file"]),
     "drive.toml": (CRANE.to_toml(), ["no tuned gains", "--controller profile"]),
-    "profile.csv": ("time [s],torque [N*m]\n0,1\n", ["no tuned gains"]),
-    "broken.toml": ("kind = \n", ["not valid TOML"]),
-    "name.toml": (TOML.replace('controller = "ramp"', ""), ["the key controller is missing"]),
-    "unknown.toml": (TOML.replace('"ramp"', '"rmp"'), ["did you mean", "ramp"]),
     "axis.toml": (TOML.replace("gaps = [0.5, 1.0", "gaps = [1.0, 0.5"), ["gaps", "rise"]),
-    "scale.toml": (TOML.replace('"linear"', '"cubic"'), ['"linear" or "logarithmic"']),
     "shape.toml": (TOML.replace("    [8.0, 9.0],\n", ""), ["3 rows", "2 numbers"]),
-    "sign.toml": (TOML.replace("[0.1, 0.2]", "[0.1, -0.2]"), ["0 or less"]),
     "gain.toml": (TOML.replace("[gains.initial]", "[gains.initail]"), ["initail", "no such parameter"]),
     "refused.toml": (TOML.replace("period = 0.002", "period = -1.0"), ["period = -1"]),
-    "nogains.toml": (
-        'kind = "gain schedule"\ncontroller = "ramp"\ngaps=[1]\nload_inertias=[1]\n',
-        ["[gains]"],
-    ),
-    "nodrive.toml": ('kind = "robust set"\ncontroller = "ramp"\n[parameters]\n', ["[drive]"]),
-    "baddrive.toml": (ROBUST_TOML.replace("gap = 0.5", 'gap = "0.5 kg"'), ["[drive]", "0.5 kg"]),
     "key.toml": (
         ROBUST_TOML.replace("[drive.load]", "[drive.load]\nmass = 3"),
         ["[drive]", "[load] has no key mass"],
     ),
-    "parameter.toml": (ROBUST_TOML.replace("time = 0.1", "tme = 0.1"), ["did you mean", "time"]),
     "rows.csv": (CSV.rsplit("\n", 2)[0] + "\n", ["one row for each combination"]),
-    "number.csv": (CSV.replace("0.1,8.0", "soon,8.0"), ['time = "soon"']),
     "itself.toml": (TOML.replace('"ramp"', '"itself.toml"'), ["gains are those of a controller"]),
-    "comma.csv": (CSV.replace("0.5,0.07,", "0,5,0,07,"), ["decimal commas"]),
     "json.csv": (CSV.replace('# gains: {"time"', "# gains: {time"), ["no JSON object"]),
 }
 
@@ -262,13 +165,6 @@ def test_a_bad_file_is_one_sentence(tmp_path, name):
     assert str(path) in str(refused.value)
     for words in says:
         assert words in str(refused.value)
-
-
-def test_parameters_beside_a_file_are_refused(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(TOML, "utf-8")
-    with pytest.raises(InputError, match="given beside the tuned gains"):
-        make_controller(str(path), {"time": 0.1})
 
 
 # code in files of gains -----------------------------------------------------------------------------------
@@ -306,14 +202,3 @@ def test_code_named_by_a_file_of_gains_runs_only_when_it_is_allowed(foreign):
     assert foreign.with_name("ran").exists()
     found = sweep(CRANE, str(foreign), {"gap": [0.5, 1.0]}, workers=1, allow_code=True)
     assert found.k_dyn.values[0] == run.k_dyn
-
-
-@pytest.mark.parametrize("command", ["simulate", "compare", "linear"])
-def test_the_command_line_has_the_same_switch(foreign, command, capsys):
-    option = "--controllers" if command == "compare" else "--controller"
-    words = [command, "crane-4amtkf", option, str(foreign)]
-    assert main(words) == 2
-    assert "--allow-code" in capsys.readouterr().err
-    assert not foreign.with_name("ran").exists()
-    main([*words, "--allow-code"])
-    assert foreign.with_name("ran").exists()

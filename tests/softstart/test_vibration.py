@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from tests.twin import chain_of
 
-from softstart import Drive, compare
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration, reduce_chain
 from softstart.errors import InputError
 from softstart.vibration import elastic_frequencies, shapes
@@ -30,15 +29,6 @@ def stiffness_matrix(c: Vector) -> Vector:
 
 def random_chain(rng: np.random.Generator, n: int, decades: float) -> tuple[Vector, Vector]:
     return 10 ** rng.uniform(-decades, decades, n), 10 ** rng.uniform(-decades, decades, n - 1)
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 20])
-def test_frequencies_are_those_of_a_dense_solver(n: int) -> None:
-    rng = np.random.default_rng(n)
-    for _ in range(20):
-        J, c = random_chain(rng, n, 0.7)
-        dense = np.sqrt(eigh(stiffness_matrix(c), np.diag(J), eigvals_only=True)[1:])
-        np.testing.assert_allclose(elastic_frequencies(J, c), dense, rtol=1e-10)
 
 
 def test_frequencies_of_equal_masses_and_springs() -> None:
@@ -59,7 +49,7 @@ def count_below(J: list[Decimal], c: list[Decimal], square: Decimal) -> int:
     return count
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_frequencies_keep_their_digits_over_many_decades(seed: int) -> None:
     """80 digits: each frequency lies within 4e-15 of itself; a dense solver keeps none of the lowest."""
     getcontext().prec = 80
@@ -86,14 +76,6 @@ def test_shapes_are_orthogonal_and_give_their_frequency_back(decades: float) -> 
         np.testing.assert_allclose(rayleigh, omega, rtol=1e-12)
 
 
-def test_the_rigid_mode_is_exactly_zero_and_flat() -> None:
-    vibration = natural_vibration(Chain.load("tractor-like"))
-    assert vibration.Omega[0] == 0.0
-    assert np.all(vibration.shape[0] == 1.0)
-    assert np.all(vibration.torque[0] == 0.0)
-    assert vibration.nodes[0] == ()
-
-
 def test_torques_balance_every_mass() -> None:
     """J Omega^2 x is what the shaft behind carries more than the one before; both equal c times the twist."""
     vibration = natural_vibration(Chain.load("tractor-like"))
@@ -112,12 +94,6 @@ def test_mode_m_has_m_nodes_and_they_rest() -> None:
         for node in nodes:
             x, y = vibration.shape[m, node.shaft : node.shaft + 2]
             assert x + node.share * (y - x) == pytest.approx(0.0, abs=1e-15)
-
-
-def test_a_node_at_a_mass() -> None:
-    chain = Chain([Mass(1), Mass(5), Mass(1)], [Shaft(2), Shaft(2)])
-    (node,) = natural_vibration(chain).nodes[1]
-    assert (node.shaft, node.share) in ((0, pytest.approx(1.0)), (1, pytest.approx(0.0)))
 
 
 def test_rigid_joints_move_as_one_mass() -> None:
@@ -147,7 +123,7 @@ def random_machine(rng: np.random.Generator) -> Chain:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_two_masses_have_frequency_node_inertia_gap_and_load_of_the_chain(seed: int) -> None:
     """Frequency and node of the drive, as a chain, against a dense solver for the whole one."""
     chain = random_machine(np.random.default_rng(seed))
@@ -178,18 +154,6 @@ def _decay(chain: Chain) -> float:
     values = np.linalg.eigvals(A)
     values = values[values.imag > 1.0]
     return float(-values[np.argmin(values.imag)].real)
-
-
-def test_the_crane_chain_gives_about_the_crane_drive() -> None:
-    """The chain was drawn from it: inertias within 0.3 %, the first frequency 2 % higher."""
-    crane, chain = Drive.load("crane-4amtkf"), Chain.load("crane-4-mass")
-    drive = reduce_chain(chain).to_drive()
-    for name in ("J1", "J2", "gap", "Mc", "Ms", "maximum_torque", "target_speed"):
-        assert getattr(drive, name) == pytest.approx(getattr(crane, name), rel=3e-3), name
-    assert drive.c == pytest.approx(crane.c, rel=0.05)
-    assert drive.assumed == chain.assumed
-    best = compare(drive, ["direct", "reduced-first-stage"])
-    assert best.rows[0].run.k_dyn == pytest.approx(compare(crane, ["direct"]).rows[0].run.k_dyn, rel=0.02)
 
 
 def test_motor_behind_the_load() -> None:
@@ -232,22 +196,3 @@ def test_refused_where_the_node_is_not_between_motor_and_load() -> None:
         reduce_chain(Chain([Mass(1), Mass(1)], [Shaft(1)], Motor(1.0), load_mass="mass 1"))
     with pytest.raises(InputError, match="1 or more"):
         reduce_chain(chain, factor=0.5)
-
-
-def test_no_drive_without_motor_or_target() -> None:
-    parts = [Mass(1), Mass(1e-6), Mass(1)], [Shaft(1), Shaft(1)]
-    with pytest.raises(InputError, match="starting torque"):
-        reduce_chain(Chain(*parts)).to_drive()
-    with pytest.raises(InputError, match="target_speed"):
-        reduce_chain(Chain(*parts, Motor(5.0))).to_drive()
-
-
-def test_notes_say_what_is_left_out() -> None:
-    chain = Chain(
-        [Mass(1), Mass(1e-3, torque=1, kind="reactive", damping=0.1), Mass(1, torque=2)],
-        [Shaft(10), Shaft(10, efficiency=0.9)],
-    )
-    notes = " ".join(reduce_chain(chain).notes)
-    assert "both kinds" in notes
-    assert "damping to the ground" in notes
-    assert "0.9" in notes

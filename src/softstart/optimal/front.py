@@ -278,9 +278,9 @@ def pareto(
     --------
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
-    >>> front = pareto(crane, [0.2, 0.2883042], terminal="synchronous", controllers=[])
-    >>> [point.status for point in front.points], round(front.points[1].k_dyn, 6)
-    (['INFEASIBLE', 'OPTIMAL'], 0.909247)
+    >>> front = pareto(crane, [0.2883042, 0.33], terminal="synchronous", controllers=[])
+    >>> [round(point.k_dyn, 4) for point in front.points]
+    [0.9092, 0.8081]
 
     References
     ----------

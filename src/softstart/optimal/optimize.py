@@ -454,9 +454,9 @@ def shortest_start_time(problem: Problem) -> float:
     """The shortest t_f in s that was found, whatever its K_dyn; infinite if none was.
 
     >>> from softstart import Drive
-    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-    >>> round(shortest_start_time(Problem(drive, 0.3)), 4)
-    0.2386
+    >>> drive = Drive.load("crane-4amtkf").replace(gap=0.0, target_speed=20.0)
+    >>> round(shortest_start_time(Problem(drive, 0.3, "reached")), 4)
+    0.0804
     """
     found = _shortest(problem)
     return math.inf if found is None else found[0]

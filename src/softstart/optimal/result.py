@@ -294,11 +294,12 @@ class InfeasibleError(RuntimeError):
     Examples
     --------
     >>> from softstart import Drive, InfeasibleError, optimize
+    >>> drive = Drive.load("crane-4amtkf").replace(gap=0.0, target_speed=20.0)
     >>> try:
-    ...     optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.1)
+    ...     optimize(drive, 0.05, terminal="reached")
     ... except InfeasibleError as error:
     ...     print(round(error.verdict.shortest_start_time, 4))
-    0.2386
+    0.0804
     """
 
     def __init__(self, verdict: Verdict) -> None:

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
+from tests.oracle import ChainOracle, Given
 from tests.oracle_torque import TorquePath
-from tests.softstart.chain.chain_oracle import ChainOracle, Given
 from tests.softstart.kernel.pieces import Pieces
 
 from softstart.chain import Chain, Mass, Motor, Shaft
@@ -82,74 +82,47 @@ def with_losses(rng: np.random.Generator, drawn: dict[str, Any]) -> dict[str, An
     return drawn | {"efficiency": efficiency, "gear": np.arange(count) + rng.integers(0, 2, count)}
 
 
-def of_curve(curve: tuple[np.ndarray, np.ndarray, bool] | None) -> dict[str, Any]:
-    """Keywords of a `Mass` for its load curve."""
-    if curve is None:
-        return {}
-    points, torques, by_angle = curve
-    return {"curve_angle" if by_angle else "curve_speed": list(points), "curve_torque": list(torques)}
+def built(given: Given, motor: Motor, target: float) -> Chain:
+    """The same as a `Chain`."""
+    masses, shafts = [], []
+    for i in range(given.J.size):
+        own = {"torque": float(given.Mc[i]), "kind": "reactive" if given.reactive[i] else "active"}
+        if i in given.curves:
+            points, torques, by_angle = given.curves[i]
+            own |= {"curve_angle" if by_angle else "curve_speed": list(points), "curve_torque": list(torques)}
+        ground, speed = float(given.ground[i]), float(given.w0[i])
+        masses.append(Mass(float(given.J[i]), damping=ground, initial_speed=speed, **own))
+    for k in range(given.c.size):
+        place = {"gap": float(given.gap[k]), "start_position": float(given.theta0[k])}
+        if not math.isnan(given.restitution[k]):
+            shafts.append(Shaft(restitution=float(given.restitution[k]), **place))
+            continue
+        loss = {"efficiency": float(given.efficiency[k]), "side": "after" if given.gear[k] == k else "before"}
+        elastic = {"damping": float(given.d[k]), "contact_law": given.law[k]}
+        shafts.append(Shaft(float(given.c[k]), **place, **elastic, **loss))
+    return Chain(
+        masses, shafts, motor, target_speed=target, load_mass=f"mass {given.load % given.J.size + 1}"
+    )
 
 
 def both(
-    J: np.ndarray, c: np.ndarray, d: np.ndarray, gap: np.ndarray, law: list[str], restitution: np.ndarray,
-    theta0: np.ndarray, w0: np.ndarray, Mc: np.ndarray, reactive: np.ndarray, ground: np.ndarray,
-    tones: list[tuple[int, float, float, float]], pieces: list[tuple[float, float]], lag: float, rate: float,
-    motor: int, t_end: float, target: float, rtol: float = 1e-12, efficiency: np.ndarray | None = None,
-    gear: np.ndarray | None = None, check: bool = True, u0: float = 0.0,
-    curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] | None = None, load: int = -1,
+    *, pieces: list[tuple[float, float]], lag: float, rate: float, t_end: float, target: float,
+    u0: float = 0.0, check: bool = True, **drawn: Any,
 ) -> tuple[Run, ChainOracle]:  # fmt: skip
-    """The same start by the kernel and, to `check` it, by the oracle."""
-    reactive = reactive & (Mc > 0)
-    target = max(target, float(w0[load]) + 1e-2)
-    eta = np.ones(c.size) if efficiency is None else efficiency
-    after = np.zeros(c.size, bool) if gear is None else gear == np.arange(c.size)
-    largest = max(*(abs(u) for _, u in pieces), 1.0)
-    chain = Chain(
-        [
-            Mass(float(J[i]), torque=float(Mc[i]), kind="reactive" if reactive[i] else "active",
-                 damping=float(ground[i]), initial_speed=float(w0[i]), **of_curve((curves or {}).get(i)))
-            for i in range(J.size)
-        ],
-        [
-            Shaft(gap=float(gap[k]), restitution=float(restitution[k]), start_position=float(theta0[k]))
-            if restitution[k] == restitution[k]
-            else Shaft(float(c[k]), damping=float(d[k]), gap=float(gap[k]), contact_law=law[k],  # type: ignore[arg-type]
-                       start_position=float(theta0[k]), efficiency=float(eta[k]),
-                       side="after" if after[k] else "before")
-            for k in range(c.size)
-        ],
-        Motor(largest, mass=f"mass {motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate,
-              initial_torque=u0),
-        target_speed=target, load_mass=f"mass {load % J.size + 1}",
-    )  # fmt: skip
+    """The same start by the kernel and, to `check` it, by the oracle; `drawn` are fields of `Given`."""
+    given = Given(**drawn | {"reactive": drawn["reactive"] & (drawn["Mc"] > 0)})
+    target = max(target, float(given.w0[given.load]) + 1e-2)
     excitation: dict[str | int, PeriodicTorque] = {
-        i: PeriodicTorque(0.0, [1.0], [cosine], [sine], speed=omega)  # type: ignore[arg-type]
-        for i, omega, cosine, sine in tones
+        i: PeriodicTorque(0.0, [1.0], [cosine], [sine], speed=omega) for i, omega, cosine, sine in given.tones
     }
-    controller = Pieces(pieces=tuple(pieces), end=math.inf)
-    run = simulate(chain, controller, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
-    given = Given(
-        J,
-        Mc,
-        reactive,
-        w0,
-        c,
-        d,
-        gap,
-        law,
-        theta0,
-        ground,
-        np.zeros(J.size),
-        tones,
-        restitution,
-        motor,
-        load,
-        efficiency=eta,
-        gear=gear,
-        curves=curves or {},
-    )
-    path = TorquePath(list(pieces), lag, rate, u0, t_end)
-    oracle = ChainOracle(given, path, target, rtol)
+    largest = max(*(abs(u) for _, u in pieces), 1.0)
+    motor = Motor(
+        largest, mass=f"mass {given.motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate,
+        initial_torque=u0,
+    )  # fmt: skip
+    played = Pieces(pieces=tuple(pieces), end=math.inf)
+    run = simulate(built(given, motor, target), played, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
+    oracle = ChainOracle(given, TorquePath(list(pieces), lag, rate, u0, t_end), target)
     return run, oracle.go() if check else oracle
 
 

@@ -20,11 +20,9 @@ def chain() -> Chain:
     return Chain.load("crane-4-mass", also=DAMPED)
 
 
-@pytest.mark.parametrize("name", ["direct", "s-curve"])
-def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
-    """The plant locates its turning points in closed forms, the chain in its series."""
-    run = simulate(CRANE, name)
-    other = simulate(chain_of(CRANE), name, fitted_to=CRANE)
+def test_a_chain_of_two_masses_lives_as_its_drive() -> None:
+    run = simulate(CRANE, "s-curve")
+    other = simulate(chain_of(CRANE), "s-curve", fitted_to=CRANE)
     mine, theirs = turning_points(run), turning_points(other)
     assert mine.shape == theirs.shape
     np.testing.assert_allclose(theirs, mine, rtol=1e-7, atol=1e-7 * run.peak_torque)
@@ -51,19 +49,6 @@ def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
         assert (np.diff(points[:, 0]) >= 0.0).all()
 
 
-def test_each_shaft_beside_direct_and_its_permissible_torque(chain: Chain) -> None:
-    strong = Chain.load("crane-4-mass", also={**DAMPED, "shaft[1].permissible_torque": "300 N*m"})
-    found = fatigue([simulate(strong, name) for name in ("direct", "ramp")])
-    direct, ramp = found.by_run
-    assert [life.relative for life in direct] == [1.0, 1.0, 1.0]
-    for hard, gentle in zip(direct, ramp, strict=True):
-        assert gentle.relative == pytest.approx((hard.equivalent_torque / gentle.equivalent_torque) ** 6.6)
-        assert gentle.relative > 1.0
-    assert ramp[0].utilisation == pytest.approx(ramp[0].run.peak_torques[0] / 300.0)
-    assert np.isnan(ramp[1].utilisation)
-    assert len(found.summary()["strategies"]) == 6
-
-
 def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(chain: Chain) -> None:
     anywhere = replace(chain, position="unknown")
     found = fatigue(simulate(anywhere, "ramp")).rows
@@ -86,10 +71,6 @@ def test_estimated_damping_is_the_ratio_of_the_first_natural_vibration() -> None
     assert same.worn_relative == pytest.approx(mine.worn_relative, rel=1e-7)
 
 
-def test_what_cannot_be_counted_is_refused(chain: Chain) -> None:
+def test_what_cannot_be_counted_is_refused() -> None:
     with pytest.raises(InputError, match="damping is missing in rotor - pinion"):
         fatigue(simulate("crane-4-mass", "ramp"))
-    with pytest.raises(InputError, match="slope = -1"):
-        fatigue(simulate(chain, "ramp"), slope=-1)
-    with pytest.raises(InputError, match="give one Run or several"):
-        fatigue([])  # type: ignore[arg-type]

@@ -1,17 +1,15 @@
-"""Chains go where drives go: positions in the gaps, simulate and compare, in Python and as commands."""
+"""Chains go where drives go: positions in the gaps, limits, compare, batches."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, InputError, PlainController, compare, simulate
-from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart import Drive, InputError, compare, simulate
+from softstart.chain import Chain, Mass, Shaft
 from softstart.chain.model import load_machine
-from softstart.cli import main
 
 DAMPED = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
 CHAIN = Chain.load("crane-4-mass", also=DAMPED)
@@ -46,7 +44,7 @@ def test_positions_are_those_of_the_flanks():
         )
 
 
-@pytest.mark.parametrize("position", ["driving-flank", "opposite-flank", "hanging"])
+@pytest.mark.parametrize("position", ["mid-gap", "opposite-flank", "hanging"])
 def test_a_position_does_not_depend_on_the_end_at_which_the_motor_sits(position):
     plain = replace(CHAIN.brought_to("motor"), position=position)
     turned = Chain(
@@ -82,15 +80,58 @@ def test_permissible_torques_are_limits():
     assert table.recommendation.recommended is table.rows[1]
 
 
+def various(count: int = 16) -> list[Chain]:
+    """The crane with other gaps, loads, dampings and frictions, some of it undamped, some reactive."""
+    rng = np.random.default_rng(16)
+    found = []
+    for i in range(count):
+        one = CHAIN.changed(gaps=float(rng.uniform(0.2, 3.0)), load_inertia=float(rng.uniform(0.3, 1.5)))
+        shafts = [shaft.replace(damping_ratio=float(rng.uniform(0.0, 0.05))) for shaft in one.shafts]
+        if i % 4 == 0:
+            shafts = [shaft.replace(damping_ratio=None) for shaft in one.shafts]
+        masses = list(one.masses)
+        if i % 3 == 0:
+            masses[3] = masses[3].replace(kind="reactive")
+        if i % 5 == 0:
+            shafts[1] = shafts[1].replace(efficiency=0.95)
+        found.append(replace(one, masses=tuple(masses), shafts=tuple(shafts)))
+    return found
+
+
+@pytest.mark.parametrize("controller", ["direct", "state-feedback"])
+def test_a_batch_has_the_bits_of_single_starts(controller):
+    chains = various()
+    found = simulate(chains, controller, fitted_to=CRANE, workers=2)
+    alone = simulate(chains, controller, fitted_to=CRANE, workers=1)
+    for i, chain in enumerate(chains):
+        run = simulate(chain, controller, fitted_to=CRANE)
+        row = found.isel(start=i)
+        assert np.array_equal(row.peak_torques.values, run.peak_torques)
+        assert np.array_equal(row.k_dyns.values, run.k_dyns)
+        assert row.k_dyn.item() == run.k_dyn
+        assert row.start_time.item() == run.start_time
+        assert row.end_time.item() == run.end_time
+        assert row.status.item() == run.status.name
+    for name in found.data_vars:
+        assert np.array_equal(found[name].values, alone[name].values), name
+
+
+def test_what_cannot_be_finished_has_a_status_and_no_figures():
+    found = simulate(various(4), "direct", fitted_to=CRANE, max_events=60)
+    failed = found.status.values == "TOO_MANY_EVENTS"
+    assert failed.any()
+    assert np.isnan(found.k_dyn.values[failed]).all()
+    assert np.isnan(found.k_dyns.values[failed]).all()
+
+
 @pytest.mark.parametrize(
     ("call", "reason"),
     [
         (lambda: Chain.load("crane-4-mass", also={"start.position": "hangin"}), 'did you mean "hanging"'),
-        (lambda: compare(Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)]), "direct"), r"\[motor\] is missing"),
-        (lambda: compare("crane-4-mas"), "did you mean crane-4-mass"),
+        (lambda: simulate([], "direct"), "not empty"),
+        (lambda: simulate([CHAIN, CRANE], "direct"), "same number of masses"),
+        (lambda: simulate([Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)])], "direct"), r"\[motor\] is missing"),
         (lambda: simulate("crane-4-mas", "direct"), "did you mean crane-4-mass"),
-        (lambda: simulate(CHAIN, "direct", fitted_to="x"), "give a Drive or a Chain"),
-        (lambda: compare(CHAIN, "direct", worst_case="gap x5"), "worst_case"),
     ],
 )
 def test_what_is_refused(call, reason):
@@ -105,36 +146,3 @@ def test_a_name_is_that_of_a_drive_or_of_a_chain(tmp_path):
     assert load_machine(str(mine)) == CHAIN
     assert isinstance(load_machine("crane-4amtkf"), Drive)
     assert simulate(str(mine), "direct").k_dyn == simulate(CHAIN, "direct").k_dyn
-
-
-def test_the_commands_take_chains(tmp_path, capsys):
-    out = tmp_path / "out"
-    words = ["--set", "shaft[1].damping_ratio=0.02", "--json"]
-    assert main(["compare", "crane-4-mass", "--controllers", "direct,ramp", "--out", str(out), *words]) == 0
-    found = json.loads(capsys.readouterr().out)
-    chain = Chain.load(out / "chain.toml")
-    assert chain.shafts[0].damping_ratio == 0.02
-    for row in found["strategies"]:
-        assert row["k_dyn"] == simulate(chain, row["controller"]).k_dyn
-    assert "K\\_dyn" in (out / "report.md").read_text(encoding="utf-8")
-    assert main(["simulate", str(out / "chain.toml"), "--controller", "ramp", "--json"]) == 0
-    alone = json.loads(capsys.readouterr().out)
-    assert alone["k_dyns"] == found["strategies"][1]["k_dyns"]
-    assert alone["events"][0]["kind"] == "gap closed"
-    assert main(["linear", str(out / "chain.toml"), "--controller", "ramp"]) == 0
-    assert "4 masses" in capsys.readouterr().out
-
-
-def test_a_motor_torque_beyond_the_limits_is_named():
-    """The table says which demand is cut off, by the limits of the chain's motor."""
-    from softstart.views.starts import clipped_torque
-
-    chain = Chain([Mass(0.03), Mass(0.2)], [Shaft(400.0, gap=0.2)], Motor(62.0), target_speed=90.0)
-
-    class Beyond(PlainController):
-        name = "beyond"
-
-        def step(self, measured, state):
-            return Command(70.0, np.inf)
-
-    assert "up to 8 N m beyond the limits 0 and 62 N m" in clipped_torque(simulate(chain, Beyond()))

@@ -54,13 +54,3 @@ def test_gaps_are_to_scale() -> None:
     stops = [line.get_xdata()[0] for line in row.get_lines() if colour(line) == "#D55E00"]
     first, second = np.diff(stops)[::2] - 3.0
     assert second / first == pytest.approx(3.0)
-
-
-def test_names_are_text_and_long_ones_cut() -> None:
-    chain = Chain([Mass(1, name="<a $b$>"), Mass(1)], [Shaft("inf")])
-    with pytest.raises(ValueError, match="nothing vibrates"):
-        natural_vibration(chain)
-    row, _ = drawn(Chain([Mass(1, name="<a $b$>"), Mass(1, name=9 * "long name ")], [Shaft(1)], name="x < y"))
-    said = [one.get_text() for one in row.texts]
-    assert {"<a $b$>", "long name long name long n..."} <= set(said)
-    row.figure.draw_without_rendering()

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from numpy.polynomial.legendre import leggauss
-from scipy.integrate import solve_ivp
-from tests import twin
 from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
 from softstart import Command, Drive, InputError, PlainController, SimulationError, simulate
-from softstart.balancing import Engine
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.controller import Sensor
@@ -22,12 +16,8 @@ from softstart.start.rows import rows_of
 CRANE = Drive.load("crane-4amtkf")
 DRIVES = {
     "undamped": {},
-    "reactive": {"load_kind": "reactive"},
-    "damped": {"damping": 0.3},
     "dead-zone": {"damping": 0.3, "contact_law": "dead-zone"},
-    "modelica": {"damping": 2.0, "contact_law": "modelica"},
     "modelica, reactive": {"damping": 0.5, "contact_law": "modelica", "load_kind": "reactive"},
-    "overdamped": {"damping": 20.0},
     "lag and rate": {"torque_lag": 0.002, "torque_rate": 5000.0},
     "dead time and noise": {"computing_delay": 0.0017, "torque_noise": 0.5, "encoder_lines": 256},
     "from overlap": {"start_position": 0.27, "initial_load_speed": 5.0, "load_kind": "reactive"},
@@ -54,17 +44,6 @@ def test_from_the_driving_flank_there_is_one_contact_however_often_it_is_grazed(
     assert [run.contacts for run in runs] == [1, 1]
 
 
-def test_the_reversals_of_a_shaft_far_from_the_motor_are_found():
-    """Its torque begins with a high power of time; the reversals are those of a fine grid."""
-    run = simulate(Chain.load("tractor-like"), "ramp", until=0.05)
-    still, grid = 1e-6 * max(run.peak_torques), run.at(np.linspace(0.0, run.end_time, 50_001))["T"]
-    for k in range(run.T.shape[1]):
-        turned = run.recorded.turning_points(k, still)[:, 1]
-        assert turned.max() >= grid[:, k].max() - still
-        assert turned.min() <= grid[:, k].min() + still
-        assert np.all(np.abs(np.diff(turned))[:-1] > still)
-
-
 def test_no_bit_depends_on_the_time_limit():
     """Undamped, the crane rattles and all its masses fly at times: a span lasts an elastic period at most."""
     starts = [simulate("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
@@ -86,32 +65,6 @@ def test_the_shaft_torque_the_load_speed_and_the_stage_are_seen():
     at = run.at(times)
     assert torques == pytest.approx(at["T"][:, 0], abs=1e-12 * run.peak_torque)
     assert speeds == pytest.approx(at["w"][:, 3], abs=1e-12 * 92.0)
-
-
-def test_plain_and_compiled_controllers_agree_to_the_bit():
-    chain = Chain.load("crane-4-mass")
-    from softstart.controller.finding import make_controller
-
-    made = make_controller("ramp", None)
-    compiled = simulate(chain, made, 0.15, fitted_to=CRANE)
-    plain = simulate(chain, twin.plain(made, CRANE), 0.15, fitted_to=CRANE)
-    for name in ("states", "events"):
-        assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
-
-
-def test_the_motor_may_sit_at_the_other_end():
-    chain = Chain.load("crane-4-mass")
-    forward = simulate(chain, "direct", fitted_to=CRANE)
-    turned = Chain(
-        reversed(chain.brought_to("motor").masses),
-        reversed(chain.brought_to("motor").shafts),
-        chain.motor,
-        load_mass=chain.load_mass,
-    )
-    back = simulate(turned, "direct", fitted_to=CRANE)
-    assert back.k_dyn == pytest.approx(forward.k_dyn, rel=1e-9)
-    assert back.start_time == pytest.approx(forward.start_time, rel=1e-10)
-    assert back.peak_torques[::-1] == pytest.approx(forward.peak_torques, rel=1e-9)
 
 
 def test_gears_change_nothing_but_the_shaft_on_which_things_are_said():
@@ -146,9 +99,10 @@ def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
     )
 
 
-def test_two_masses_on_a_shaft_with_a_damping_ratio_swing_with_it():
-    """Free vibration: after a damped period the twist has fallen to exp(-2 pi zeta/sqrt(1 - zeta^2))."""
-    zeta, c, J1, J2 = 0.03, 900.0, 0.4, 1.6
+@pytest.mark.parametrize("zeta", [0.0, 0.03])
+def test_two_masses_on_a_shaft_with_a_damping_ratio_swing_with_it(zeta):
+    """A spring without a gap pulls too: after a damped period exp(-2 pi zeta/sqrt(1 - zeta^2)) is left."""
+    c, J1, J2 = 900.0, 0.4, 1.6
     shaft = Shaft(c, damping_ratio=zeta, start_position=0.01)
     omega = np.sqrt(c * (1.0 / J1 + 1.0 / J2))
     period = 2.0 * np.pi / (omega * np.sqrt(1.0 - zeta**2))
@@ -169,8 +123,9 @@ def free_chain(gap: float = 0.03, damping: float = 0.0, law: str = "no-pull") ->
     return Chain([Mass(J, initial_speed=w) for J, w in zip(inertias, speeds, strict=True)], [shaft] * 4)
 
 
-@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
-@pytest.mark.parametrize("damping", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("law", "damping"), [("no-pull", 0.0), ("no-pull", 0.4), ("dead-zone", 0.4), ("modelica", 0.4)]
+)
 def test_momentum_and_energy_without_torque(damping, law):
     chain = free_chain(damping=damping, law=law)
     run = simulate(chain, None, 3.0)
@@ -191,16 +146,6 @@ def test_momentum_and_energy_without_torque(damping, law):
         assert run.energy.shafts > 0.1 * start
 
 
-def test_a_spring_without_a_gap_pulls_too():
-    """Modes superpose: the free vibration of two joined masses is a cosine, at any instant."""
-    J1, J2, c = 2.0, 3.0, 40.0
-    Omega = math.sqrt(c * (1 / J1 + 1 / J2))
-    run = simulate(Chain([Mass(J1), Mass(J2)], [Shaft(c, start_position=0.1)]), None, 7.0)
-    times = np.linspace(0.0, 7.0, 50)
-    assert run.at(times)["torques"][:, 0] == pytest.approx(4.0 * np.cos(Omega * times), abs=1e-12 * 4.0)
-    assert run.peak_torques[0] == pytest.approx(4.0, rel=1e-14)
-
-
 def test_forced_vibration_is_that_of_the_formula():
     """A damped oscillator driven by a harmonic, against a wall that its inertia is: exact steady state."""
     J, c, d, omega = 0.2, 80.0, 1.5, 17.0
@@ -213,40 +158,6 @@ def test_forced_vibration_is_that_of_the_formula():
         (answer * np.exp(1j * omega * times)).real, abs=1e-11 * abs(answer)
     )
     assert abs(run.energy.residual) < 1e-12 * (abs(run.energy.exciting) + run.energy.shafts)
-
-
-def test_an_engine_drives_a_chain():
-    """The torque of a four-stroke engine over time, on its own shaft behind a gear, against DOP853."""
-    torque = Engine.load("vaz-11113").torque_of_time(471.0, load=0.5, orders=4.0)
-    J, c, d, ratio = (0.05, 0.3), 900.0, 3.0, 2.5
-    drum = Mass(J[1] * ratio**2, name="drum", damping=0.2 * ratio**2)
-    chain = Chain([Mass(J[0], name="crank"), drum], [Shaft(c, damping=d, ratio=ratio)])
-    run = simulate(chain, None, 0.5, excitation={"crank": torque})
-
-    def slopes(t, y):
-        T = c * y[0] + d * (y[1] - y[2])
-        return [y[1] - y[2], (float(torque.at(np.array(t))) - T) / J[0], (T - 0.2 * y[2]) / J[1]]
-
-    found = solve_ivp(slopes, (0.0, 0.5), np.zeros(3), "DOP853", rtol=1e-12, atol=1e-12)
-    last = run.at(0.5)
-    assert last["w"] == pytest.approx(found.y[1:, -1], rel=1e-9)
-    assert last["twist"][0] == pytest.approx(found.y[0, -1], rel=1e-8)
-    assert torque.mean > 0.0
-    assert abs(run.energy.residual) < 1e-11 * run.energy.exciting
-
-
-def test_work_of_exciting_torques_by_quadrature():
-    chain = free_chain(damping=0.3)
-    hum = PeriodicTorque(0.7, [0.5, 2.0], [0.3, -0.1], [0.2, 0.4], speed=30.0)
-    run = simulate(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
-    nodes, weights = leggauss(8)
-    starts, ends = run.recorded.spans[:, 0], run.recorded.spans[:, 1]
-    half = 0.5 * (ends - starts)
-    times = starts[:, None] + half[:, None] * (1.0 + nodes)
-    w = run.at(times)["w"]
-    work = np.sum(half[:, None] * weights * hum.at(times) * (w[..., 0] + w[..., 2]))
-    assert run.energy.exciting == pytest.approx(work, rel=1e-9)
-    assert abs(run.energy.residual) < 1e-12 * abs(run.energy.exciting)
 
 
 def test_peaks_are_not_below_a_fine_grid_and_are_taken():
@@ -314,8 +225,6 @@ def two(**shaft) -> Chain:
         ),
         (Chain([Mass(1), Mass(1)], [Shaft(1)]), {"controller": None}, "until is missing"),
         (two(), {"controller": "direct", "until": -1.0}, "until = -1.0"),
-        (two(), {"controller": "direct", "max_events": 0}, "max_events = 0"),
-        (two(), {"controller": "direct", "fitted_to": 3}, "fitted_to = 3"),
         (two(), {"controller": "direct", "excitation": {"mas 1": None}}, "mass 1"),
         (
             Chain([Mass(1, initial_speed=1), Mass(1), Mass(1)], [Shaft("inf"), Shaft(1)]),
@@ -337,11 +246,6 @@ def test_a_load_that_cannot_be_moved_needs_an_end():
     assert run.status.name == "NOT_REACHED"
 
 
-def test_too_many_events_are_an_error():
-    with pytest.raises(SimulationError, match="That is 20"):
-        simulate("crane-4-mass", "direct", fitted_to=CRANE, max_events=20)
-
-
 def test_a_controller_that_fails_is_named():
     class Broken(PlainController):
         name = "broken"
@@ -351,15 +255,3 @@ def test_a_controller_that_fails_is_named():
 
     with pytest.raises(SimulationError, match="Broken failed at t = 0 s"):
         simulate("crane-4-mass", Broken())
-
-
-def test_the_summary_is_plain_data_and_the_figure_draws():
-    import json
-
-    run = simulate("crane-4-mass", "direct", fitted_to=CRANE, until=0.1)
-    told = json.loads(json.dumps(run.summary()))
-    assert told["peak_torques"] == run.peak_torques.tolist()
-    assert told["assumed"] == run.drive.assumed
-    assert len(run.plot().axes) == 3
-    with pytest.raises(ValueError, match="within the run"):
-        run.at(0.2)

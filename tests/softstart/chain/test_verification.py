@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,8 +19,8 @@ CHAIN = Chain.load("crane-4-mass")
 DRIVE = reduce_chain(CHAIN).to_drive()
 
 
-@pytest.mark.parametrize("controller", ["direct", "current-limit-feedback"])
-def test_both_sides_are_the_starts_themselves(controller):
+def test_both_sides_are_the_starts_themselves():
+    controller = "current-limit-feedback"
     found = verify_on_chain(CHAIN, DRIVE, controller)
     alone = simulate(DRIVE, controller)
     assert found.drive.k_dyn == alone.k_dyn
@@ -51,22 +50,35 @@ def test_the_worst_shaft_is_between_motor_and_load():
     assert verify_on_chain(behind, DRIVE, "direct").worst_shaft < 3
 
 
-def test_the_summary_has_both_sides():
-    told = json.loads(json.dumps(verify_on_chain(CHAIN, DRIVE, "direct").summary()))
-    assert told["chain_k_dyn"] / told["k_dyn"] == pytest.approx(1 + told["k_dyn_error"])
-    assert told["chain"]["assumed"] == CHAIN.assumed
-
-
 def test_a_chain_of_two_masses_is_its_own_drive():
     chain = chain_of(Drive.load("crane-4amtkf"))
     found = two_mass_error(chain, controllers=["direct", "ramp", "shaped"])
     assert found.error < 1e-9
     assert found.enough
-    assert two_mass_error(chain, controllers=["direct", "ramp", "shaped"]).summary() == found.summary()
 
 
-def test_the_error_is_the_largest_of_all_starts():
+def test_the_error_is_the_largest_of_all_starts(monkeypatch):
+    """Of no torque that was tried is it more; those are computed here for themselves."""
+    tried = []
+
+    def noted(chain, drive, profile):
+        tried.append((chain, drive, profile))
+        return error_under(chain, drive, profile)
+
+    monkeypatch.setattr("softstart.chain.two_masses.error_under", noted)
     found = two_mass_error("crane-4-mass", controllers=["direct", "pulse-coast-hold"])
+    errors = []
+    for chain, drive, profile in tried:
+        until = float(profile.time[-1]) + 2.0 * float(drive.elastic_period)
+        k_dyn = [
+            simulate(
+                one, "profile", until, parameters={"profile": profile}, fitted_to=drive, base=drive
+            ).k_dyn
+            for one in (drive, chain)
+        ]
+        errors.append(abs(k_dyn[1] / k_dyn[0] - 1.0))
+    assert len(errors) == 128
+    assert found.of_torques == pytest.approx(max(errors), rel=1e-12)
     direct, pulse = found.verified
     assert (found.worst, found.enough) == (pulse, False)
     assert found.error == max(pulse.error, found.of_torques)

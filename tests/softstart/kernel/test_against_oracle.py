@@ -24,7 +24,7 @@ KINDS = {
     "motor stops": "motor-stops",
 }
 DRIVES_PER_BLOCK = 25
-BLOCKS = 6 if settings.default.derandomize else 20  # `make fuzz` takes all
+BLOCKS = 4 if settings.default.derandomize else 20  # `make fuzz` takes all
 
 
 def case(seed: int) -> dict[str, Any]:
@@ -37,10 +37,8 @@ def case(seed: int) -> dict[str, Any]:
 
 def drive_of(drawn: dict[str, Any]) -> Drive:
     """The drive of this start."""
-    pieces, ends = (
-        drawn["torque_pieces"],
-        [*(piece[0] for piece in drawn["torque_pieces"][1:]), drawn["t_end"]],
-    )
+    pieces = drawn["torque_pieces"]
+    ends = [*(piece[0] for piece in pieces[1:]), drawn["t_end"]]
     torques = [u for _, u, *_ in pieces]
     torques += [u + (end - t) * sum(slope) for (t, u, *slope), end in zip(pieces, ends, strict=True)]
     Ms = max(*torques, 1.1 * drawn["Mc"], 1e-09)
@@ -124,10 +122,9 @@ def test_friction_of_motor_and_load(block: int) -> None:
         compare_with_oracle(case_with_friction(seed), seed)
 
 
-@pytest.mark.parametrize("block", range(6))
-def test_overdamped_shafts(block: int) -> None:
+def test_overdamped_shafts() -> None:
     """Damping from 1 to 30 times the critical one, whose two rates lie far apart."""
-    for seed in range(10_000 + 8 * block, 10_008 + 8 * block):
+    for seed in range(10_000, 10_016):
         drawn = case(seed)
         critical = 2.0 * np.sqrt(drawn["c"] * drawn["J1"] * drawn["J2"] / (drawn["J1"] + drawn["J2"]))
         drawn["d"] = float(critical * 10 ** np.random.default_rng(seed).uniform(0.0, 1.5))
@@ -170,15 +167,6 @@ def test_a_peak_after_a_rest_on_the_flank() -> None:
     run, other = run_of(drawn), integrate(**drawn)
     assert run.peak_torque == pytest.approx(2.0 * 1e-3 * 0.2 / 0.6, rel=1e-5)  # of a step: twice the mean
     assert run.peak_torque == pytest.approx(abs(other.peak), rel=1e-8)
-
-
-def test_a_limiter_much_faster_than_the_lag() -> None:
-    """Slewing in 1e-8 s before a lag of 10 s: the torque is that of the lag alone, to all its digits."""
-    drive = Drive.load("crane-4amtkf").replace(torque_lag=10.0, torque_rate=6e9)
-    run = simulate(drive, "direct", until=0.5)
-    t = np.array([1e-3, 0.1, 0.5])
-    late = 0.5 * 62.0 / 6e9  # as if the whole step came in the middle of the slewing
-    np.testing.assert_allclose(run.at(t)["u"], -62.0 * np.expm1((late - t) / 10.0), rtol=1e-11)
 
 
 def test_a_torque_that_rises_again_is_no_fall_of_rounding() -> None:

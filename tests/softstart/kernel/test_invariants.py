@@ -19,10 +19,11 @@ from softstart.kernel.records import BEYOND, OPEN
 SEEDS = st.integers(1_000, 100_000)
 
 
-@settings(max_examples=150, deadline=None)
-@given(SEEDS)
-def test_energy_balance(seed: int) -> None:
-    run = run_of(case(seed))
+@pytest.mark.parametrize("make", [case, case_with_friction])
+@settings(max_examples=60, deadline=None)
+@given(seed=SEEDS)
+def test_energy_balance(make: Any, seed: int) -> None:
+    run = run_of(make(seed))
     energy = run.energy
     turnover = max(
         abs(value)
@@ -41,7 +42,7 @@ def test_energy_balance(seed: int) -> None:
         assert energy.dissipated > -1e-9 * turnover
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(SEEDS)
 def test_total_momentum(seed: int) -> None:
     """J1 w1 + J2 w2 changes by the impulse of motor torque and load torque alone: the shaft is inside."""
@@ -68,7 +69,7 @@ def test_total_momentum(seed: int) -> None:
 
 
 @pytest.mark.parametrize("make", [case, case_with_friction])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=SEEDS, mass=st.floats(-4, 4), time=st.floats(-3, 3))
 def test_unit_changes(make: Any, seed: int, mass: float, time: float) -> None:
     """With inertias in other units and time in others, all figures are the same starts."""
@@ -83,7 +84,22 @@ def test_unit_changes(make: Any, seed: int, mass: float, time: float) -> None:
     assert other.start_time == pytest.approx(one.start_time * s, rel=1e-8, nan_ok=True)
 
 
-@settings(max_examples=60, deadline=None)
+@pytest.mark.parametrize("make", [case, case_with_friction])
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS)
+def test_the_instants_of_asking_change_nothing(make: Any, seed: int) -> None:
+    """Pieces cut into twelve are the same torque, whose spans begin elsewhere."""
+    drawn = make(seed)
+    pieces = dict(drawn["torque_pieces"])
+    for cut in np.linspace(0.0, drawn["t_end"], 13)[:-1].tolist():
+        pieces.setdefault(cut, next(u for t, u in reversed(drawn["torque_pieces"]) if t <= cut))
+    whole, parts = run_of(drawn), run_of({**drawn, "torque_pieces": sorted(pieces.items())})
+    if drawn["gap"] > 0.0:
+        assert [event.kind for event in whole.events] == [event.kind for event in parts.events]
+    assert parts.peak_torque == pytest.approx(whole.peak_torque, rel=1e-9, abs=1e-12 * drawn["c"])
+
+
+@settings(max_examples=30, deadline=None)
 @given(
     wait=st.floats(1e-6, 100.0),
     torque=st.floats(8.0, 62.0),
@@ -100,45 +116,28 @@ def test_time_shift(wait: float, torque: float, damping: float, lag: float) -> N
     assert later.contacts == now.contacts
 
 
-RAMPED = TorqueProfile([0.0, 0.02, 0.02, 0.15], [10.0, 50.0, 20.0, 60.0])
+RAMPED = TorqueProfile([0.0, 0.02, 0.02, 0.15], [10.0, 50.0, 20.0, 70.0])
 SENSED = TorqueProfile(
     [0.0, 0.4], [5.0, 40.0], after_contact=TorqueProfile([0.0, 0.1, 0.1], [0.0, 50.0, 60.0])
 )
-PROFILES = [
+STRATEGIES = [
     controller.make_controller("profile", {"profile": RAMPED}),
-    controller.make_controller("profile", {"profile": RAMPED, "period": 0.0013}),
     controller.make_controller("profile", {"profile": SENSED}),
     controller.make_controller("profile", {"profile": SENSED, "period": 0.0013}),
+    controller.make_controller("current-limit-feedback"),
 ]
-CONTROLLERS = [TwoSteps(20.0, 0.03, 62.0), *PROFILES, *controller.ready_controller_names()]
 
 
-@pytest.mark.parametrize("strategy", CONTROLLERS, ids=str)
-def test_batch_equals_single_exactly(strategy: Any) -> None:
-    rng = np.random.default_rng(7)
+@pytest.mark.parametrize("strategy", STRATEGIES, ids=str)
+def test_batch_recorded_start_and_plain_twin_have_the_same_bits(strategy: Any) -> None:
     base = Drive.load("crane-4amtkf").replace(torque_lag=0.002, load_kind="reactive", damping=0.2)
-    gaps, inertias = rng.uniform(0.05, 4.0, 25), rng.uniform(0.05, 0.4, 25)
-    many = simulate(records(base, gap=gaps, load_inertia=inertias), strategy)
-    listed = [base.replace(gap=g, load_inertia=j) for g, j in zip(gaps, inertias, strict=True)]
-    again = simulate(listed, strategy)
-    for i, drive in enumerate(listed):
-        run = simulate(drive, strategy)
-        for data in (many, again):
-            assert float(data.k_dyn[i]) == run.k_dyn
-            assert float(data.peak_torque[i]) == run.peak_torque
-            np.testing.assert_equal(float(data.start_time[i]), run.start_time)
-            assert float(data.contacts[i]) == run.contacts
-            assert str(data.status.values[i]) == run.status.name
-
-
-@pytest.mark.parametrize("strategy", [*PROFILES, *controller.ready_controller_names()], ids=str)
-def test_a_plain_controller_equals_its_compiled_twin(strategy: Any) -> None:
-    gaps = np.linspace(0.1, 3.0, 6)
-    drive = Drive.load("crane-4amtkf").replace(torque_lag=0.001)
-    compiled = controller.make_controller(strategy)
-    assert isinstance(compiled, controller.CompiledController)
-    fast = simulate(records(drive, gap=gaps), compiled, fitted_to=drive)
-    slow = simulate(records(drive, gap=gaps), plain(compiled, drive))
-    np.testing.assert_array_equal(fast.k_dyn, slow.k_dyn)
-    np.testing.assert_array_equal(fast.start_time, slow.start_time)
-    np.testing.assert_array_equal(fast.gap_events, slow.gap_events)
+    grid = records(base, gap=[0.05, 0.4, 4.0], computing_delay=[0.0, 0.0007, 0.003], torque_noise=0.1)
+    many = simulate(grid, strategy, fitted_to=base)
+    for i, drive in enumerate(grid.elements()):
+        run = simulate(drive, strategy, fitted_to=base)
+        slow = simulate(drive, plain(strategy, base))
+        for one in (run, slow):
+            assert float(many.k_dyn[i]) == one.k_dyn
+            np.testing.assert_equal(float(many.start_time[i]), one.start_time)
+            assert float(many.contacts[i]) == one.contacts
+            assert (many.torque_excess[i].item(), many.torque_excess_time[i].item()) == one.clipped

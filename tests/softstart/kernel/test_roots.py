@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.polynomial.polynomial import polyfromroots, polymul, polyval
 
-from softstart.kernel.events import NONE, first_root, value
+from softstart.kernel.events import NONE, first_root
 from softstart.kernel.records import N_WORK, WORK
 
 
@@ -82,8 +82,3 @@ def test_a_root_far_down_a_long_span_has_all_its_digits():
     s = root([1e-3, v * h, -0.5 * a * h * h]) * h
     exact = (v + np.sqrt(v * v + 2 * a * 1e-3)) / a
     assert s == pytest.approx(exact, rel=1e-13)
-
-
-def test_the_value_is_that_of_the_polynomial():
-    f = np.array([0.3, -1.0, 2.0, 0.5])
-    assert njit(lambda g: value(g, 3, 0.7))(f) == pytest.approx(polyval(0.7, f), rel=1e-15)

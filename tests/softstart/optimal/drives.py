@@ -19,6 +19,7 @@ HOIST = Drive(
     damping=1.5, target_speed="970 rpm", start_position="hanging",
 )  # fmt: skip
 HELD = HOIST.replace(brake="motor")
+QUICK = CRANE.replace(gap=0.0, target_speed=20.0)  # its shortest start is found in a moment
 
 
 def played(machine: Any, profile: TorqueProfile, until: float | None = None, base: Any = None) -> Run:

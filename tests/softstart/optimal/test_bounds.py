@@ -23,7 +23,6 @@ from tests.softstart.optimal.drives import (
 
 from softstart import Drive, TorqueProfile, optimize, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.controller import ready_controller_names
 from softstart.errors import SimulationError
 from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold
@@ -43,15 +42,16 @@ def slack(machine: Any, k_dyn: float, start_time: float, terminal: Any = "reache
     return k_dyn / bound.k_dyn - 1.0 if bound.k_dyn > 0.0 else 0.0
 
 
-@pytest.mark.parametrize("braking", [False, True])
-def test_no_torque_at_all_gets_below(braking: bool) -> None:
-    rng = np.random.default_rng(5 + braking)
-    closest, several, rubs = math.inf, 0, 0
-    for _ in range(400):
-        drive = moving_drive(rng)
-        if braking:
+@pytest.mark.parametrize("kind", ["moving", "braking", "placed"])
+def test_no_torque_at_all_gets_below(kind: str) -> None:
+    """Masses that move at first, friction, a motor that brakes; every position, free or behind a brake."""
+    rng = np.random.default_rng({"moving": 5, "braking": 6, "placed": 21}[kind])
+    closest, starts, several, rubs, released = math.inf, 0, 0, 0, 0
+    for _ in range(350):
+        drive = placed_drive(rng) if kind == "placed" else moving_drive(rng)
+        if kind == "braking":
             drive = drive.replace(minimum_torque=-drive.Ms * rng.uniform(0.05, 1.0))
-        if rng.random() < 0.25:
+        if kind != "placed" and rng.random() < 0.25:
             share = 0.2 * (drive.Ms - drive.Mc)
             rough = {
                 "motor_friction": share * rng.random(),
@@ -65,30 +65,16 @@ def test_no_torque_at_all_gets_below(braking: bool) -> None:
         except SimulationError:
             continue
         if not math.isnan(run.start_time):
-            several += run.contacts > 1
-            closest = min(closest, slack(drive, run.k_dyn, run.start_time))
-    assert closest >= -1e-9
-    assert several > 70
-    assert rubs > 70
-
-
-def test_no_torque_gets_below_from_any_position() -> None:
-    """With a brake the earliest release counts."""
-    rng = np.random.default_rng(21)
-    closest, starts, released = math.inf, 0, 0
-    for _ in range(350):
-        drive = placed_drive(rng)
-        try:
-            run = played(drive, random_torque(rng, drive))
-        except SimulationError:
-            continue
-        if not math.isnan(run.start_time):
-            starts += 1
-            released += drive.brake == "motor"
+            starts, several, released = (
+                starts + 1,
+                several + (run.contacts > 1),
+                released + (drive.brake != "none"),
+            )
             closest = min(closest, slack(drive, run.k_dyn, run.start_time))
     assert closest >= -1e-9
     assert starts > 170
-    assert released > 40
+    assert several > 60
+    assert released > 40 if kind == "placed" else rubs > 60
 
 
 def test_no_gentle_torque_gets_below() -> None:
@@ -108,28 +94,10 @@ def test_no_gentle_torque_gets_below() -> None:
     assert near > 20
 
 
-def test_no_shipped_controller_gets_below() -> None:
-    rng = np.random.default_rng(3)
-    starts = 0
-    for i in range(30):
-        drive = (
-            placed_drive(rng) if i % 2 else moving_drive(rng, initial_load_speed=0.0, initial_motor_speed=0.0)
-        )
-        for name in ready_controller_names():
-            try:
-                run = simulate(drive, name)
-            except SimulationError:
-                continue
-            if not math.isnan(run.start_time):
-                starts += 1
-                assert slack(drive, run.k_dyn, run.start_time) >= -1e-9, (name, drive)
-    assert starts > 120
-
-
 def test_no_random_torque_of_a_chain_gets_below() -> None:
     rng = np.random.default_rng(3)
     nearest, starts = math.inf, 0
-    for i in range(80):
+    for i in range(60):
         chain = damped_crane(float(rng.choice([0.0, 0.05])))
         gaps, inertia = float(10.0 ** rng.uniform(-2, 0.3)), float(rng.uniform(0.1, 2))
         chain = chain.changed(gaps=gaps, load_inertia=inertia)
@@ -152,7 +120,7 @@ def test_no_random_torque_of_a_chain_gets_below() -> None:
         if closed.size:  # no bound for a time at which the load cannot have been pulled yet
             assert momentum_shortest_time(Problem(chain, start_time, "reached")) <= closed[0]
     assert nearest >= 0.0
-    assert starts > 30
+    assert starts > 20
 
 
 @pytest.mark.parametrize("name", ["middle load", "motor in the middle", "friction", "no gaps", "ground"])
@@ -170,14 +138,14 @@ def test_no_torque_of_other_chains_gets_below(name: str) -> None:
                         motor, load_mass="c", target_speed=5.0),
     }  # fmt: skip
     chain, starts = chains[name], 0
-    for _ in range(40):
+    for _ in range(20):
         time = np.sort(np.append(0.0, rng.uniform(0.0, 0.4, 5)))
         profile = {"profile": TorqueProfile(time, rng.uniform(10.0, 100.0, 6))}
         run = simulate(chain, "profile", 1.0, parameters=profile, fitted_to=CRANE)
         if not math.isnan(run.start_time):
             starts += 1
             assert slack(chain, run.k_dyn, run.start_time) >= -1e-9
-    assert starts > 10
+    assert starts > 5
 
 
 def test_a_load_that_follows_a_curve_and_losses_have_no_bound() -> None:
@@ -209,18 +177,13 @@ def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(start_time: flo
 
 
 def test_the_plain_form() -> None:
-    """A braking motor leaves only J2 (target - w2) = (P - Mc) (t - t_c) - Mc t_c."""
-    drive = CRANE.replace(minimum_torque=-20.0)
+    """A braking motor leaves J2 (target - w2) = (P - Mc) (t - t_c) - Mc t_c; reactive: from rest."""
+    problem = Problem(CRANE.replace(minimum_torque=-20.0), 0.3)
     t_c = math.sqrt(2.0 * 0.25 / (62.0 / 0.035 + 7.16 / 0.175))
     P = (0.175 * 60.0 + 7.16 * 0.3) / (0.3 - t_c)
-    problem = Problem(drive, 0.3)
     assert momentum_bound(problem).k_dyn == pytest.approx(P / problem.base_torque, rel=1e-9)
-
-
-def test_a_reactive_load_starts_from_rest() -> None:
-    drive = CRANE.replace(load_kind="reactive", damping=1.0)
+    problem = Problem(CRANE.replace(load_kind="reactive", damping=1.0), 0.3)
     t_c = math.sqrt(2.0 * 0.25 * 0.035 / 62.0)
-    problem = Problem(drive, 0.3)
     P = 7.16 + 0.175 * 60.0 / (0.3 - t_c)
     assert momentum_bound(problem).k_dyn == pytest.approx(P / problem.base_torque, rel=1e-9)
 
@@ -238,12 +201,9 @@ def test_a_chain_knows_the_momentum_of_its_load() -> None:
 @pytest.mark.parametrize(
     "drive",
     [
-        CRANE,
         CRANE.replace(start_position=-0.25, initial_motor_speed=3.0),
         CRANE.replace(load_kind="reactive"),
-        CRANE.replace(load_kind="reactive", gap=0.0),
         CRANE.replace(load_kind="reactive", start_position=0.26, load_torque=20.0),
-        CRANE.replace(load_kind="reactive", initial_motor_speed=2.0),
     ],
 )
 def test_the_earliest_pull_is_that_of_full_torque(drive: Drive) -> None:
@@ -258,21 +218,16 @@ def test_a_damped_contact_has_to_be_gentle() -> None:
     assert momentum_bound(damped).k_dyn > 1.01 * momentum_bound(braked).k_dyn
 
 
-def test_without_time_only_the_load_torque_remains() -> None:
+def test_the_ends_of_the_bound() -> None:
+    """Without a time only the load torque is left; too short a time for a contact has no start."""
     problem = Problem(CRANE, minimise="start_time")
     assert momentum_bound(problem).k_dyn == pytest.approx(7.16 / problem.base_torque)
-
-
-def test_full_torque_all_the_way_is_no_less_than_allowed() -> None:
-    """The only start that is in time by a hair: rounding must not call it impossible."""
+    assert momentum_bound(Problem(CRANE, 0.01)).k_dyn == math.inf
+    assert momentum_bound(Problem(damped_crane(), 0.005)).k_dyn == math.inf
+    # full torque all the way is in time by a hair: rounding must not call it impossible
     drive = CRANE.replace(gap=0.0, load_torque=0.0, target_speed=1.0)
     run = simulate(drive, "direct")
     assert momentum_bound(Problem(drive, run.start_time, "reached")).k_dyn <= run.k_dyn
-
-
-def test_too_short_for_a_contact() -> None:
-    assert momentum_bound(Problem(CRANE, 0.01)).k_dyn == math.inf
-    assert momentum_bound(Problem(damped_crane(), 0.005)).k_dyn == math.inf
 
 
 def test_shortest_times() -> None:
@@ -326,7 +281,7 @@ def test_the_least_heat_is_momentum_by_cauchy_and_schwarz() -> None:
 
 def test_no_start_has_less_heat() -> None:
     """Optima of K_dyn are starts; where only the load has its speed, or a brake helps, no bound is known."""
-    for drive, time in ((CRANE, LONG), (CRANE, 0.6), (CRANE.replace(load_kind="reactive"), 0.3)):
+    for drive, time in ((CRANE, LONG), (CRANE.replace(load_kind="reactive"), 0.3)):
         best = optimize(drive, time)
         bound = least_heat(Problem(drive, time, minimise="heat", k_dyn=best.k_dyn))
         assert 0.5 * best.heat < bound < best.heat
@@ -334,11 +289,3 @@ def test_no_start_has_less_heat() -> None:
     assert least_heat(Problem(CRANE, 0.3, "reached", "heat")) == 0.0
     assert least_heat(Problem(HELD.replace(release=0.05), 0.4, minimise="heat")) == 0.0
     assert least_heat(Problem(damped_crane(), 0.4, minimise="heat")) == 0.0
-
-
-def test_constant_torque_without_a_shaft_to_wind_reaches_it() -> None:
-    stiff = CRANE.replace(gap=0.0, stiffness=2e5, start_position=7.16 / 2e5)
-    problem = Problem(stiff, 0.3, minimise="heat")
-    mean = 0.21 * 60.0 / 0.3 + 7.16
-    run = played(stiff, TorqueProfile([0.0], [mean]), 0.3)
-    assert heat_of(run, 0.3) == pytest.approx(least_heat(problem), rel=1e-9)

@@ -20,7 +20,7 @@ from softstart import Drive, TorqueProfile, optimize
 from softstart.arrays import Vector
 from softstart.optimal import certificate, contact_motion
 from softstart.optimal.bounds import momentum_bound
-from softstart.optimal.certificate import _Dual, _Multipliers, _Search, certified_bound, not_certified
+from softstart.optimal.certificate import _Dual, _Multipliers, _Search, not_certified
 from softstart.optimal.contact_motion import Contact, entries
 from softstart.optimal.problem import Problem, Terminal
 
@@ -385,23 +385,11 @@ def test_a_free_motion_stays_within_its_enclosure(share: float, y: float, rate: 
     )
 
 
-@pytest.mark.parametrize("name", ["crane-4amtkf-light", "crane-4amtkf-worn"])
-def test_it_is_close_where_momentum_is_far(name: str) -> None:
-    """K_dyn above 1, at 1.2 times the start time of direct: the momentum bound is 38 and 28 % below."""
-    best = optimize(Drive.load(name), "1.2x")
+def test_it_is_close_where_momentum_is_far() -> None:
+    """K_dyn above 1, at 1.2 times the start time of direct: the momentum bound is 38 % below."""
+    best = optimize(Drive.load("crane-4amtkf-light"), "1.2x")
     assert 0.9985 * best.k_dyn < best.bound.k_dyn <= best.k_dyn
     assert momentum_bound(best.problem).k_dyn < 0.75 * best.k_dyn
-
-
-def test_what_the_bound_covers_is_said() -> None:
-    said = certified_bound(Problem(CRANE, 0.2883042), 0.909)
-    assert said.kind == "certificate"
-    assert "gap closes once" in said.covers
-    assert "both masses have the target speed" in said.covers
-    reactive = certified_bound(Problem(CRANE.replace(load_kind="reactive"), 0.3, "reached"), 0.8)
-    assert "moving on once it moves" in reactive.covers
-    closed = certified_bound(Problem(CRANE.replace(gap=0.0), 0.3, "reached"), 0.8)
-    assert "whose gap stays closed until the target speed is reached" in closed.covers
 
 
 @pytest.mark.parametrize(
@@ -413,10 +401,8 @@ def test_what_the_bound_covers_is_said() -> None:
         ({"initial_load_speed": 3.0}, "runs away"),
         ({"load_kind": "reactive", "damping": 1.0}, "depends on the speed"),
         ({"load_kind": "reactive", "initial_motor_speed": 3.0}, "moves before the contact"),
-        ({"start_position": -0.3}, "wound up against the load"),
         ({"load_kind": "reactive", "start_position": 0.27}, "wound up against the load"),
     ],
 )
 def test_nothing_is_certified_where_the_start_is_no_linear_problem(given: dict[str, Any], why: str) -> None:
     assert why in not_certified(Problem(CRANE.replace(**given), 0.3, "steady"))
-    assert "start time" in not_certified(Problem(CRANE.replace(**given), None, minimise="start_time"))

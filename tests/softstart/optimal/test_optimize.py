@@ -15,6 +15,7 @@ from tests.softstart.optimal.drives import (
     HELD,
     HOIST,
     LONG,
+    QUICK,
     SHORT,
     damped_crane,
     gentle_torque,
@@ -31,7 +32,7 @@ from softstart import Drive, InfeasibleError, InputError, Optimum, TorqueProfile
 from softstart.controller import ready_controller_names
 from softstart.errors import SimulationError
 from softstart.optimal.bounds import least_heat, momentum_bound
-from softstart.optimal.optimize import scenarios_of, shortest_start_time, start_time_of_direct
+from softstart.optimal.optimize import scenarios_of, shortest_start_time
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 
@@ -77,7 +78,6 @@ def kept(best: Optimum) -> Optimum:
         slopes = np.abs(np.diff(best.profile.torque)) / np.maximum(np.diff(best.profile.time), 1e-300)
         assert best.profile.torque[0] == 0.0
         assert slopes.max() <= min(float(record.rate), 1e9) * (1.0 + 1e-6)  # no steps
-    assert best.summary()["k_dyn"] == best.k_dyn
     assert best.claimed == pytest.approx(best.minimised, rel=1e-3)
     return best
 
@@ -91,7 +91,6 @@ def test_the_anchor_by_the_closed_form() -> None:
     assert best.k_dyn == pytest.approx(0.90924724, abs=1e-6)
     assert 0.9999 * best.k_dyn <= best.bound.k_dyn <= best.k_dyn * (1 + 1e-9)
     assert best.run.contacts == 1
-    assert (best.problem.terminal, best.tried[0].method) == ("synchronous", "closed-form")
 
 
 def test_a_bang_bang_optimum() -> None:
@@ -114,7 +113,7 @@ def test_terminals_cost_what_they_ask_for() -> None:
 
 def test_a_heavily_damped_contact_begins_with_a_jump_of_torque() -> None:
     """T(0+) = d v is the peak here: the gap has to be crossed slowly."""
-    best = kept(solved(CRANE.replace(damping=20.0), 0.35, terminal="reached"))
+    best = kept(optimize(CRANE.replace(damping=20.0), 0.35, terminal="reached"))
     assert best.run.peak_time == pytest.approx(best.run.first_contact, abs=1e-6)
 
 
@@ -135,9 +134,7 @@ IDLE = Drive(
     ("drive", "start_time", "k_dyn"),
     [
         (IDLE.replace(damping=0.1), 0.2, 0.7629),
-        pytest.param(CRANE.replace(load_torque=0.01), 0.27, 0.8689, marks=SLOW),
         pytest.param(IDLE, 0.17, 0.9198, marks=SLOW),  # with a load torque of 0.03 N m
-        pytest.param(IDLE.replace(load_torque=0.001), 0.17, 0.9198, marks=SLOW),
     ],
 )
 def test_a_steady_start_without_load_torque(drive: Drive, start_time: float, k_dyn: float) -> None:
@@ -151,31 +148,23 @@ def test_a_steady_start_without_load_torque(drive: Drive, start_time: float, k_d
 CLASSES: dict[str, Any] = {
     "lag": (CRANE.replace(torque_lag=0.005), 0.29, {}),
     "damped": (CRANE.replace(damping=0.5), 0.27, {}),
-    "rate": (CRANE.replace(torque_rate=2000.0), 0.31, {}),
     "braking": (CRANE.replace(minimum_torque=-30.0), 0.26, {}),
     "reactive": (CRANE.replace(load_kind="reactive"), 0.27, {}),
-    "friction": (
-        CRANE.replace(motor_friction=2.0, motor_viscous_friction=0.02),
-        0.3,
-        {"terminal": "reached"},
-    ),
     "brake": (HELD.replace(torque_lag=0.005), "1.2x", {}),
     "heat under": (CRANE, 0.32, {"heat": 0.2}),
 }
+FRICTION = CRANE.replace(motor_friction=2.0, motor_viscous_friction=0.02)
 MORE: dict[str, Any] = {
+    "rate": (CRANE.replace(torque_rate=2000.0), 0.31, {}),
+    "friction": (FRICTION, 0.3, {"terminal": "reached"}),
     "lag, rate": (CRANE.replace(torque_lag=0.003, torque_rate=3e3, damping=0.3), 0.33, STEADY),
     "dead-zone, braking": (CRANE.replace(damping=0.5, contact_law="dead-zone", minimum_torque=-9), 0.27, {}),
     "modelica": (CRANE.replace(damping=0.3, contact_law="modelica"), 0.2883, {}),
     "reactive, damped": (CRANE.replace(load_kind="reactive", damping=1.0, torque_lag=0.004), 0.29, {}),
-    "reactive, braking": (CRANE.replace(load_kind="reactive", minimum_torque=-10.0), 0.29, {}),
-    "touching": (CRANE.replace(torque_lag=0.004, start_position=0.25), 0.28, {}),
-    "moving": (CRANE.replace(initial_load_speed=5.0, initial_motor_speed=8.0), 0.27, {"terminal": "steady"}),
-    "curve": (CRANE, 0.33, {"torque_speed": ((0.0, 62.0), (30.0, 62.0), (70.0, 30.0))}),
+    "moving": (CRANE.replace(initial_load_speed=5.0, initial_motor_speed=8.0), 0.27, STEADY),
     "curve, lag": (CRANE.replace(torque_lag=0.003), 0.4, {"torque_speed": CURVE, "terminal": "reached"}),
     "smooth": (CRANE, 0.2883, {"smoothness": 3e-5}),
-    "heat": (CRANE, 0.2883, {"minimise": "heat"}),
     "heat, k_dyn": (CRANE, 0.2883, {"minimise": "heat", "k_dyn": 0.95}),
-    "late release": (HELD.replace(release=0.1), 0.31, {"terminal": "reached"}),
     "dropped": (HELD.replace(start_position="driving-flank", release=0.01), "1.2x", {"terminal": "reached"}),
     "three masses": (three_masses(), 0.2, {}),
     "three masses, reactive": (three_masses(kind="reactive"), 0.2, {}),
@@ -183,7 +172,7 @@ MORE: dict[str, Any] = {
     "three masses, ends": (three_masses(), 0.2, {"terminal": "synchronous"}),
     "losses": (three_masses(efficiency=0.95), 0.2, {}),
     "fan": (three_masses(curve_speed=[0.0, 8.0, 30.0], curve_torque=[0.0, 10.0, 40.0]), 0.25, {}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", [*CLASSES, *(pytest.param(name, marks=SLOW) for name in MORE)])
@@ -202,31 +191,19 @@ def test_every_class_keeps_what_it_promises(name: str) -> None:
 
 
 def test_what_a_motor_cannot_do_never_helps() -> None:
-    """Lag, rate and braking are ordered; a load that is not turned back at first needs less."""
-    ideal = {time: solved(CRANE, time).k_dyn for time in (0.27, 0.29, 0.31)}
+    """Lag and braking are ordered; a load that is not turned back at first needs less."""
+    ideal = {time: solved(CRANE, time).k_dyn for time in (0.27, 0.29)}
     assert solved(*CLASSES["lag"][:2]).k_dyn > ideal[0.29]
-    assert solved(*CLASSES["rate"][:2]).k_dyn > ideal[0.31]
     assert solved(*CLASSES["reactive"][:2]).k_dyn < ideal[0.27]
     quick = solved(*CLASSES["braking"][:2])
     assert quick.k_dyn <= solved(CRANE, 0.26).k_dyn * (1.0 + 1e-3)
 
 
 @SLOW
-@pytest.mark.parametrize(
-    ("key", "values"), [("torque_lag", [1e-6, 0.003, 0.02]), ("torque_rate", [1e7, 5e3, 1.5e3])]
-)
-def test_what_can_do_less_starts_no_gentler(key: str, values: list[float]) -> None:
-    peaks = [optimize(CRANE.replace(**{key: value}), 0.32).k_dyn for value in values]
-    assert peaks[0] == pytest.approx(solved(CRANE, 0.32).k_dyn, rel=1e-3)  # hardly any: the ideal torque
-    assert peaks[0] * 1.002 < peaks[2]
-    assert peaks == sorted(peaks)
-
-
-@pytest.mark.parametrize("given", [{}, pytest.param({"torque_lag": 0.004, "damping": 0.3}, marks=SLOW)])
-def test_a_change_of_units_leaves_k_dyn_as_it_is(given: dict[str, float]) -> None:
+def test_a_change_of_units_leaves_k_dyn_as_it_is() -> None:
     """Times 7-fold, torques a hundredth."""
-    t, m = 7.0, 0.01
-    drive, time = CRANE.replace(**given), SHORT if not given else 0.29
+    t, m, time = 7.0, 0.01, 0.29
+    drive = CRANE.replace(torque_lag=0.004, damping=0.3)
     scaled = drive.replace(
         motor_inertia=drive.J1 * m * t**2, load_inertia=drive.J2 * m * t**2, stiffness=drive.c * m,
         damping=drive.d * m * t, load_torque=drive.Mc * m, starting_torque=drive.Ms * m,
@@ -238,9 +215,7 @@ def test_a_change_of_units_leaves_k_dyn_as_it_is(given: dict[str, float]) -> Non
     assert there.heat == pytest.approx(here.heat * t, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "seed", [6, 28, *(pytest.param(k, marks=SLOW) for k in (8, 12, 13, 21, 33, 35, 36, 41))]
-)
+@pytest.mark.parametrize("seed", [28, *(pytest.param(k, marks=SLOW) for k in (6, 13, 33, 36, 41))])
 def test_nobody_is_gentler(seed: int) -> None:
     """All strategies, 200 torques at random and near the answer, on a random drive; none below the bound."""
     rng = np.random.default_rng(seed)
@@ -263,6 +238,7 @@ def test_nobody_is_gentler(seed: int) -> None:
     assert gentlest >= best.bound.k_dyn * (1.0 - 1e-6)
 
 
+@SLOW
 def test_no_perturbed_profile_is_better() -> None:
     """Torque moved from one span to another, within the limits and in time, of a damped drive."""
     drive = CRANE.replace(damping=1.0)
@@ -286,6 +262,7 @@ def test_no_perturbed_profile_is_better() -> None:
     assert kept_in_time > 15
 
 
+@SLOW
 def test_an_answer_nearby_is_used_and_does_no_harm() -> None:
     drive = CRANE.replace(damping=0.5)
     near = solved(*CLASSES["damped"][:2])
@@ -300,24 +277,23 @@ def test_an_answer_nearby_is_used_and_does_no_harm() -> None:
 
 def test_too_short_a_start_time() -> None:
     """What is proved and what was not found are told apart, and none names a shorter start."""
+    asked: dict[str, Any] = {"terminal": "reached"}
     with pytest.raises(
         InfeasibleError, match=r"No torque brings .* the shortest start found takes"
     ) as raised:
-        optimize(CRANE, 0.2)
+        optimize(QUICK, 0.05, **asked)
     shortest = raised.value.verdict.shortest_start_time
-    assert 0.21 * 60.0 / (62.0 - 7.16) < shortest < 0.25
-    assert raised.value.verdict.summary()["status"] == "INFEASIBLE"
+    assert 0.21 * 20.0 / (62.0 - 7.16) < shortest <= simulate(QUICK, "direct").start_time
     with pytest.raises(InfeasibleError, match="No torque was found that brings"):
-        optimize(CRANE, 0.999 * shortest)
-    assert kept(optimize(CRANE, 1.002 * shortest)).end_time <= 1.002 * shortest
+        optimize(QUICK, 0.999 * shortest, **asked)
+    assert kept(optimize(QUICK, 1.002 * shortest, **asked)).end_time <= 1.002 * shortest
 
 
 def test_a_start_time_may_be_a_multiple_of_that_of_direct() -> None:
-    assert start_time_of_direct(CRANE) == (direct := simulate(CRANE, "direct").start_time)
-    assert solved(CRANE, "1.2x").end_time == pytest.approx(1.2 * direct, rel=1e-9)
-    usual = optimize(CRANE)
-    assert usual.k_dyn == solved(CRANE, "1.2x").k_dyn
-    assert "no start time given: 1.2x that of direct" in usual.why
+    assert solved(CRANE, "1.2x").end_time == pytest.approx(
+        1.2 * simulate(CRANE, "direct").start_time, rel=1e-9
+    )
+    assert optimize(CRANE).k_dyn == solved(CRANE, "1.2x").k_dyn
     assert solved(CRANE, "300 ms").k_dyn == solved(CRANE, 0.3).k_dyn
 
 
@@ -350,8 +326,6 @@ def test_the_least_start_time_under_a_k_dyn_is_the_root_of_the_formula(k_dyn: fl
     assert best.kept is not None
     assert best.k_dyn <= k_dyn
     assert best.kept.at_least <= best.end_time <= best.kept.at_least * (1.0 + 3e-5)
-    assert best.minimised == best.end_time == best.summary()["start_time"]
-    assert best.gap_percent == pytest.approx(100.0 * (best.end_time / best.kept.at_least - 1.0))
     formula = PulseCoastHold.of(best.problem).least_peak_for(60.0, best.end_time)
     assert formula == pytest.approx(k_dyn * CRANE.mean_torque, rel=3e-5)
     assert momentum_bound(Problem(CRANE, 0.9999 * best.kept.at_least)).k_dyn > k_dyn
@@ -396,23 +370,6 @@ def test_the_least_heat_is_between_its_bound_and_that_of_the_gentlest() -> None:
     assert bounded.k_dyn <= 0.95 * (1.0 + 1e-3)
 
 
-@SLOW
-def test_a_stiff_drive_is_one_mass_which_constant_torque_heats_least() -> None:
-    drive = CRANE.replace(gap=0.0, stiffness=2000.0)
-    best = kept(optimize(drive, 0.3, minimise="heat"))
-    assert best.heat_at_least < best.heat < 1.02 * best.heat_at_least
-
-
-@SLOW
-def test_smoothness_makes_the_torque_continuous_and_costs_the_more_the_more_it_weighs() -> None:
-    answers = [solved(CRANE, 0.2883, **given) for given in ({}, {"smoothness": 3e-5}, {"smoothness": 3e-4})]
-    rough = [
-        float(np.sum(np.diff(best.profile.torque) ** 2 / np.diff(best.profile.time))) for best in answers[1:]
-    ]
-    assert answers[0].k_dyn < answers[1].k_dyn < answers[2].k_dyn < 1.1 * answers[0].k_dyn
-    assert rough[0] > rough[1]
-
-
 # brakes and positions --------------------------------------------------------------------------------------
 
 
@@ -427,7 +384,7 @@ def test_a_held_hoist_is_near_1_in_the_time_of_direct() -> None:
     assert free.k_dyn == pytest.approx(quick.k_dyn, rel=1e-3)
 
 
-@pytest.mark.parametrize("where", ["driving-flank", "mid-gap", "opposite-flank", "hanging"])
+@pytest.mark.parametrize("where", ["driving-flank", "opposite-flank", "hanging"])
 def test_the_closed_form_answers_every_position(where: str) -> None:
     best = kept(solved(CRANE.replace(start_position=where), 0.32, terminal="reached"))
     assert best.method == "closed-form"
@@ -435,7 +392,7 @@ def test_the_closed_form_answers_every_position(where: str) -> None:
 
 
 @SLOW
-@pytest.mark.parametrize("seed", [None, 0, 3])
+@pytest.mark.parametrize("seed", [None, 3])
 def test_an_unknown_position_is_the_worst_of_all(seed: int | None) -> None:
     drive = CRANE.replace(start_position="unknown") if seed is None else random_unknown(seed)
     best = kept(optimize(drive, 0.3 if seed is None else "1.2x"))
@@ -450,7 +407,6 @@ def test_an_unknown_position_is_the_worst_of_all(seed: int | None) -> None:
     assert best.bound.k_dyn == pytest.approx(max(each), rel=1e-12)
     assert set(best.alone) <= set(drive.positions)
     assert all(alone.k_dyn <= best.k_dyn * (1.0 + 1e-3) for alone in best.alone.values())
-    assert best.summary()["k_dyn_if_position_known"] == {at: one.k_dyn for at, one in best.alone.items()}
     for name in ("direct", "ramp", "s-curve"):  # strategies that measure nothing
         run = simulate(drive, name)
         assert not run.start_time <= best.end_time or run.k_dyn >= best.k_dyn * (1.0 - 1e-3)
@@ -471,22 +427,8 @@ def test_one_torque_for_several_gaps() -> None:
         assert best.k_dyn == max(best.k_dyn_each) == best.k_dyn_each[best.worst] == best.run.k_dyn
         assert max(best.start_times) <= LONG
         assert all(alone.k_dyn <= best.k_dyn * (1.0 + 1e-3) for alone in best.alone.values())
-        figures = best.summary()
-        assert figures["k_dyn_each"] == list(best.k_dyn_each)
-        assert (figures["start_times"], figures["worst"]) == (list(best.start_times), best.worst)
-        assert len(figures["scenarios"]) == len(best.runs) - 1
     turned = optimize(gaps[0.7], LONG, scenarios=[CRANE], base=CRANE)
     assert turned.k_dyn == pytest.approx(two.k_dyn, rel=5e-3)  # the order of scenarios does not matter
-
-
-@SLOW
-def test_the_same_machine_twice_is_one_and_the_slowest_decides() -> None:
-    alone = solved(CRANE, LONG, terminal="reached")
-    twice = optimize(CRANE, LONG, scenarios=[CRANE])
-    assert twice.k_dyn == pytest.approx(alone.k_dyn, rel=1e-3)
-    assert twice.k_dyn_each[0] == twice.k_dyn_each[1]
-    with pytest.raises(InfeasibleError):
-        optimize(CRANE, 0.2, scenarios=[CRANE.replace(load_inertia=0.25)])
 
 
 def test_the_grid_of_scenarios() -> None:
@@ -497,11 +439,13 @@ def test_the_grid_of_scenarios() -> None:
     assert scenarios_of(CRANE) == (CRANE,)
     with pytest.raises(InputError, match="gap = 3: give a list of numbers"):
         scenarios_of(CRANE, gaps=3)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="gap = -1"):
-        scenarios_of(CRANE, gaps=[-1.0])
     chains = scenarios_of(damped_crane(), inertias=[1e4])
     assert [one.masses[-1].inertia for one in chains] == [damped_crane().masses[-1].inertia, 1e4]
     assert len(scenarios_of(CRANE.replace(start_position="unknown"), gaps=[1.0])) == 2
+
+
+@SLOW
+def test_the_shortest_start_of_several_machines_is_that_of_the_slowest() -> None:
     two = optimize(CRANE, minimise="start_time", scenarios=scenarios_of(CRANE, gaps=[0.6])[1:])
     alone = optimize(CRANE, minimise="start_time", terminal="reached").end_time
     assert two.end_time == max(two.start_times) >= 0.999 * alone
@@ -510,7 +454,7 @@ def test_the_grid_of_scenarios() -> None:
 # limits ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("torque", [25.0, 40.0, 50.0])
+@pytest.mark.parametrize("torque", [25.0, 50.0])
 def test_where_a_formula_is_exact_the_limit_is_reached(torque: float) -> None:
     best = optimize(CRANE.replace(permissible_torque=torque), limits=True)
     assert best.kept is not None
@@ -527,7 +471,6 @@ def test_where_a_formula_is_exact_the_limit_is_reached(torque: float) -> None:
     "drive",
     [
         HELD.replace(permissible_torque=153.0, permissible_start_time=0.2),
-        CRANE.replace(permissible_torque=60.0),
         CRANE.replace(permissible_torque=45.0, load_kind="reactive"),
         CRANE.replace(gap=0.02, start_position="unknown", target_speed=30.0, permissible_torque=70.0),
     ],
@@ -544,7 +487,6 @@ def test_nothing_keeps_the_limits_in_less_time(drive: Drive) -> None:
     assert best.kept.kept == in_time
     rows = compare(drive, [best.run.controller], worst_case=[]).rows
     assert [str(one) for one in best.kept.margins] == [str(one) for one in rows[0].margins(drive.limits)]
-    assert best.summary()["limits"]["margins"] == [one.summary() for one in best.kept.margins]
     rng = np.random.default_rng(14)
     runs = [simulate(drive, name) for name in ready_controller_names()]
     runs += [played(drive, shaken(rng, best.profile, 0.0, float(drive.Ms))) for _ in range(40)]
@@ -575,28 +517,11 @@ def test_with_wide_limits_the_motor_torque_is_what_forbids_a_quicker_start() -> 
     assert best.kept.at_least < best.end_time < 0.2498 * (1.0 + 1e-3)
 
 
-@SLOW
-@pytest.mark.parametrize("share", [0.4, 1.5])
-def test_a_brake_that_is_released_late_is_no_bound_on_the_start_time(share: float) -> None:
-    drive = HELD.replace(release=share * HELD.elastic_period, target_speed=20.0, permissible_torque=180.0)
-    best = optimize(drive, limits=True)
-    assert best.kept is not None
-    assert best.run.peak_torque <= 180.0
-    assert 0.0 <= best.kept.at_least <= best.end_time
-    assert best.end_time > drive.release
-
-
-def test_a_torque_that_no_start_keeps_is_proved_so() -> None:
-    """The active load falls back through half the gap and hits harder than 9 N m by itself."""
-    with pytest.raises(InfeasibleError, match=r"limits: no start of Crane .* has a K_dyn below"):
-        optimize(CRANE.replace(permissible_torque=9.0), limits=True)
-
-
 # chains ----------------------------------------------------------------------------------------------------
 
 
 @SLOW
-@pytest.mark.parametrize("terminal", ["reached", "synchronous", "steady"])
+@pytest.mark.parametrize("terminal", ["reached", "steady"])
 def test_a_chain_without_gaps_ends_as_asked(terminal: Any) -> None:
     """Everything is linear: any first demand leads to the same answer."""
     best = kept(solved(without_gaps(), 0.3, terminal=terminal))
@@ -610,16 +535,13 @@ def test_a_chain_without_gaps_ends_as_asked(terminal: Any) -> None:
 def test_the_crane_starts_more_gently_than_any_torque_known_before() -> None:
     best = kept(solved(damped_crane(), 0.42))
     assert best.k_dyn < 1.19  # the best of the prototypes; 1.166 is known
-    assert best.summary()["k_dyns"].values()
 
 
 # confirmed by CasADi ---------------------------------------------------------------------------------------
 
 
 @SLOW
-@pytest.mark.parametrize(
-    ("drive", "time"), [(CRANE, LONG), (CRANE, SHORT), (CRANE.replace(damping=0.3), 0.28)]
-)
+@pytest.mark.parametrize(("drive", "time"), [(CRANE, SHORT), (CRANE.replace(damping=0.3), 0.28)])
 def test_confirm_solves_the_casadi_problem_from_its_own_guess(drive: Drive, time: float) -> None:
     best = kept(optimize(drive, time, confirm=True))
     ours, theirs = (one.value for one in best.tried)
@@ -628,16 +550,10 @@ def test_confirm_solves_the_casadi_problem_from_its_own_guess(drive: Drive, time
     assert best.k_dyn <= ours * (1.0 + 1e-6)
 
 
-@SLOW
-def test_confirm_is_for_one_start() -> None:
-    with pytest.raises(InputError, match="confirm: the CasADi problem is for one start"):
-        optimize(CRANE, 0.35, scenarios=[CRANE], confirm=True)
-
-
 # what is refused -------------------------------------------------------------------------------------------
 
-UNKNOWN = CRANE.replace(start_position="unknown")
-CHAIN = damped_crane()
+STRONG = HOIST.replace(permissible_torque=175.0)
+WEAK = CRANE.replace(starting_torque=10, load_torque=2)
 
 
 @pytest.mark.parametrize(
@@ -645,38 +561,31 @@ CHAIN = damped_crane()
     [
         (CRANE, {"start_time": -1.0}, "start_time = -1.0: give a time above 0"),
         (CRANE, {"start_time": math.nan}, "start_time = nan: give a time"),
-        (CRANE, {"start_time": True}, "start_time = True: give a time"),
         (CRANE, {"terminal": "still"}, "terminal = 'still': choose one of synchronous"),
-        (CRANE, {"minimise": "noise"}, "minimise = 'noise': choose one of k_dyn"),
         (CRANE, {"k_dyn": 1.0}, "k_dyn: it is what is minimised"),
-        (CRANE, {"heat": -1.0}, "heat = -1.0: give a bound above 0"),
         (CRANE, {"smoothness": -1.0}, "smoothness = -1.0: a weight in s, 0 or more"),
         (CRANE, {"minimise": "start_time"}, "start_time: it is what is minimised"),
         (CRANE, {"torque_speed": [(0, 60), (10, 50), (20, 45)]}, "this curve bends upward"),
         (CRANE, {"torque_speed": [(0, 60)]}, "give two corners or more"),
-        (CRANE, {"torque_speed": [(0, 60), (10, math.inf)]}, "give finite numbers"),
         (CRANE.replace(load_torque=-3.0), {}, "load torque = -3 N m: this load drives"),
         (CRANE, STEADY | {"scenarios": [CRANE.replace(gap=1.0)]}, "terminal = steady: one torque"),
-        (UNKNOWN, {"terminal": "synchronous"}, "terminal = synchronous: one torque"),
-        (
-            CRANE,
-            {"scenarios": [CRANE.replace(starting_torque=10, load_torque=2), CRANE.replace(load_torque=12)]},
-            "a load torque of 12 N m is not below the motor torque of 10 N m",
-        ),
-        (
-            CRANE,
-            {"scenarios": [CRANE.replace(load_torque=-3.0)]},
-            "scenario 2: load torque = -3 N m",
-        ),
-        (dataclasses.replace(CHAIN, motor=None), {}, r"[motor] is missing"),
+        (WEAK, {"scenarios": [CRANE.replace(load_torque=12)]}, "12 N m is not below the motor torque of 10"),
+        (dataclasses.replace(damped_crane(), motor=None), {}, r"[motor] is missing"),
         (three_masses(curve_angle=[0.0, 1.0], curve_torque=[0.0, 10.0]), {}, "curve_angle: an optimum"),
         (
             three_masses(curve_speed=[0.0, 30.0], curve_torque=[0.0, 10.0]),
-            {"terminal": "steady"},
+            STEADY,
             "load curves leave no steady torque",
         ),
+        (
+            CRANE,
+            {"start_time": None, "limits": True},
+            "has no permissible shaft torque; give limits.shaft_tor",
+        ),
+        (STRONG, {"limits": True}, "start_time: limits asks for the least"),
+        (STRONG, {"start_time": None, "limits": True, "minimise": "heat"}, "minimise: limits asks"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_one_sentence(machine: Any, given: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError) as raised:
         optimize(machine, **{"start_time": 0.3, **given})
@@ -684,29 +593,7 @@ def test_bad_input_is_one_sentence(machine: Any, given: dict[str, Any], says: st
     assert len(raised.value.sentences) == 1
 
 
-@pytest.mark.parametrize(
-    ("drive", "given", "said"),
-    [
-        (CRANE, {}, "limits: .* has no permissible shaft torque; give limits.shaft_torque"),
-        (CRANE.replace(permissible_start_time=0.3), {}, "has no permissible shaft torque"),
-        (
-            HOIST.replace(permissible_torque=175.0),
-            {"start_time": 0.3},
-            "start_time: limits asks for the least",
-        ),
-        (HOIST.replace(permissible_torque=175.0), {"minimise": "heat"}, "minimise: limits asks"),
-    ],
-)
-def test_limits_that_cannot_be_asked_for(drive: Drive, given: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        optimize(drive, limits=True, **given)
-
-
 def test_everything_wrong_is_said_at_once() -> None:
     with pytest.raises(InputError) as raised:
         Problem(CRANE.replace(load_torque=-3.0), -1.0, "still")  # type: ignore[arg-type]
     assert len(raised.value.sentences) == 3
-    with pytest.raises(InputError, match="needs a bound on the start time"):
-        Problem(CRANE)
-    with pytest.raises(InputError, match="give a Drive or a Chain"):
-        Problem("crane")  # type: ignore[arg-type]

@@ -50,18 +50,28 @@ def checked(problem, run, straight=False):
 
 
 # [G]'s drive: the first by the closed form pulse, coast, hold, the second by linear programs
-@pytest.mark.parametrize(("start_time", "k_dyn"), [(0.2883042, 0.90924724), (0.2522662, 1.4564)])
-@pytest.mark.parametrize("straight", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("start_time", "k_dyn", "straight"),
+    [
+        (0.2883042, 0.90924724, False),
+        pytest.param(0.2883042, 0.90924724, True, marks=pytest.mark.slow),
+        pytest.param(0.2522662, 1.4564, False, marks=pytest.mark.slow),
+    ],
+)
 def test_the_two_anchors_are_met_from_a_rough_guess(start_time, k_dyn, straight):
+    """The first one is a pulse, a coast, and the torque that holds its peak."""
     claim, _ = checked(Problem(CRANE, start_time), guess(56.0, start_time), straight)
     assert claim.value == pytest.approx(k_dyn, rel=WITHIN)
+    if k_dyn < 1.0:
+        P = claim.value * Problem(CRANE, start_time).base_torque
+        u_eq = (P * (CRANE.J1 + CRANE.J2) - CRANE.Mc * CRANE.J1) / CRANE.J2
+        assert claim.profile.at([0.001, 0.2, 0.27]) == pytest.approx([62.0, u_eq, u_eq], rel=2e-3)
 
 
-def test_the_first_anchor_is_a_pulse_a_coast_and_a_hold():
-    claim, _ = checked(Problem(CRANE, 0.2883042), guess(56.0, 0.2883042))
-    P = claim.value * Problem(CRANE, 0.2883042).base_torque
-    u_eq = (P * (CRANE.J1 + CRANE.J2) - CRANE.Mc * CRANE.J1) / CRANE.J2
-    assert claim.profile.at([0.001, 0.2, 0.27]) == pytest.approx([62.0, u_eq, u_eq], rel=2e-3)
+def refound(best):
+    """The answer run to one elastic period after its start time, however early it is."""
+    until = (best.problem.start_time or best.end_time) + 1.001 * best.run.elastic_period
+    return played(best.problem.drive, best.profile, until)
 
 
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float | None]] = {
@@ -70,7 +80,6 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float | None]] = {
     "reactive, damped": ({"load_kind": "reactive", "damping": 1.0}, {}, 0.27),
     "dead-zone": ({"damping": 0.3, "contact_law": "dead-zone"}, {}, 0.2883),
     "lag and rate": ({"torque_rate": 2000.0, "torque_lag": 0.005}, {}, 0.33),
-    "no gap": ({"gap": 0.0}, {}, 0.2883),
     "braking motor": ({"minimum_torque": -30.0}, {}, 0.26),
     "heat": ({}, {"minimise": "heat"}, 0.2883),
     "K_dyn under a heat": ({}, {"heat": 0.2}, 0.32),
@@ -78,7 +87,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], float | None]] = {
     "curve": ({}, {"torque_speed": ((0.0, 62.0), (30.0, 62.0), (70.0, 30.0))}, 0.33),
     "smooth": ({}, {"smoothness": 3e-5}, 0.2883),
 }
-QUICK = ("steady", "reactive, damped")
+QUICK = ("reactive, damped",)
 
 
 @pytest.mark.parametrize(
@@ -87,9 +96,7 @@ QUICK = ("steady", "reactive, damped")
 def test_every_class_agrees_with_the_optimum_found_otherwise(name):
     changes, options, start_time = CASES[name]
     best = optimize(CRANE.replace(**changes), start_time, **options)
-    until = (start_time or best.end_time) + 1.001 * best.run.elastic_period
-    run = played(best.problem.drive, best.profile, until)
-    claim, exact = checked(best.problem, run)
+    claim, exact = checked(best.problem, refound(best))
     value = {"k_dyn": best.k_dyn, "heat": best.heat, "start_time": best.end_time}[best.problem.minimise]
     assert claim.value == pytest.approx(value, rel=WITHIN)
     if best.problem.k_dyn is not None:
@@ -101,34 +108,20 @@ def test_every_class_agrees_with_the_optimum_found_otherwise(name):
         assert np.abs(np.diff(claim.profile.torque))[np.diff(claim.profile.time) == 0.0].max() == 0.0
 
 
-# classes by seed: 6 reactive, lag, damped; 13 rate, braking; 28 lag, rate; 33 lag, curve; 36 reactive, ideal
-@pytest.mark.parametrize(
-    "seed", [13, 36, *(pytest.param(k, marks=pytest.mark.slow) for k in (6, 8, 12, 21, 28, 33, 35))]
-)
+# classes by seed: 13 rate, braking; 28 lag, rate; 33 lag, curve; 36 reactive, ideal
+@pytest.mark.parametrize("seed", [13, *(pytest.param(k, marks=pytest.mark.slow) for k in (28, 33, 36))])
 def test_random_drives_agree_with_the_linear_programs(seed):
     rng = np.random.default_rng(seed)
     drive, options = random_drive(rng)
     best = optimize(drive, "1.3x", **options)
-    run = played(drive, best.profile, best.problem.start_time + 1.001 * best.run.elastic_period)
-    claim, _ = checked(best.problem, run)
+    claim, _ = checked(best.problem, refound(best))
     assert claim.value == pytest.approx(best.k_dyn, rel=WITHIN)
-
-
-def test_least_heat_lies_a_little_above_what_momentum_demands():
-    """Momentum (J1 + J2) target = integral of u - Mc, and Cauchy-Schwarz; a stiff drive is one mass."""
-    drive = CRANE.replace(gap=0.0, stiffness=2000.0)
-    mean = (drive.J1 + drive.J2) * drive.target_speed / 0.3 + drive.Mc
-    bound = mean**2 * 0.3 / drive.Ms**2
-    run = played(drive, TorqueProfile([0.0], [mean]), 0.33)
-    claim, _ = checked(Problem(drive, 0.3, minimise="heat"), run)
-    assert bound < claim.value < 1.02 * bound
 
 
 @pytest.mark.parametrize(
     "changes",
     [
         {"torque_lag": 0.005},
-        pytest.param({"torque_lag": 0.005, "torque_rate": 2000.0}, marks=pytest.mark.slow),
         pytest.param({"release": 0.05}, marks=pytest.mark.slow),
     ],
     ids=str,
@@ -138,7 +131,7 @@ def test_a_brake_holds_the_motor_first(changes):
         start_position="hanging", brake="motor", target_speed=50.0, **changes
     )
     best = optimize(hoist, "1.2x")
-    run = played(hoist, best.profile, best.problem.start_time + 1.001 * best.run.elastic_period)
+    run = refound(best)
     claim, exact = checked(best.problem, run)
     assert phases_of(best.problem, run)[0].braked
     assert claim.value == pytest.approx(best.k_dyn, rel=WITHIN)
@@ -146,12 +139,6 @@ def test_a_brake_holds_the_motor_first(changes):
 
 
 # chains ---------------------------------------------------------------------------------------------------
-
-
-def refound(best):
-    """The answer run to one elastic period after the start time, however early it is."""
-    until = best.problem.start_time + best.run.elastic_period
-    return played(best.problem.drive, best.profile, until)
 
 
 @pytest.mark.slow
@@ -231,8 +218,3 @@ def test_what_it_does_not_cover_is_said(given, said):
     chain = three_masses(**given)
     with pytest.raises(InputError, match=said):
         as_casadi(Problem(chain, 0.2), simulate(chain, "direct", 0.4))
-
-
-def test_a_run_that_ends_too_early_is_refused():
-    with pytest.raises(InputError, match="an elastic period after"):
-        as_casadi(Problem(three_masses(), 0.2), simulate(three_masses(), "direct", 0.19))

@@ -1,0 +1,106 @@
+"""What is drawn and what a notebook shows: the data behind it, well-formed, and never a script."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softstart import Chain, Drive, compare, fatigue, optimize, simulate
+from softstart.optimal.check import replayed
+from softstart.optimal.front import ControllerPoint, Front, FrontPoint
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import LowerBound, Optimum
+from softstart.profile import TorqueProfile
+from softstart.views.optima import front_figure, optimum_figure
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+def optimum(**options) -> Optimum:
+    """A start that is no optimum, but has all that is drawn."""
+    problem = Problem(CRANE, 0.28, **options)
+    profile = TorqueProfile.steps([0.0, 0.0184, 0.0333, 0.34], [62.0, 0.0, 55.0])
+    runs = replayed(problem, profile, 0.28)
+    bound = LowerBound(0.9, "certificate", "all")
+    return Optimum(problem, profile, runs, bound, "descent", "why", 1.0, 0.28, 0.1)
+
+
+def lines(axes):
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def test_an_optimum_is_drawn_from_its_run():
+    best = optimum()
+    motor, shaft, speed, twist = optimum_figure(best).axes
+    run = best.run
+    assert np.array_equal(lines(shaft)["shaft torque T"].get_xydata(), np.column_stack([run.t, run.T]))
+    assert [run.peak_time, run.peak_torque] in [line.get_xydata()[0].tolist() for line in shaft.get_lines()]
+    assert lines(shaft)["bound"].get_ydata()[0] == 0.9 * best.problem.base_torque
+    assert np.array_equal(lines(motor)["realised u"].get_ydata(), run.u)
+    assert lines(motor)["demand"].get_xydata().tolist() == [
+        [0, 62], [0.0184, 62], [0.0184, 0], [0.0333, 0], [0.0333, 55], [run.end_time, 55],
+    ]  # fmt: skip
+    assert np.array_equal(lines(speed)["load w2"].get_ydata(), run.w2)
+    assert np.array_equal(twist.get_lines()[0].get_ydata(), run.theta)
+
+
+def test_one_profile_for_several_machines_is_drawn_from_all_runs():
+    several = (CRANE.replace(gap=0.4), CRANE.with_gap(1.0, load_inertia=0.1))
+    best = optimum(terminal="reached", scenarios=several)
+    drawn = [line.get_xydata() for line in optimum_figure(best).axes[1].get_lines()]
+    for run in best.runs:
+        assert any(np.array_equal(one, np.column_stack([run.t, run.T])) for one in drawn)
+    worst = max(best.runs, key=lambda run: run.peak_torque)
+    assert [worst.peak_time, worst.peak_torque] in [one[0].tolist() for one in drawn]
+
+
+def front(controllers):
+    points = [FrontPoint(0.22, "reached", "INFEASIBLE", "too short", shortest_start_time=0.235)]
+    for time in (0.24, 0.3, 0.5):
+        k_dyn = 0.6 + 0.2 / (time - 0.1)
+        points.append(FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=k_dyn, k_dyn_lower_bound=k_dyn - 0.01))
+    optimal = FrontPoint(0.3, "reached", "OPTIMAL", "", k_dyn=1.0)
+    placed = [ControllerPoint(name, k, time, "", optimal) for name, time, k in controllers]
+    return Front(CRANE, "reached", tuple(points), tuple(placed))
+
+
+def test_a_front_is_drawn_from_its_points():
+    crowded = [("direct", 0.2402, 3.1), ("ramp", 0.262, 2.1), ("s-curve", 0.262, 1.9)]
+    one = front(crowded)
+    drawn = lines(front_figure(one).axes[0])
+    found = [p for p in one.points if p.found]
+    assert drawn["optimum"].get_xydata().tolist() == [[p.start_time_bound, p.k_dyn] for p in found]
+    assert drawn["lower bound"].get_ydata().tolist() == [p.k_dyn_lower_bound for p in found]
+    assert drawn["no optimum"].get_xdata().tolist() == [0.22]
+    for name, time, k in crowded:
+        assert drawn[f"{name}, x{k:.2f}"].get_xydata().tolist() == [[time, k]]
+
+
+NAMED = Drive.load("crane-4amtkf").replace(name="<script>alert(1)</script> & co")
+DAMPED = NAMED.replace(damping=1.0)
+
+MADE: dict[str, Callable[[], Any]] = {
+    "run": lambda: simulate(DAMPED, "ramp"),
+    "chain": lambda: simulate(Chain.load("crane-4-mass"), "ramp"),
+    "comparison": lambda: compare(DAMPED, ["direct", "ramp", "shaped"]),
+    "optimum": lambda: optimize(NAMED, 0.45),
+    "fatigue": lambda: fatigue([simulate(DAMPED, "direct"), simulate(DAMPED, "ramp")]),
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_cell_is_well_formed_and_shows_the_figures(name):
+    text = MADE[name]()._repr_html_()
+    assert "<script" not in text
+    assert text.count("<svg") == 1
+    page = ET.fromstring(f"<div>{text.replace('<br>', '<br/>')}</div>")
+    cells = ["".join(cell.itertext()) for cell in page.iter("td")]
+    assert len(cells) >= 6
+    if name != "chain":
+        assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; co" in text
+    if name in ("run", "comparison"):
+        assert any(cell.startswith(f"{simulate(DAMPED, 'ramp').k_dyn:.3f}") for cell in cells)
