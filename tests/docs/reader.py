@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import select
 import shlex
 import signal
@@ -24,20 +23,17 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-from tests.docs.shown import among, difference, named, rewritten
+from tests.docs.shown import among, difference, named
 from tests.docs.steps import Step
 
 ROOT = Path(__file__).parents[2]
-SEEN = 3.0  # s of its processor time for which a long command is watched at work: imports are over then
-SEEN_WARM = 1.5  # the same of one that has nothing to import
-SEEN_TOGETHER = 4.0  # the same of all its processes, where others work for it
-WATCHED = 8.0  # s of the clock after which that is enough in any case
-PRINTED = 60.0  # s of the clock after which a long command must have printed what the page shows of it
+WATCHED = 5.0  # s for which a long command of which the page shows nothing must go on
+PRINTED = 60.0  # s after which it must have printed what the page shows of it
 PATIENCE = 300.0  # s for a command that is not called long, on a machine that may be busy
 INTERRUPTED = 130
 SHELL = re.compile(r"[|&;<>$`*?~{}()\\]")  # what only a shell understands
 WARM = """
-import contextlib, io, json, os, resource, signal, sys, threading
+import contextlib, io, json, os, signal, sys, threading
 sys.path.remove("")
 import casadi, control, matplotlib.backends.backend_agg, matplotlib.figure, xarray, zarr
 from softstart.cli import main
@@ -65,9 +61,7 @@ for line in sys.stdin:
     os.read(ready, 1)
     os.close(ready)
     print(child, flush=True)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(json.dumps([code, used.ru_utime + used.ru_stime]), flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
@@ -93,8 +87,6 @@ def end_warm() -> None:
 class Forked:
     """A command that runs in a fork of the warm process, like a Popen."""
 
-    used = 0.0  # s of processor time of all that have ended
-
     def __init__(self, words: list[str], folder: Path, out: str, err: str) -> None:
         self.returncode: int | None = None
         self.out, self.err = out, err
@@ -108,7 +100,7 @@ class Forked:
 
     def poll(self, seconds: float = 0.0) -> int | None:
         if self.returncode is None and select.select([self.answers], [], [], seconds)[0]:
-            self.returncode, Forked.used = json.loads(self.answers.readline())
+            self.returncode = int(self.answers.readline())
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
@@ -127,27 +119,19 @@ class Reader:
     folder: Path
     page: str
     wrong: list[str] = field(default_factory=list)
-    took: list[tuple[float, float, str]] = field(default_factory=list)
     python: str = ""
     typed: bool = False
-    rewritten: dict[int, tuple[str, str]] = field(
-        default_factory=dict
-    )  # by line: what stands there, what should
 
     def do(self, step: Step) -> None:
         """One step."""
-        began, used = time.perf_counter(), _used()
         if step.kind == "file":
             path = self.folder / step.name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(step.text, encoding="utf-8")
             return
-        problem = self._command(step) if step.kind == "command" else self._python(step)
-        first = step.text.strip().splitlines()[0]
-        name = f"{self.page}:{step.line}: {first}"
-        if problem:
-            self.wrong.append(f"{name}\n    {problem}")
-        self.took.append((_used() - used, time.perf_counter() - began, name))
+        if problem := self._command(step) if step.kind == "command" else self._python(step):
+            first = step.text.strip().splitlines()[0]
+            self.wrong.append(f"{self.page}:{step.line}: {first}\n    {problem}")
 
     def _command(self, step: Step) -> str:
         if step.text.startswith("make"):
@@ -162,7 +146,7 @@ class Reader:
         done = _run(words, self.folder)
         missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
         said = f"not printed: {', '.join(missing)}" if missing else ""
-        return self._ended(done, step) or said
+        return _as_shown(done, step) or said
 
     def _python(self, step: Step) -> str:
         code = step.text
@@ -177,29 +161,14 @@ class Reader:
         self.python = code
         if step.long:
             return _watched([sys.executable, str(name)], self.folder, step.output)
-        return self._ended(_run([sys.executable, str(name)], self.folder), step)
-
-    def _ended(self, done: subprocess.CompletedProcess[str], step: Step) -> str:
-        """What is wrong with a command that has ended."""
-        printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
-        problem = _ended(done, step.exit_code)
-        if problem or step.output is None or not (problem := difference(step.output, printed)):
-            return problem
-        self.rewritten[step.shown] = step.output, rewritten(step.output, printed)
-        return problem
-
-    def rewrite(self, page: Path) -> None:
-        """Let the page show what its commands print."""
-        lines = page.read_text(encoding="utf-8").splitlines()
-        for line, (old, new) in sorted(self.rewritten.items(), reverse=True):
-            lines[line - 1 : line - 1 + len(old.splitlines())] = [one.rstrip() for one in new.splitlines()]
-        page.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return _as_shown(_run([sys.executable, str(name)], self.folder), step)
 
 
-def _used() -> float:
-    """Processor time of all processes that have ended, s."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return children.ru_utime + children.ru_stime + Forked.used
+def _as_shown(done: subprocess.CompletedProcess[str], step: Step) -> str:
+    """What is wrong with a command that has ended."""
+    printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
+    problem = _ended(done, step.exit_code)
+    return problem if problem or step.output is None else difference(step.output, printed)
 
 
 def _environment() -> dict[str, str]:
@@ -272,7 +241,7 @@ def _watched(words: list[str], folder: Path, shown: str | None) -> str:
     with tempfile.NamedTemporaryFile("r", encoding="utf-8") as out:
         with open(out.name, "w", encoding="utf-8") as written, _started(words, folder, written) as process:
             began = time.perf_counter()
-            while process.poll() is None and not _seen(process, time.perf_counter() - began, out, shown):
+            while process.poll() is None and not _seen(time.perf_counter() - began, out, shown):
                 time.sleep(0.2)
             if process.poll() is None:
                 err = _interrupted(process)
@@ -290,41 +259,16 @@ def _watched(words: list[str], folder: Path, shown: str | None) -> str:
     return f"exit code {process.returncode} instead of 130 after Ctrl-C: {err.strip()[-500:]}"
 
 
-def _seen(process: Process, seconds: float, out: IO[str], shown: str | None) -> bool:
+def _seen(seconds: float, out: IO[str], shown: str | None) -> bool:
     """Whether a long command has been watched long enough."""
-    if shown is not None:
-        return not difference(shown, _all_of(out), ended=False) or seconds > PRINTED
-    own, together = _work_of(process)
-    imports = 0.0 if isinstance(process, subprocess.Popen) else SEEN - SEEN_WARM
-    return seconds > WATCHED or own + imports > SEEN or together + imports > SEEN_TOGETHER
+    if shown is None:
+        return seconds > WATCHED
+    return not difference(shown, _all_of(out), ended=False) or seconds > PRINTED
 
 
 def _all_of(out: IO[str]) -> str:
     out.seek(0)
     return out.read()
-
-
-def _work_of(process: Process) -> tuple[float, float]:
-    """Processor time of a process that runs, and of it and all that it has started, s.
-
-    0 where the system does not tell.
-    """
-    known: dict[int, tuple[int, float]] = {}  # by process: its parent, its time
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
-        except OSError:
-            continue
-        ticks = sum(int(one) for one in fields[11:15])
-        known[int(path.parent.name)] = int(fields[1]), ticks / os.sysconf("SC_CLK_TCK")
-
-    def started_by_it(one: int) -> bool:
-        while one in known and one != process.pid:
-            one = known[one][0]
-        return one == process.pid
-
-    together = sum(time for one, (_, time) in known.items() if started_by_it(one))
-    return known.get(process.pid, (0, 0.0))[1], together
 
 
 def _interrupted(process: Process) -> str | None:
