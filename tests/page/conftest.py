@@ -41,7 +41,8 @@ class Server:
         self.mark = uuid.uuid4().hex
         self.log = folder.with_suffix(".log")
         environment = os.environ | {
-            MARK: self.mark, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1", "SOFTSTART_BUDGET": "2",
+            MARK: self.mark, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1",
+            "SOFTSTART_BUDGET": "2",
         }  # fmt: skip
         with self.log.open("w", encoding="utf-8") as stream:
             self.process = subprocess.Popen(
@@ -113,6 +114,13 @@ def wait_for_rows(page: Any) -> None:
       const cells = [...document.querySelectorAll(".strategies tbody td[data-key=k_dyn]")];
       return cells.length > 5 && cells.every((cell) => cell.textContent);
     }""")
+
+
+def opened(page: Any) -> Any:
+    """The page with its first figures."""
+    page.wait_for_selector("#k-dyn[data-value]")
+    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
+    return page
 
 
 INSTRUMENT = 'window.getElement(document.querySelector(".instrument")).instrument'
@@ -233,7 +241,7 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on("request", asked)
         page.goto(url or server.url)
-        page.wait_for_selector(".instrument .k-dyn:not(:empty)")
+        opened(page)
         if select:  # else the gentlest is
             choose(page, select)
         return page

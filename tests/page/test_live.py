@@ -6,20 +6,13 @@ import re
 from typing import Any
 
 import pytest
-from tests.page.conftest import answered, at_rest, choose, comes_to, settled, wait_for_rows
+from tests.page.conftest import answered, at_rest, choose, comes_to, opened, settled, wait_for_rows
 
 from softstart import Chain, Drive, simulate
 from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
 STEPS = 60
-
-
-def opened(page: Any) -> Any:
-    """The page with its first figures."""
-    page.wait_for_selector("#k-dyn[data-value]")
-    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
-    return page
 
 
 def k_dyn(page: Any) -> float:
@@ -41,6 +34,19 @@ def field(page: Any, path: str) -> Any:
     return page.locator(f'[data-path="{path}"] input[type=text]')
 
 
+def enter(page: Any, path: str, text: str) -> None:
+    field(page, path).fill(text)
+    field(page, path).press("Enter")
+
+
+def kept(page: Any) -> None:
+    """Wait until the tab has kept its bench."""
+    at_rest(page)
+    page.wait_for_function(
+        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
+    )
+
+
 def shows(page: Any, path: str, text: str) -> None:
     """Wait until a field shows a text: figures may come before the fields do."""
     page.wait_for_function(
@@ -60,7 +66,6 @@ def drag(page: Any, path: str, start: float, end: float, steps: int) -> None:
 
 
 def test_a_slider_moved_by_mouse_gives_the_k_dyn_of_simulate(page):
-    opened(page)
     comes_to(lambda: k_dyn(page), simulate(CRANE, "direct").k_dyn)
     drag(page, "shaft.gap", 0.25, 0.8, 12)
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
@@ -108,7 +113,6 @@ def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy, machine,
 
 
 def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):
-    opened(page)
     at_rest(page)
     box, plots = page.locator(".map canvas").bounding_box(), page.locator(".plots").bounding_box()
     x, y = box["x"] + 0.62 * box["width"], box["y"] + 0.3 * box["height"]
@@ -133,16 +137,13 @@ def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):
 
 
 def test_a_mistake_stands_beside_its_field_and_the_state_stays(page):
-    opened(page)
     before = k_dyn(page)
-    field(page, "shaft.gap").fill("4 metres")
-    field(page, "shaft.gap").press("Enter")
+    enter(page, "shaft.gap", "4 metres")
     told = page.locator("#field-shaft-gap-mistake")
     told.wait_for(state="visible")
     comes_to(field(page, "shaft.gap").input_value, "4 metres")
     comes_to(lambda: k_dyn(page), before)
-    field(page, "shaft.gap").fill("4 deg")
-    field(page, "shaft.gap").press("Enter")
+    enter(page, "shaft.gap", "4 deg")
     told.wait_for(state="hidden")
     wait_for_k(page, simulate(CRANE.replace(gap="4 deg"), "direct").k_dyn)
     field(page, "motor.starting_torque").fill("5")  # weaker than its load
@@ -154,7 +155,6 @@ def test_a_mistake_stands_beside_its_field_and_the_state_stays(page):
 
 
 def test_everything_is_reached_by_keyboard(page):
-    opened(page)
     slider(page, "shaft.gap").focus()
     for _ in range(3):
         page.keyboard.press("ArrowRight")
@@ -173,7 +173,6 @@ def test_everything_is_reached_by_keyboard(page):
 
 
 def test_strategies_are_drawn_hidden_and_sorted(page):
-    opened(page)
     page.locator('tr[data-name="ramp"] input[type=checkbox]').check()
     wait_for_rows(page)
     assert page.locator('tr[data-name="ramp"] input[type=checkbox]').is_checked()
@@ -188,7 +187,6 @@ def test_strategies_are_drawn_hidden_and_sorted(page):
 
 
 def test_older_frames_change_neither_what_was_written_nor_what_was_selected(page):
-    opened(page)
     instrument = 'const { instrument } = window.getElement(document.querySelector(".instrument"));'
     written = field(page, "shaft.gap").evaluate(f"""(field) => {{
       {instrument}
@@ -213,9 +211,7 @@ def test_older_frames_change_neither_what_was_written_nor_what_was_selected(page
 
 
 def test_a_lost_line_is_taken_up_again_with_the_same_drive(page):
-    opened(page)
-    field(page, "shaft.gap").fill("1 rad")
-    field(page, "shaft.gap").press("Enter")
+    enter(page, "shaft.gap", "1 rad")
     wait_for_k(page, simulate(CRANE.replace(gap=1.0), "direct").k_dyn)
     page.evaluate("window.socket.io.engine.close()")
     page.wait_for_function("!window.socket.connected")
@@ -229,39 +225,32 @@ def test_a_lost_line_is_taken_up_again_with_the_same_drive(page):
 
 
 def test_a_page_loaded_anew_goes_on_with_its_drive(page, visit):
-    opened(page)
-    field(page, "shaft.gap").fill("1.3 rad")
-    field(page, "shaft.gap").press("Enter")
+    enter(page, "shaft.gap", "1.3 rad")
     wait_for_k(page, simulate(CRANE.replace(gap=1.3), "direct").k_dyn)
     page.locator('tr[data-name="ramp"] input[type=radio]').check()
-    field(page, "strategy.time").fill("200 ms")
-    field(page, "strategy.time").press("Enter")
+    enter(page, "strategy.time", "200 ms")
     expected = simulate(CRANE.replace(gap=1.3), make_controller("ramp", {"time": 0.2})).k_dyn
     wait_for_k(page, expected)
-    at_rest(page)  # then its bench is kept
-    page.wait_for_function(
-        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
-    )
+    kept(page)
     page.reload()
     wait_for_k(opened(page), expected)
     shows(page, "shaft.gap", "1.3")
-    other = opened(visit())  # another tab has nothing of it
+    other = visit()  # another tab has nothing of it
     wait_for_k(other, simulate(CRANE, "direct").k_dyn)
-    linked = opened(visit(url=page.url, select=""))  # but a link brings all of it
+    linked = visit(url=page.url, select="")  # but a link brings all of it
     wait_for_k(linked, expected)
     shows(linked, "strategy.time", "0.2")
 
 
 def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit):
-    page = opened(visit())
+    page = visit()
     direct = simulate(CRANE, "direct")
     keep, foot = page.get_by_text("Keep as reference"), page.locator(".strategies tfoot")
     clear = page.get_by_label("clear the reference")
     comes_to(foot.is_visible, False)
     keep.click()
     foot.wait_for(state="visible")
-    field(page, "shaft.gap").fill("4 deg")
-    field(page, "shaft.gap").press("Enter")
+    enter(page, "shaft.gap", "4 deg")
     page.locator('tr[data-name="ramp"] input[type=radio]').check()
     wait_for_k(page, simulate(CRANE.replace(gap="4 deg"), "ramp").k_dyn)
     shows(page, "shaft.gap", "4")
@@ -273,11 +262,8 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit):
       return plots.reference.peak[1];
     }""")
     assert peak == direct.peak_torque
-    at_rest(page)  # then its bench is kept
-    page.wait_for_function(
-        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
-    )
-    linked = opened(visit(url=page.url, select=""))
+    kept(page)
+    linked = visit(url=page.url, select="")
     linked.locator(".strategies tfoot").wait_for(state="visible")
     page.reload()
     opened(page)
@@ -289,7 +275,7 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit):
 
 
 def test_undo_and_redo_by_buttons_and_keys(visit):
-    page = opened(visit(select=""))  # to select another one would be a step to undo
+    page = visit(select="")  # to select another one would be a step to undo
     first = k_dyn(page)
     drag(page, "shaft.gap", 0.25, 0.8, 12)
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
@@ -323,25 +309,9 @@ def test_colours_follow_the_system_and_the_switch(page):
     page.wait_for_function(f"{paper} != 'rgb(255, 255, 255)'")
 
 
-def test_with_a_token_the_page_opens_by_it_and_by_nothing_else(start_server, visit, browser):
-    server = start_server("--token", "a-token-of-some-length")
-    bare = server.url.partition("?")[0]
-    page = opened(visit(url=server.url))
-    assert "token" not in page.url
-    drag(page, "shaft.gap", 0.25, 0.5, 5)  # the socket is let in by the cookie
-    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 0.8")
-    cookies = page.context.cookies()
-    assert len(cookies) == 2  # the pass, and whose browser it is
-    assert {(one["httpOnly"], one["sameSite"]) for one in cookies} == {(True, "Strict")}
-    stranger = browser.new_page()
-    assert stranger.goto(bare).status == 401
-    assert "needs its token" in stranger.inner_text("body")
-    stranger.close()
-
-
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080)])
 def test_the_main_view_fits_without_scrolling(visit, width, height):
-    page = opened(visit(width, height))
+    page = visit(width, height)
     at_rest(page)
     sizes = page.evaluate(
         "['.controls', '.strategies', '.centre'].map((name) => document.querySelector(name))"

@@ -160,6 +160,7 @@ def test_other_aims_and_bounds_of_an_optimum(as_json, done):
     assert "K_dyn if known to start at opposite-flank" in out
 
 
+@pytest.mark.slow
 def test_too_short_a_start_time_is_told_with_the_shortest(run, nothing_left):
     code, out, err = run("optimize", *SIXTY, "--start-time", "0.2", "--json", "--out", "best")
     assert (code, err.count("\n")) == (3, 1)
@@ -247,7 +248,6 @@ SHOWN = {
     ],
     "simulate crane-4amtkf --controller direct --until 1": ["reached its target", "(the first 24 of "],
     "compare --controllers direct,ramp --until 0.05": ["direct (does not reach the target speed)"],
-    LOOP + " --set motor.torque_lag=2ms --param damping_ratio=0.5": ["J2 x 2.5", "No limit cycle"],
     LIVES + " --worn-gap 2rad": ["Longest life: s-curve", "Damping ratio of the shaft: 15 %"],
     "fatigue crane-4-mass --estimate-damping gears=3,couplings=2 --controllers direct,s-curve": [
         "The damping is ESTIMATED: a ratio of 4 % from 3 gears and 2 couplings",
@@ -399,6 +399,7 @@ def test_commands_go_on_with_the_chain_itself(run, as_json):
 # ---- identification ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_log_becomes_a_drive_file(run, tmp_path):
     log = made_up_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
     table = np.column_stack([log.time, log.torque, log.values])

@@ -306,6 +306,7 @@ def test_tuned_gains_play(begun, tuned, as_json):
     assert names == ["ramp", "ramp (robust)", "ramp (schedule)"]
 
 
+@pytest.mark.slow
 def test_optimal_laws_of_a_clutch_can_be_played(as_json, place):
     (point,) = as_json("clutch", "--optimal", "--points", "1", "--out", "best")["points"]
     assert point["work_bound"] <= point["slip_work"]
@@ -396,7 +397,6 @@ def test_a_sweep_goes_on_where_it_was_interrupted(interrupted, place, as_json, r
     assert [path.name for path in (place / "grid").iterdir()] == ["sweep.zarr"]
     with closing(sqlite3.connect(listed)) as base:
         records = [json.loads(text) for (text,) in base.execute("SELECT record FROM parts WHERE key > ''")]
-    assert all(isinstance(one["part"][0], int) for one in records), str(records)[:600]
     chunks = ["/".join(map(str, one["part"])) for one in records]
     files = [home / name / "c" / chunk for chunk in chunks for name in ("k_dyn", "status")]
     done = {path: path.stat().st_mtime_ns for path in files}

@@ -108,8 +108,6 @@ def test_life_of_the_shaft_line_where_it_is_asked_for(hostile):
     assert {row[0]: row[column] for row in shown[1:]} == {
         row.run.controller_name: factor(row.relative) for row in wanted.rows
     }
-    refused = report(asked, controllers=["ramp"], budget=0.0).to_html()
-    assert "Lives cannot be given: damping is missing in motor - load: an undamped shaft rattles" in refused
 
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -72,7 +72,7 @@ def test_gains_tuned_for_another_drive_keep_its_numbers():
 
 @pytest.mark.parametrize(
     ("step", "time", "moved"),
-    [("10ms", 0.11, ()), ("80ms", 0.16, ("time",)), ("1s", None, ())],
+    [("80ms", 0.16, ("time",)), ("1s", None, ())],
 )
 def test_a_sheet_keeps_the_rule_by_which_its_strategy_was_chosen(step, time, moved):
     """With the worn gap a ramp in 80 ms exceeds the limit; one in a second is slow: neither is printed."""
