@@ -16,12 +16,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import IO
 
 from tests.docs.shown import among, difference, named
 from tests.docs.steps import Step
@@ -89,7 +86,6 @@ class Forked:
 
     def __init__(self, words: list[str], folder: Path, out: str, err: str) -> None:
         self.returncode: int | None = None
-        self.out, self.err = out, err
         warm = _warm()
         assert warm.stdin
         assert warm.stdout
@@ -98,18 +94,10 @@ class Forked:
         warm.stdin.write(json.dumps(asked).encode() + b"\n")
         self.pid = int(self.answers.readline())
 
-    def poll(self, seconds: float = 0.0) -> int | None:
-        if self.returncode is None and select.select([self.answers], [], [], seconds)[0]:
+    def poll(self) -> int | None:
+        if self.returncode is None and select.select([self.answers], [], [], 0.0)[0]:
             self.returncode = int(self.answers.readline())
         return self.returncode
-
-    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        if self.poll(PATIENCE if timeout is None else timeout) is None:
-            raise subprocess.TimeoutExpired("softstart", timeout or PATIENCE)
-        return Path(self.out).read_text("utf-8"), Path(self.err).read_text("utf-8")
-
-
-Process = subprocess.Popen[str] | Forked
 
 
 @dataclass
@@ -128,8 +116,7 @@ class Reader:
             path = self.folder / step.name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(step.text, encoding="utf-8")
-            return
-        if problem := self._command(step) if step.kind == "command" else self._python(step):
+        elif problem := self._command(step) if step.kind == "command" else self._python(step):
             first = step.text.strip().splitlines()[0]
             self.wrong.append(f"{self.page}:{step.line}: {first}\n    {problem}")
 
@@ -140,35 +127,40 @@ class Reader:
             return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0)
         shell = not self.typed or bool(SHELL.search(step.text.partition("#")[0]))
         self.typed = True
-        words = ["bash", "-c", step.text] if shell else shlex.split(step.text, comments=True)
-        if step.long:
-            return _watched(words, self.folder, step.output)
-        done = _run(words, self.folder)
+        words = shlex.split(step.text, comments=True)
+        if shell:
+            words = ["bash", "-c", f"exec {step.text}" if step.long else step.text]
+        done = _run(words, self.folder, step)
         missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
-        said = f"not printed: {', '.join(missing)}" if missing else ""
+        said = f"not printed: {', '.join(missing)}" if missing and not step.long else ""
         return _as_shown(done, step) or said
 
     def _python(self, step: Step) -> str:
-        code = step.text
-        if ">>>" in code:
+        if ">>>" in step.text:
             name = self.folder / "session.txt"
-            name.write_text(code, encoding="utf-8")
+            name.write_text(step.text, encoding="utf-8")
             words = ["-m", "doctest", "-o", "ELLIPSIS", "-o", "NORMALIZE_WHITESPACE", str(name)]
             return _ended(_run([sys.executable, *words], self.folder), 0)
-        code = self.python + "\n" + code if step.continued else code
+        self.python = self.python + "\n" + step.text if step.continued else step.text
         name = self.folder / "_page_script.py"
-        name.write_text(code, encoding="utf-8")
-        self.python = code
-        if step.long:
-            return _watched([sys.executable, str(name)], self.folder, step.output)
-        return _as_shown(_run([sys.executable, str(name)], self.folder), step)
+        name.write_text(self.python, encoding="utf-8")
+        return _as_shown(_run([sys.executable, str(name)], self.folder, step), step)
 
 
 def _as_shown(done: subprocess.CompletedProcess[str], step: Step) -> str:
-    """What is wrong with a command that has ended."""
+    """What is wrong with a command that has ended, or that was interrupted if it is long."""
+    python = step.kind == "python"
+    problem = _ended(done, *((INTERRUPTED, 1, -signal.SIGINT) if python else (INTERRUPTED,))
+                     if step.long else (step.exit_code,))  # fmt: skip
     printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
-    problem = _ended(done, step.exit_code)
-    return problem if problem or step.output is None else difference(step.output, printed)
+    return problem or (difference(step.output, printed, ended=not step.long) if step.output else "")
+
+
+def _ended(done: subprocess.CompletedProcess[str], *codes: int) -> str:
+    if done.returncode in codes:
+        return ""
+    last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
+    return f"exit code {done.returncode} instead of {codes[0]}: {last}"
 
 
 def _environment() -> dict[str, str]:
@@ -180,30 +172,39 @@ def _environment() -> dict[str, str]:
     return known | {"PATH": path, "OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 
 
-@contextmanager
-def _started(words: list[str], folder: Path, stdout: int | IO[str] = subprocess.PIPE) -> Iterator[Process]:
-    """The process, in a group of its own that is gone afterwards."""
-    if words[0] == "softstart":
-        with tempfile.NamedTemporaryFile() as out, tempfile.NamedTemporaryFile() as err:
-            told = out.name if isinstance(stdout, int) else stdout.name
-            forked = Forked(words[1:], folder, told, err.name)
-            try:
-                yield forked
-            finally:
-                if forked.poll() is None:
-                    os.killpg(forked.pid, signal.SIGKILL)
-                    forked.poll(PATIENCE)
-        return
-    with subprocess.Popen(
-        words, cwd=folder, env=_environment(), text=True, stdin=subprocess.DEVNULL,
-        stdout=stdout, stderr=subprocess.PIPE, start_new_session=True,
-        preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
-    ) as process:  # fmt: skip
+def _run(words: list[str], folder: Path, step: Step | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; a long one until it has been seen at work, and then press Ctrl-C.
+
+    Where the page shows what it prints, being at work is to have printed that.
+    """
+    long, shown = (step.long, step.output) if step else (False, None)
+    with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
+        if words[0] == "softstart":
+            process: Forked | subprocess.Popen[bytes] = Forked(words[1:], folder, out.name, err.name)
+        else:
+            with open(out.name, "w") as to_out, open(err.name, "w") as to_err:
+                process = subprocess.Popen(
+                    words, cwd=folder, env=_environment(), stdin=subprocess.DEVNULL, stdout=to_out,
+                    stderr=to_err, start_new_session=True,
+                    preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
+                )  # fmt: skip
+        began, press = time.monotonic(), 0.0
         try:
-            yield process
+            while process.poll() is None:
+                seconds = time.monotonic() - began
+                if seconds > PATIENCE:
+                    raise AssertionError(
+                        f"{words}: not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
+                    )
+                if long and _seen(seconds, out.name, shown) and seconds > press:
+                    press = seconds + 15.0  # then again, as a person would
+                    os.killpg(process.pid, signal.SIGINT)
+                time.sleep(0.02)
         finally:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
+        assert process.returncode is not None
+        return subprocess.CompletedProcess(words, process.returncode, out.read(), err.read())
 
 
 def _hears_ctrl_c() -> None:
@@ -211,72 +212,8 @@ def _hears_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _run(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    with _started(words, folder) as process:
-        try:
-            out, err = process.communicate(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            out, err = process.communicate()
-            err += f"not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
-        code = process.returncode
-    assert code is not None
-    return subprocess.CompletedProcess(words, code, out, err)
-
-
-def _ended(done: subprocess.CompletedProcess[str], code: int) -> str:
-    if done.returncode != code:
-        last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
-        return f"exit code {done.returncode} instead of {code}: {last}"
-    return ""
-
-
-def _watched(words: list[str], folder: Path, shown: str | None) -> str:
-    """Start, see it at work, interrupt: a command of softstart then ends with 130.
-
-    Where the page shows what it prints, being at work is to have printed that.
-    """
-    if words[0] == "bash":
-        words = [*words[:-1], f"exec {words[-1]}"]
-    with tempfile.NamedTemporaryFile("r", encoding="utf-8") as out:
-        with open(out.name, "w", encoding="utf-8") as written, _started(words, folder, written) as process:
-            began = time.perf_counter()
-            while process.poll() is None and not _seen(time.perf_counter() - began, out, shown):
-                time.sleep(0.2)
-            if process.poll() is None:
-                err = _interrupted(process)
-            else:
-                err = process.communicate()[1].strip()
-                if process.returncode == 0:
-                    return "ended by itself: it is not long, take the mark away"
-                return f"exit code {process.returncode} at once: {err[-500:]}"
-        missing = difference(shown, _all_of(out), ended=False) if shown is not None else ""
-    if err is None:
-        return "does not end after Ctrl-C"
-    expected = (INTERRUPTED, 1, -signal.SIGINT) if words[0] == sys.executable else (INTERRUPTED,)
-    if process.returncode in expected:
-        return missing
-    return f"exit code {process.returncode} instead of 130 after Ctrl-C: {err.strip()[-500:]}"
-
-
-def _seen(seconds: float, out: IO[str], shown: str | None) -> bool:
+def _seen(seconds: float, out: str, shown: str | None) -> bool:
     """Whether a long command has been watched long enough."""
     if shown is None:
         return seconds > WATCHED
-    return not difference(shown, _all_of(out), ended=False) or seconds > PRINTED
-
-
-def _all_of(out: IO[str]) -> str:
-    out.seek(0)
-    return out.read()
-
-
-def _interrupted(process: Process) -> str | None:
-    """What it said after Ctrl-C, pressed again as a person would; None if it goes on all the same."""
-    for _ in range(4):
-        os.killpg(process.pid, signal.SIGINT)
-        try:
-            return process.communicate(timeout=15)[1]
-        except subprocess.TimeoutExpired:
-            continue
-    return None
+    return not difference(shown, Path(out).read_text(), ended=False) or seconds > PRINTED

@@ -76,4 +76,5 @@ def test_ten_tabs_that_are_dragged(visit: Any, start_server: Callable[..., Any])
         time.sleep(0.1)
     assert left <= before
     assert len(server.jobs()) <= 1  # it waits for the next job
+    alone.context.close()
     server.end()
