@@ -215,7 +215,7 @@ def test_controllers_and_words_are_axes_and_what_went_wrong_stands_out(as_json, 
 # ---- tables ------------------------------------------------------------------------------------------
 
 SHOWN = {
-    "compare --controllers direct,ramp,shaped --details": ["K_dyn", "gap x4", "J2 x0.4", "stage 1"],
+    "compare --details --controllers " + ",".join(THREE): ["K_dyn", "gap x4", "J2 x0.4", "stage 1"],
     "simulate crane-4amtkf --controller reduced-two-stage --until 0.3": [
         "under reduced-two-stage (torque = 15.386", "The run ended at the time", "closed, driving flank",
     ],
