@@ -12,7 +12,7 @@ import re
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from typing import Any
 from urllib.parse import urlencode, urlsplit
 
@@ -50,11 +50,13 @@ class Tab:
         }  # fmt: skip
         address = f"ws://{self.place}/_nicegui_ws/socket.io/?{urlencode(query)}"
         own = f"http://{self.place}"
-        self.line = sync_client.connect(address, origin=own, max_size=None, close_timeout=2)
+        self.held = ExitStack()
+        line = sync_client.connect(address, origin=own, max_size=None, close_timeout=2)
+        self.line = self.held.enter_context(line)
         self.line.send("40")
 
     def close(self) -> None:
-        self.line.close()
+        self.held.close()
 
     def happen(self, element: str, kind: str, *args: Any) -> None:
         """What a script sends when something happens to an element."""
