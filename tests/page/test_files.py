@@ -12,23 +12,10 @@ from typing import Any
 import pytest
 from tests.page.conftest import INSTRUMENT, SOFTSTART, comes_to, settled
 
-from softstart import Chain, DataSheet, Drive, InputError, simulate
+from softstart import Chain, DataSheet, Drive, simulate
 from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
-BROKEN = b"""name = "broken"
-[motor]
-inertia = -1
-starting_torque = "62 N"
-[shaft]
-stiffness = 368.465
-gap = "0.5 rad"
-[load]
-inertia = "0.175 kg*m^2"
-torque = 7.16
-[start]
-target_sped = 92
-"""
 SHEET = {
     "motor.rated_power": "3 kW", "motor.rated_speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
     "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
@@ -59,27 +46,6 @@ def k_dyn(page: Any, text: str) -> None:
 def files(page: Any) -> Any:
     page.get_by_role("tab", name="Files", exact=True).click()
     return page
-
-
-def test_a_broken_drive_file_shows_all_its_sentences_and_changes_nothing(files: Any) -> None:
-    with pytest.raises(InputError) as told:
-        Drive.from_toml(BROKEN.decode())
-    assert len(told.value.sentences) >= 3
-    own = f"{simulate(CRANE, 'direct').k_dyn:.3f}"
-    k_dyn(files, own)
-    trouble = files.get_by_test_id("drive-trouble")
-    for name, content, sentences in (
-        ("broken.toml", BROKEN, told.value.sentences),
-        ("picture.toml", b"name = '\xff\xfe'", ("the file is not UTF-8 text (line 1); save it as UTF-8.",)),
-        ("no.toml", b"", ("it is empty",)),
-        ("large.toml", b"#" * 300_000, ("more than 64 kB",)),
-    ):
-        put(files, name, content)
-        for sentence in sentences:
-            trouble.get_by_text(sentence).wait_for()
-        trouble.get_by_text("unchanged").first.wait_for()
-    comes_to(lambda: files.locator("#k-dyn").inner_text().strip(), own)
-    comes_to(files.locator(".drive-name").inner_text, CRANE.name)
 
 
 def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:

@@ -168,21 +168,6 @@ def test_the_figures_of_a_chain_are_those_of_simulate():
     assert session.machine is DAMPED
 
 
-@pytest.mark.parametrize("path", ["start.target_speed", "motor.maximum_torque", "motor.minimum_torque"])
-def test_an_empty_field_gives_back_what_follows_another_one(path):
-    """The rated speed is the target then, the starting torque the largest; or it says what it needs."""
-    session, screen, controls = screen_of(CHAIN, "direct")
-    before = session.machine
-    controls.take({"what": "edit", "path": path, "text": ""})
-    if path == "motor.minimum_torque":
-        assert "the field is empty" in screen.mistakes[path]
-        assert session.machine is before
-    else:
-        assert not screen.mistakes
-        assert session.machine.target_speed == CHAIN.motor.rated_speed
-        assert session.machine.motor.maximum_torque >= CHAIN.motor.starting_torque
-
-
 @pytest.mark.parametrize(
     "chain", [CHAIN, DAMPED, Chain.load("tractor-like")], ids=["bare", "damped", "tractor"]
 )
