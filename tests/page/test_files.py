@@ -31,8 +31,8 @@ def put(page: Any, name: str, content: bytes) -> None:
     )
 
 
-def saved(page: Any, name: str, timeout: float = 20_000) -> tuple[str, bytes]:
-    with page.expect_download(timeout=timeout) as download:
+def saved(page: Any, name: str) -> tuple[str, bytes]:
+    with page.expect_download(timeout=120_000) as download:
         page.get_by_test_id(name).click()
     return download.value.suggested_filename, Path(download.value.path()).read_bytes()
 
@@ -172,7 +172,7 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
     pins = [one["share"] for one in files.evaluate(f"{INSTRUMENT}.scheme.states")]
     assert pins == pytest.approx(shares, abs=0.05)
     link = settled(files, "location.href")
-    name, page = saved(files, "export-report", 120_000)
+    name, page = saved(files, "export-report")
     assert name.endswith("report.html")
     assert b"The strategies compared" in page
     files.get_by_role("button", name="Undo").click()
