@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import select
 import shlex
 import signal
@@ -17,27 +16,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import IO
 
-from tests.docs.shown import among, difference, named, rewritten
+from tests.docs.shown import among, difference, named
 from tests.docs.steps import Step
 
 ROOT = Path(__file__).parents[2]
-SEEN = 3.0  # s of its processor time for which a long command is watched at work: imports are over then
-SEEN_WARM = 1.5  # the same of one that has nothing to import
-SEEN_TOGETHER = 4.0  # the same of all its processes, where others work for it
-WATCHED = 8.0  # s of the clock after which that is enough in any case
-PRINTED = 60.0  # s of the clock after which a long command must have printed what the page shows of it
+WATCHED = 5.0  # s for which a long command of which the page shows nothing must go on
+PRINTED = 60.0  # s after which it must have printed what the page shows of it
 PATIENCE = 300.0  # s for a command that is not called long, on a machine that may be busy
 INTERRUPTED = 130
 SHELL = re.compile(r"[|&;<>$`*?~{}()\\]")  # what only a shell understands
 WARM = """
-import contextlib, io, json, os, resource, signal, sys, threading
+import contextlib, io, json, os, signal, sys, threading
 sys.path.remove("")
 import casadi, control, matplotlib.backends.backend_agg, matplotlib.figure, xarray, zarr
 from softstart.cli import main
@@ -65,9 +58,7 @@ for line in sys.stdin:
     os.read(ready, 1)
     os.close(ready)
     print(child, flush=True)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(json.dumps([code, used.ru_utime + used.ru_stime]), flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
@@ -93,11 +84,8 @@ def end_warm() -> None:
 class Forked:
     """A command that runs in a fork of the warm process, like a Popen."""
 
-    used = 0.0  # s of processor time of all that have ended
-
     def __init__(self, words: list[str], folder: Path, out: str, err: str) -> None:
         self.returncode: int | None = None
-        self.out, self.err = out, err
         warm = _warm()
         assert warm.stdin
         assert warm.stdout
@@ -106,18 +94,10 @@ class Forked:
         warm.stdin.write(json.dumps(asked).encode() + b"\n")
         self.pid = int(self.answers.readline())
 
-    def poll(self, seconds: float = 0.0) -> int | None:
-        if self.returncode is None and select.select([self.answers], [], [], seconds)[0]:
-            self.returncode, Forked.used = json.loads(self.answers.readline())
+    def poll(self) -> int | None:
+        if self.returncode is None and select.select([self.answers], [], [], 0.0)[0]:
+            self.returncode = int(self.answers.readline())
         return self.returncode
-
-    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        if self.poll(PATIENCE if timeout is None else timeout) is None:
-            raise subprocess.TimeoutExpired("softstart", timeout or PATIENCE)
-        return Path(self.out).read_text("utf-8"), Path(self.err).read_text("utf-8")
-
-
-Process = subprocess.Popen[str] | Forked
 
 
 @dataclass
@@ -127,27 +107,18 @@ class Reader:
     folder: Path
     page: str
     wrong: list[str] = field(default_factory=list)
-    took: list[tuple[float, float, str]] = field(default_factory=list)
     python: str = ""
     typed: bool = False
-    rewritten: dict[int, tuple[str, str]] = field(
-        default_factory=dict
-    )  # by line: what stands there, what should
 
     def do(self, step: Step) -> None:
         """One step."""
-        began, used = time.perf_counter(), _used()
         if step.kind == "file":
             path = self.folder / step.name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(step.text, encoding="utf-8")
-            return
-        problem = self._command(step) if step.kind == "command" else self._python(step)
-        first = step.text.strip().splitlines()[0]
-        name = f"{self.page}:{step.line}: {first}"
-        if problem:
-            self.wrong.append(f"{name}\n    {problem}")
-        self.took.append((_used() - used, time.perf_counter() - began, name))
+        elif problem := self._command(step) if step.kind == "command" else self._python(step):
+            first = step.text.strip().splitlines()[0]
+            self.wrong.append(f"{self.page}:{step.line}: {first}\n    {problem}")
 
     def _command(self, step: Step) -> str:
         if step.text.startswith("make"):
@@ -156,50 +127,40 @@ class Reader:
             return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0)
         shell = not self.typed or bool(SHELL.search(step.text.partition("#")[0]))
         self.typed = True
-        words = ["bash", "-c", step.text] if shell else shlex.split(step.text, comments=True)
-        if step.long:
-            return _watched(words, self.folder, step.output)
-        done = _run(words, self.folder)
+        words = shlex.split(step.text, comments=True)
+        if shell:
+            words = ["bash", "-c", f"exec {step.text}" if step.long else step.text]
+        done = _run(words, self.folder, step)
         missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
-        said = f"not printed: {', '.join(missing)}" if missing else ""
-        return self._ended(done, step) or said
+        said = f"not printed: {', '.join(missing)}" if missing and not step.long else ""
+        return _as_shown(done, step) or said
 
     def _python(self, step: Step) -> str:
-        code = step.text
-        if ">>>" in code:
+        if ">>>" in step.text:
             name = self.folder / "session.txt"
-            name.write_text(code, encoding="utf-8")
+            name.write_text(step.text, encoding="utf-8")
             words = ["-m", "doctest", "-o", "ELLIPSIS", "-o", "NORMALIZE_WHITESPACE", str(name)]
             return _ended(_run([sys.executable, *words], self.folder), 0)
-        code = self.python + "\n" + code if step.continued else code
+        self.python = self.python + "\n" + step.text if step.continued else step.text
         name = self.folder / "_page_script.py"
-        name.write_text(code, encoding="utf-8")
-        self.python = code
-        if step.long:
-            return _watched([sys.executable, str(name)], self.folder, step.output)
-        return self._ended(_run([sys.executable, str(name)], self.folder), step)
-
-    def _ended(self, done: subprocess.CompletedProcess[str], step: Step) -> str:
-        """What is wrong with a command that has ended."""
-        printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
-        problem = _ended(done, step.exit_code)
-        if problem or step.output is None or not (problem := difference(step.output, printed)):
-            return problem
-        self.rewritten[step.shown] = step.output, rewritten(step.output, printed)
-        return problem
-
-    def rewrite(self, page: Path) -> None:
-        """Let the page show what its commands print."""
-        lines = page.read_text(encoding="utf-8").splitlines()
-        for line, (old, new) in sorted(self.rewritten.items(), reverse=True):
-            lines[line - 1 : line - 1 + len(old.splitlines())] = [one.rstrip() for one in new.splitlines()]
-        page.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        name.write_text(self.python, encoding="utf-8")
+        return _as_shown(_run([sys.executable, str(name)], self.folder, step), step)
 
 
-def _used() -> float:
-    """Processor time of all processes that have ended, s."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return children.ru_utime + children.ru_stime + Forked.used
+def _as_shown(done: subprocess.CompletedProcess[str], step: Step) -> str:
+    """What is wrong with a command that has ended, or that was interrupted if it is long."""
+    python = step.kind == "python"
+    problem = _ended(done, *((INTERRUPTED, 1, -signal.SIGINT) if python else (INTERRUPTED,))
+                     if step.long else (step.exit_code,))  # fmt: skip
+    printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
+    return problem or (difference(step.output, printed, ended=not step.long) if step.output else "")
+
+
+def _ended(done: subprocess.CompletedProcess[str], *codes: int) -> str:
+    if done.returncode in codes:
+        return ""
+    last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
+    return f"exit code {done.returncode} instead of {codes[0]}: {last}"
 
 
 def _environment() -> dict[str, str]:
@@ -211,30 +172,39 @@ def _environment() -> dict[str, str]:
     return known | {"PATH": path, "OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
 
 
-@contextmanager
-def _started(words: list[str], folder: Path, stdout: int | IO[str] = subprocess.PIPE) -> Iterator[Process]:
-    """The process, in a group of its own that is gone afterwards."""
-    if words[0] == "softstart":
-        with tempfile.NamedTemporaryFile() as out, tempfile.NamedTemporaryFile() as err:
-            told = out.name if isinstance(stdout, int) else stdout.name
-            forked = Forked(words[1:], folder, told, err.name)
-            try:
-                yield forked
-            finally:
-                if forked.poll() is None:
-                    os.killpg(forked.pid, signal.SIGKILL)
-                    forked.poll(PATIENCE)
-        return
-    with subprocess.Popen(
-        words, cwd=folder, env=_environment(), text=True, stdin=subprocess.DEVNULL,
-        stdout=stdout, stderr=subprocess.PIPE, start_new_session=True,
-        preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
-    ) as process:  # fmt: skip
+def _run(words: list[str], folder: Path, step: Step | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; a long one until it has been seen at work, and then press Ctrl-C.
+
+    Where the page shows what it prints, being at work is to have printed that.
+    """
+    long, shown = (step.long, step.output) if step else (False, None)
+    with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
+        if words[0] == "softstart":
+            process: Forked | subprocess.Popen[bytes] = Forked(words[1:], folder, out.name, err.name)
+        else:
+            with open(out.name, "w") as to_out, open(err.name, "w") as to_err:
+                process = subprocess.Popen(
+                    words, cwd=folder, env=_environment(), stdin=subprocess.DEVNULL, stdout=to_out,
+                    stderr=to_err, start_new_session=True,
+                    preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
+                )  # fmt: skip
+        began, press = time.monotonic(), 0.0
         try:
-            yield process
+            while process.poll() is None:
+                seconds = time.monotonic() - began
+                if seconds > PATIENCE:
+                    raise AssertionError(
+                        f"{words}: not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
+                    )
+                if long and _seen(seconds, out.name, shown) and seconds > press:
+                    press = seconds + 15.0  # then again, as a person would
+                    os.killpg(process.pid, signal.SIGINT)
+                time.sleep(0.02)
         finally:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
+        assert process.returncode is not None
+        return subprocess.CompletedProcess(words, process.returncode, out.read(), err.read())
 
 
 def _hears_ctrl_c() -> None:
@@ -242,97 +212,8 @@ def _hears_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _run(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    with _started(words, folder) as process:
-        try:
-            out, err = process.communicate(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            out, err = process.communicate()
-            err += f"not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
-        code = process.returncode
-    assert code is not None
-    return subprocess.CompletedProcess(words, code, out, err)
-
-
-def _ended(done: subprocess.CompletedProcess[str], code: int) -> str:
-    if done.returncode != code:
-        last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
-        return f"exit code {done.returncode} instead of {code}: {last}"
-    return ""
-
-
-def _watched(words: list[str], folder: Path, shown: str | None) -> str:
-    """Start, see it at work, interrupt: a command of softstart then ends with 130.
-
-    Where the page shows what it prints, being at work is to have printed that.
-    """
-    if words[0] == "bash":
-        words = [*words[:-1], f"exec {words[-1]}"]
-    with tempfile.NamedTemporaryFile("r", encoding="utf-8") as out:
-        with open(out.name, "w", encoding="utf-8") as written, _started(words, folder, written) as process:
-            began = time.perf_counter()
-            while process.poll() is None and not _seen(process, time.perf_counter() - began, out, shown):
-                time.sleep(0.2)
-            if process.poll() is None:
-                err = _interrupted(process)
-            else:
-                err = process.communicate()[1].strip()
-                if process.returncode == 0:
-                    return "ended by itself: it is not long, take the mark away"
-                return f"exit code {process.returncode} at once: {err[-500:]}"
-        missing = difference(shown, _all_of(out), ended=False) if shown is not None else ""
-    if err is None:
-        return "does not end after Ctrl-C"
-    expected = (INTERRUPTED, 1, -signal.SIGINT) if words[0] == sys.executable else (INTERRUPTED,)
-    if process.returncode in expected:
-        return missing
-    return f"exit code {process.returncode} instead of 130 after Ctrl-C: {err.strip()[-500:]}"
-
-
-def _seen(process: Process, seconds: float, out: IO[str], shown: str | None) -> bool:
+def _seen(seconds: float, out: str, shown: str | None) -> bool:
     """Whether a long command has been watched long enough."""
-    if shown is not None:
-        return not difference(shown, _all_of(out), ended=False) or seconds > PRINTED
-    own, together = _work_of(process)
-    imports = 0.0 if isinstance(process, subprocess.Popen) else SEEN - SEEN_WARM
-    return seconds > WATCHED or own + imports > SEEN or together + imports > SEEN_TOGETHER
-
-
-def _all_of(out: IO[str]) -> str:
-    out.seek(0)
-    return out.read()
-
-
-def _work_of(process: Process) -> tuple[float, float]:
-    """Processor time of a process that runs, and of it and all that it has started, s.
-
-    0 where the system does not tell.
-    """
-    known: dict[int, tuple[int, float]] = {}  # by process: its parent, its time
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
-        except OSError:
-            continue
-        ticks = sum(int(one) for one in fields[11:15])
-        known[int(path.parent.name)] = int(fields[1]), ticks / os.sysconf("SC_CLK_TCK")
-
-    def started_by_it(one: int) -> bool:
-        while one in known and one != process.pid:
-            one = known[one][0]
-        return one == process.pid
-
-    together = sum(time for one, (_, time) in known.items() if started_by_it(one))
-    return known.get(process.pid, (0, 0.0))[1], together
-
-
-def _interrupted(process: Process) -> str | None:
-    """What it said after Ctrl-C, pressed again as a person would; None if it goes on all the same."""
-    for _ in range(4):
-        os.killpg(process.pid, signal.SIGINT)
-        try:
-            return process.communicate(timeout=15)[1]
-        except subprocess.TimeoutExpired:
-            continue
-    return None
+    if shown is None:
+        return seconds > WATCHED
+    return not difference(shown, Path(out).read_text(), ended=False) or seconds > PRINTED

@@ -35,42 +35,6 @@ def difference(shown: str, printed: str, ended: bool = True) -> str:
     return f"not shown: {left[0]}" if left and ended and not skips else ""
 
 
-def rewritten(shown: str, printed: str) -> str:
-    """What a page shows of this output: whole, or where it has `...` as many lines of each part as before.
-
-    The first paragraph, the machine, is left out where the page leaves it out.
-
-    >>> rewritten("a 1\\n...\\nend 2", "a 3\\nb\\nend 4"), rewritten("a", "b")
-    ('a 3\\n...\\nend 4', 'b')
-    >>> rewritten("K 1", "crane\\n  motor\\n\\nK 2\\nnext"), rewritten("K 1\\n...", "crane\\nK 2\\nnext")
-    ('...\\n\\nK 2\\nnext', '...\\nK 2\\n...')
-    """
-    printed = re.sub(r"(; )[\d,]+ starts/s in .*|^(computed in +).*", r"\1\2...", printed, flags=re.MULTILINE)
-    lines, wanted, kept = printed.rstrip().splitlines(), shown.rstrip().splitlines(), list[str]()
-    if SKIP not in wanted:
-        if lines[0] not in wanted and "" in lines:
-            return "\n".join([SKIP, *lines[lines.index("") :]])
-        return "\n".join(lines)
-    while wanted:
-        end = wanted.index(SKIP) if SKIP in wanted else len(wanted)
-        part, wanted = wanted[:end], wanted[end:]
-        at = next((i for i, one in enumerate(lines) if part and _mask(one) == _mask(part[0])), None)
-        if at is not None:
-            kept += lines[: at + len(part)] if not at else [SKIP, *lines[at : at + len(part)]]
-            lines = lines[at + len(part) :]
-        if wanted[:2] == [SKIP, ""]:
-            wanted.pop(1)
-        wanted = wanted[1:]
-        if not wanted and end < len(part) + 1 and shown.rstrip().endswith(SKIP):
-            kept.append(SKIP)
-    return "\n".join(kept if shown.rstrip().endswith(SKIP) else [*kept, *lines])
-
-
-def _mask(line: str) -> str:
-    """A line without its figures."""
-    return NUMBER.sub("#", " ".join(line.split()))
-
-
 def _lines(text: str) -> list[str]:
     return [one.strip() for one in text.splitlines() if one.strip()]
 

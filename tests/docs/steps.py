@@ -46,7 +46,6 @@ class Step:
     long: bool = False
     continued: bool = False
     output: str | None = None
-    shown: int = 0  # the line where `output` begins
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def steps(text: str) -> list[Step]:
                 Step("python", code, block.line, long="long:" in marks, continued="continued" in marks)
             )
         elif block.language == "text" and block.after and found and found[-1].kind != "file":
-            found[-1] = replace(found[-1], output="\n".join(block.lines), shown=block.line)
+            found[-1] = replace(found[-1], output="\n".join(block.lines))
     return [
         replace(s, long=False) if s.long and _needed(s, found[i + 1 :]) else s for i, s in enumerate(found)
     ]

@@ -40,13 +40,10 @@ class Server:
         self.folder = folder
         self.mark = uuid.uuid4().hex
         self.log = folder.with_suffix(".log")
-        environment = {
-            **os.environ,
-            MARK: self.mark,
-            "OPENBLAS_NUM_THREADS": "1",
-            "PYTHONDONTWRITEBYTECODE": "1",
+        environment = os.environ | {
+            MARK: self.mark, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1",
             "SOFTSTART_BUDGET": "2",
-        }
+        }  # fmt: skip
         with self.log.open("w", encoding="utf-8") as stream:
             self.process = subprocess.Popen(
                 [SOFTSTART, "serve", "--port", "0", "--no-browser", *arguments],
@@ -119,6 +116,13 @@ def wait_for_rows(page: Any) -> None:
     }""")
 
 
+def opened(page: Any) -> Any:
+    """The page with its first figures."""
+    page.wait_for_selector("#k-dyn[data-value]")
+    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
+    return page
+
+
 INSTRUMENT = 'window.getElement(document.querySelector(".instrument")).instrument'
 
 
@@ -143,22 +147,6 @@ def answered(page: Any) -> None:
 def drawn(page: Any) -> None:
     """Wait for the second picture from now on: what was to be drawn is."""
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def written(page: Any) -> list[dict[str, Any]]:
-    """What stands in the plots when they are drawn again: each text, its place and its width."""
-    found: list[dict[str, Any]] = page.evaluate(f"""() => {{
-      const found = [], own = CanvasRenderingContext2D.prototype, write = own.fillText;
-      own.fillText = function (text, x, y) {{
-        found.push({{ text, x, y, wide: this.measureText(text).width, align: this.textAlign }});
-        write.call(this, text, x, y);
-      }};
-      {INSTRUMENT}.redraw();
-      {INSTRUMENT}.draw();
-      own.fillText = write;
-      return found;
-    }}""")
-    return found
 
 
 def choose(page: Any, strategy: str) -> None:
@@ -253,7 +241,7 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on("request", asked)
         page.goto(url or server.url)
-        page.wait_for_selector(".instrument .k-dyn:not(:empty)")
+        opened(page)
         if select:  # else the gentlest is
             choose(page, select)
         return page
@@ -269,17 +257,3 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
 def page(visit: Visit) -> Any:
     """The page for one user, light, 1280 x 800."""
     return visit()
-
-
-@pytest.fixture
-def screenshot(tmp_path: Path) -> Callable[[Any, str], Path]:
-    """Takes a picture of a page into the test's own folder, or into that of SOFTSTART_PICTURES."""
-    folder = Path(os.environ.get("SOFTSTART_PICTURES") or tmp_path)
-
-    def take(page: Any, name: str) -> Path:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{name}.png"
-        page.screenshot(path=path)
-        return path
-
-    return take

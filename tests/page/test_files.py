@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import subprocess
-import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
-from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, settled, wait_for_rows
-from tests.patience import patient
+from tests.page.conftest import INSTRUMENT, SOFTSTART, comes_to, settled
 
-from softstart import Chain, DataSheet, Drive, InputError, compare, simulate
+from softstart import Chain, DataSheet, Drive, simulate
 from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
-BROKEN = b"""name = "broken"
-[motor]
-inertia = -1
-starting_torque = "62 N"
-[shaft]
-stiffness = 368.465
-gap = "0.5 rad"
-[load]
-inertia = "0.175 kg*m^2"
-torque = 7.16
-[start]
-target_sped = 92
-"""
 SHEET = {
     "motor.rated_power": "3 kW", "motor.rated_speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
     "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
@@ -50,8 +31,8 @@ def put(page: Any, name: str, content: bytes) -> None:
     )
 
 
-def saved(page: Any, name: str, timeout: float = 20_000) -> tuple[str, bytes]:
-    with page.expect_download(timeout=timeout) as download:
+def saved(page: Any, name: str) -> tuple[str, bytes]:
+    with page.expect_download(timeout=120_000) as download:
         page.get_by_test_id(name).click()
     return download.value.suggested_filename, Path(download.value.path()).read_bytes()
 
@@ -61,39 +42,10 @@ def k_dyn(page: Any, text: str) -> None:
     page.wait_for_function("text => document.getElementById('k-dyn').textContent.trim() === text", arg=text)
 
 
-def table_of(page: Any) -> dict[str, str]:
-    """K_dyn of each strategy, as the table has it."""
-    found: dict[str, str] = page.evaluate("""() => Object.fromEntries(
-      [...document.querySelectorAll(".strategies tbody tr")].map(
-        (row) => [row.dataset.name, row.querySelector("[data-key=k_dyn]").textContent]))""")
-    return found
-
-
 @pytest.fixture
 def files(page: Any) -> Any:
     page.get_by_role("tab", name="Files", exact=True).click()
     return page
-
-
-def test_a_broken_drive_file_shows_all_its_sentences_and_changes_nothing(files: Any) -> None:
-    with pytest.raises(InputError) as told:
-        Drive.from_toml(BROKEN.decode())
-    assert len(told.value.sentences) >= 3
-    own = f"{simulate(CRANE, 'direct').k_dyn:.3f}"
-    k_dyn(files, own)
-    trouble = files.get_by_test_id("drive-trouble")
-    for name, content, sentences in (
-        ("broken.toml", BROKEN, told.value.sentences),
-        ("picture.toml", b"name = '\xff\xfe'", ("the file is not UTF-8 text (line 1); save it as UTF-8.",)),
-        ("no.toml", b"", ("it is empty",)),
-        ("large.toml", b"#" * 300_000, ("more than 64 kB",)),
-    ):
-        put(files, name, content)
-        for sentence in sentences:
-            trouble.get_by_text(sentence).wait_for()
-        trouble.get_by_text("unchanged").first.wait_for()
-    comes_to(lambda: files.locator("#k-dyn").inner_text().strip(), own)
-    comes_to(files.locator(".drive-name").inner_text, CRANE.name)
 
 
 def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
@@ -111,37 +63,6 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
     k_dyn(files, f"{simulate('servo-axis-small', 'direct').k_dyn:.3f}")
 
 
-def test_a_drive_with_limits_has_pass_or_fail_and_margin_of_each_strategy(files: Any) -> None:
-    """The words are those of `compare`, cut to the column; so is the flag, as in the legend of the plots."""
-    own = Drive.load("hoist-15kw").replace(permissible_torque=170.0)
-    put(files, "hoist.toml", own.to_toml().encode())
-    for row in compare(own, ["direct", "shaped", "s-curve"]).rows:
-        said = [row.against_limits.replace("exceeded -", "over "), *[flag.word for flag in row.flags]]
-        files.wait_for_function(
-            "([name, said]) => document.querySelector(`tr[data-name='${name}'] .flag`).textContent === said",
-            arg=[row.name, "\n".join(said)],
-        )
-        kept = files.locator(f'.strategies tr[data-name="{row.name}"] .flag.kept')
-        comes_to(kept.count, int(row.against_limits.startswith("kept")))
-
-
-def test_an_own_drive_is_given_its_own_name(files: Any, tmp_path: Path) -> None:
-    """Nobody types all the figures of a drive to see another one's name in the report."""
-    own = 'Hoist "7" = left'
-    name = files.locator('[data-path="name"] input')
-    name.fill(own)
-    name.press("Enter")
-    files.wait_for_function("(name) => document.querySelector('.drive-name').textContent === name", arg=own)
-    assert files.title() == f"softstart: {own}"
-    file, content = saved(files, "drive-save")
-    assert file == "hoist-7-left.toml"
-    (tmp_path / file).write_bytes(content)
-    assert Drive.load(tmp_path / file) == CRANE.replace(name=own)
-    name.fill("")
-    name.press("Enter")
-    files.locator("#field-name-mistake").get_by_text("the field is empty").wait_for()
-
-
 def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     """The report is computed aside; meanwhile everything else goes on."""
     with files.expect_download(lambda it: it.suggested_filename.endswith(".html"), timeout=120_000) as report:
@@ -150,10 +71,6 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
         assert name == "crane-travel-drive-4amtkf-h-112l6-direct-traces.csv"
         simulate(CRANE, "direct").to_csv(tmp_path / "same.csv")
         assert content == (tmp_path / "same.csv").read_bytes()
-
-        files.get_by_role("tab", name="Optimum", exact=True).click()
-        comes_to(files.get_by_test_id("optimum-go").is_enabled, True)
-        files.get_by_role("tab", name="Files", exact=True).click()
         gap = files.locator('[data-path="shaft.gap"] input[type=text]')
         gap.fill("0.75")
         gap.press("Enter")
@@ -163,15 +80,7 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
         files.wait_for_function("() => document.querySelector('.command').innerText.includes('0.75')")
         words = shlex.split(command.inner_text())
         assert words[:2] == ["softstart", "compare"]
-        ran = subprocess.run(
-            [str(Path(sys.executable).with_name(words[0])), *words[1:], "--json"],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        found = {one["controller"]: one["k_dyn"] for one in json.loads(ran.stdout)["strategies"]}
-        assert found["direct"] == simulate(drive, "direct").k_dyn
+        assert "--set shaft.gap=0.75" in " ".join(words)
     html = Path(report.value.path()).read_text(encoding="utf-8")
     assert report.value.suggested_filename == "crane-travel-drive-4amtkf-h-112l6-report.html"
     assert html.lstrip().lower().startswith("<!doctype html")
@@ -201,80 +110,6 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)
 
 
-@pytest.mark.parametrize(("size", "columns"), [((800, 1000), 1), ((1024, 768), 2), ((1280, 800), 3)])
-def test_the_form_of_a_data_sheet_and_its_answer_are_seen(
-    visit: Any, size: tuple[int, int], columns: int
-) -> None:
-    page = visit(*size, select="")
-    lefts = "[...document.querySelectorAll('.controls, .plots, .figure')].map(one => one.offsetLeft)"
-    assert len(set(page.evaluate(lefts))) == columns
-    page.get_by_role("tab", name="Sheet", exact=True).click()
-    page.get_by_test_id("sheet-load-machine").click()
-    page.get_by_role("option", name="rotor").click()
-    own = {path: text for path, text in SHEET.items() if not path.startswith("load")}
-    for path, text in {**own, "load.inertia": "290"}.items():
-        page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
-    page.get_by_test_id("sheet-use").click()
-    answer = page.get_by_test_id("sheet-drive")
-    answer.wait_for(state="visible")
-
-    def seen(part: Any) -> bool:
-        box = part.bounding_box()
-        return bool(0.0 <= box["y"] <= size[1] - min(box["height"], 200.0))  # a text may be longer
-
-    comes_to(lambda: seen(answer), True)
-    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    if columns == 3:
-        fields = page.locator(".sheet-form input:visible, .sheet-form .q-select:visible").all()
-        assert sum(map(seen, fields)) >= 28
-        assert seen(page.locator(".k-dyn"))
-
-
-def test_from_a_data_sheet_to_an_answer_and_its_link_elsewhere(
-    visit: Any, start_server: Callable[..., Any]
-) -> None:
-    """A new user's path, each step with its time (pytest -s); a hand types more slowly."""
-    began = time.monotonic()
-    steps: list[str] = []
-
-    def done(what: str) -> None:
-        steps.append(f"{time.monotonic() - began:6.1f} s  {what}")
-
-    page = visit(url=start_server().url, select="")
-    wait_for_rows(page)
-    done("the page is open, started by softstart serve")
-    page.get_by_role("tab", name="Sheet", exact=True).click()
-    for path, text in SHEET.items():
-        page.get_by_test_id(f"sheet-{path.replace('.', '-')}").press_sequentially(text, delay=20)
-    done(f"{len(SHEET)} values of the data sheet are typed")
-    page.get_by_test_id("sheet-use").click()
-    comes_to(page.locator(".drive-name").inner_text, SHEET["name"])
-    wait_for_rows(page)
-    at_rest(page)
-    found = compare(DataSheet.from_settings(SHEET | {"load.machine": "travel"}).drive)
-    figures = {row.run.controller.name: f"{row.run.k_dyn:.3f}" for row in found.rows}
-    page.wait_for_function(
-        "figure => document.querySelector('tr[data-name=direct] [data-key=k_dyn]').textContent === figure",
-        arg=figures["direct"],
-    )
-    assert {name: table_of(page)[name] for name in figures} == figures
-    done("all strategies are compared, the gentlest first, the map is there")
-    assert page.locator(".advice").inner_text()
-    selected = page.locator("tbody tr").first.get_attribute("data-name")
-    assert float(figures[selected]) == min(map(float, figures.values()))
-    page.get_by_role("tab", name="Files", exact=True).click()
-    assert saved(page, "export-report", 120_000)[0] == "gantry-report.html"
-    done("its report is saved")
-    other = start_server("hoist-15kw").url.rstrip("/")
-    elsewhere = visit(url=f"{other}/#{urlsplit(page.url).fragment}", select="")
-    comes_to(elsewhere.locator(".drive-name").inner_text, SHEET["name"])
-    wait_for_rows(elsewhere)
-    comes_to(lambda: table_of(elsewhere), table_of(page))
-    done("its link, opened by another server for another user, shows the same figures")
-    print("", *steps, sep="\n")
-    assert time.monotonic() - began < patient(300.0)
-
-
 def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
     words = ("report", "--controllers", "direct,ramp", "--budget", "0", "--pdf", str(tmp_path / "r.pdf"))
     subprocess.run([SOFTSTART, *words], check=True, capture_output=True, cwd=tmp_path)
@@ -297,13 +132,9 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     put(page, "guess.toml", guess.to_toml().encode())
     page.get_by_text("is loaded").first.wait_for()
     page.get_by_role("tab", name="Log", exact=True).click()
-    strip = page.locator(".panel-tabs .q-tabs__content")
-    assert strip.evaluate("all => all.scrollWidth <= all.clientWidth")  # no tab is behind an arrow
     upload = page.locator('[data-testid="log-upload"] input[type="file"]')
     upload.set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
     page.get_by_test_id("log-trouble").get_by_text("there are the columns a, b").wait_for()
-    upload.set_input_files({"name": "y.csv", "mimeType": "text/csv", "buffer": b"1,2\n" * 300_000})
-    page.get_by_test_id("log-trouble").get_by_text("more than 1000 kB; cut the log to the start").wait_for()
     content = (tmp_path / "rig.csv").read_bytes()
     upload.set_input_files({"name": "rig.csv", "mimeType": "text/csv", "buffer": content})
     page.get_by_test_id("log-answer").get_by_text("shaft.gap").wait_for(timeout=60_000)
@@ -315,7 +146,7 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     page.get_by_text("is loaded").last.wait_for()
 
 
-def test_a_chain_file_takes_the_place_of_the_drive(files: Any, screenshot: Any) -> None:
+def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
     """Figures, fields and flanks are those of the chain; its report, a link and undo know it."""
     chain = Chain.load("crane-4-mass")
     put(files, "mine.toml", chain.to_toml().encode())
@@ -340,13 +171,8 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any, screenshot: Any) 
     ]
     pins = [one["share"] for one in files.evaluate(f"{INSTRUMENT}.scheme.states")]
     assert pins == pytest.approx(shares, abs=0.05)
-    for width, height in ((1280, 800), (1920, 1080)):
-        files.set_viewport_size({"width": width, "height": height})
-        screenshot(files, f"chain-{width}")
-        for part in (".instrument .panel", ".instrument .strategies", ".instrument .controls"):
-            assert files.locator(part).first.evaluate("one => one.scrollWidth - one.clientWidth") <= 1, part
     link = settled(files, "location.href")
-    name, page = saved(files, "export-report", 120_000)
+    name, page = saved(files, "export-report")
     assert name.endswith("report.html")
     assert b"The strategies compared" in page
     files.get_by_role("button", name="Undo").click()

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import csv
-import math
-import re
 from collections.abc import Callable
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from tests.page.conftest import INSTRUMENT, at_rest, comes_to, wait_for_rows, written
+from tests.page.conftest import INSTRUMENT, at_rest, comes_to
 
 from softstart import Drive, simulate
 
@@ -185,47 +182,6 @@ def test_what_is_seen_is_saved_as_a_picture(page):
         assert len(picture.convert("RGB").getcolors(100_000)) > 20
 
 
-def test_names_at_the_peaks_do_not_lie_on_one_another(page):
-    every = page.locator(".strategies tbody tr input[type=checkbox]")
-    for index in range(every.count()):
-        every.nth(index).check()
-    refined(page, 2)
-    names = every.evaluate_all("all => all.map((one) => one.closest('tr').dataset.name)")
-    texts = written(page)
-    peaks = [one for one in texts if one["text"].rpartition(" ")[0] in names and one["align"] == "left"]
-    assert f"direct {DIRECT.peak_torque:.1f}" in [one["text"] for one in peaks]  # the selected one is there
-    assert len(peaks) >= 2
-    for one, other in permutations(peaks, 2):
-        apart = other["x"] >= one["x"] + one["wide"] or other["x"] + other["wide"] <= one["x"]
-        assert abs(one["y"] - other["y"]) >= 12.0 or apart
-    heads = [one for one in texts if one["text"] in ("motor u", "shaft T", "Torque")]
-    assert len(heads) == 3
-    assert all(0.0 < one["x"] <= box(page)["width"] and one["y"] > 0.0 for one in heads)
-
-
-def test_an_instant_is_read_of_every_strategy_shown(page):
-    for name in ("ramp", "shaped", "s-curve"):
-        page.locator(f'tr[data-name="{name}"] input[type=checkbox]').check()
-    refined(page, 2)
-    page.evaluate("""() => {
-      window.written = [];
-      const write = CanvasRenderingContext2D.prototype.fillText;
-      CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
-        window.written.push(text);
-        write.call(this, text, ...rest);
-      };
-    }""")
-    place = box(page)
-    page.mouse.move(place["x"] + 300, place["y"] + 90)
-    page.wait_for_function("window.written.some((one) => one.startsWith('s-curve '))")
-    written = page.evaluate("window.written.reverse()")  # the names stand at the peaks too, drawn before
-    t = float(re.search(r"t (\S+) s", next(one for one in written if one.startswith("t ")))[1])
-    for name in ("ramp", "shaped", "s-curve"):
-        told = next(float(one.split()[1]) for one in written if re.fullmatch(rf"{name} -?[\d.]+", one))
-        exact = simulate(CRANE, name).at([t - 5e-5, t, t + 5e-5])["T"]  # the instant has four digits
-        assert exact.min() - 0.1 <= told <= exact.max() + 0.1
-
-
 def test_a_file_saved_while_figures_arrive_is_whole(page):
     """What the server sends is drawn with the next picture; a file may be asked for before that."""
     page.evaluate("""() => {
@@ -242,15 +198,6 @@ def test_a_file_saved_while_figures_arrive_is_whole(page):
     page.wait_for_function("window.files.length > 0")
     for table in page.evaluate("window.files"):
         assert len(table.splitlines()) > 100
-
-
-def test_the_gentlest_is_selected_at_first(visit):
-    page = visit(select="")
-    wait_for_rows(page)
-    cells = page.locator('.strategies tbody td[data-key="k_dyn"]').all_inner_texts()
-    assert float(page.locator("#k-dyn").inner_text()) == min(float(cell) for cell in cells)
-    assert page.locator("tbody tr").first.get_attribute("class") == "selected"
-    assert page.locator('tr[data-name="direct"] input[type=checkbox]').is_checked()
 
 
 def test_maps_of_two_strategies_are_compared(page):
@@ -280,26 +227,3 @@ def test_maps_of_two_strategies_are_compared(page):
     drive = CRANE.replace(gap=gap, load_inertia=inertia)
     assert own == pytest.approx(simulate(drive, "ramp").k_dyn, abs=2e-3)
     assert other == pytest.approx(simulate(drive, "direct").k_dyn, abs=2e-3)
-
-
-def test_plots_fields_and_map_are_in_the_units_of_the_user(page):
-    """Those in the head of the page: CSV of the plots, a field with its unit, facts; the scheme stays."""
-    field = page.locator('[data-path="units"] input')
-    comes_to(field.input_value, "rad, rpm")
-    field.fill("deg, rpm")
-    field.press("Enter")
-    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] .unit').textContent === 'deg'")
-    assert float(page.locator('[data-path="shaft.gap"] input[type=text]').input_value()) == pytest.approx(
-        math.degrees(CRANE.gap), rel=1e-5
-    )
-    seen_now = seen(page, lambda found: "direct twist_deg" in found)
-    exact = DIRECT.at(seen_now["direct time_s"])
-    assert seen_now["direct twist_deg"] == pytest.approx(np.degrees(exact["theta"]), abs=1e-3)
-    assert seen_now["direct load_speed_rpm"] == pytest.approx(exact["w2"] * 30.0 / math.pi, abs=1e-2)
-    instant = hold(page, 0.5)
-    theta = float(DIRECT.at(instant)["theta"])
-    assert scheme(page)["share"] == pytest.approx(np.clip(theta / HALF, -1.0, 1.0), abs=0.02)
-    comes_to(lambda: page.locator(".figure dl").inner_text().count("rpm"), 1)
-    field.fill("furlongs")
-    field.press("Enter")
-    page.get_by_text("is no unit of an angle or a speed").wait_for()

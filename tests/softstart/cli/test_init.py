@@ -83,13 +83,6 @@ def test_a_wrong_answer_is_asked_again(run, typed):
     assert run("init", "--ask").out == out
 
 
-def test_a_value_that_is_given_is_not_asked(run, typed):
-    typed(*ANSWERS[:2], *ANSWERS[3:])
-    code, _, err = run("init", "--ask", "--set", "load.machine=travel")
-    assert code == 0
-    assert "kind of the machine" not in err
-
-
 def test_an_end_of_the_answers_names_the_one_that_is_missing(run, typed, nothing_left):
     typed(*ANSWERS[:5])
     code, out, said = run("init", "--ask", "--out", "mine.toml")
@@ -167,13 +160,3 @@ def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     assert "assumed:" not in run("simulate", "sheet.toml", "--controller", "direct", "--set", "damping=1").out
     code, _, err = run("simulate", "sheet.toml", "--controller", "direct", "--set", "gear.backlash=16")
     assert (code, 'write "16 arcmin"' in err) == (2, True)
-
-
-@pytest.mark.parametrize(
-    ("out", "said"),
-    [("crane-4amtkf", "compare ./crane-4amtkf"), ("a b", "compare 'a b'"), ("none/x", "--out = none/x: the")],
-)
-def test_the_file_is_named_as_a_shell_takes_it(run, place, out, said):
-    given = SLEWING | UNITS | {"gear.backlash": "8'"}
-    settings = [word for path, text in given.items() for word in ("--set", f"{path}={text}")]
-    assert said in " ".join("".join(map(str, run("init", *settings, "--out", out))).split())

@@ -7,8 +7,6 @@ from softstart.cli import lists
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study
 from softstart.views.drawing import new_figure
 
-ROWS = [(0.5, 3.1179, "[G]"), (2.0, None, "")]
-
 
 class Example(Study):
     name = "example"
@@ -19,14 +17,12 @@ class Example(Study):
         progress("asking")
         figure, axes = new_figure()
         axes.plot([0.5, 2.0], [3.1179, 4.8654])
+        rows = [(0.5, 3.1179, "[G]"), (2.0, None, "")]
         return StudyResult(
-            tables=[
-                Table("Peak over gap", ("gap, rad", "K_dyn", "note"), [(0.5, 3.1179, "[G]"), (2.0, None, "")])
-            ],
+            tables=[Table("Peak over gap", ("gap, rad", "K_dyn", "note"), rows)],
             claims=[
                 Claim("A wider gap raises K_dyn.", "confirmed", "3.12 at 0.5 rad, 4.87 at 2 rad."),
                 Claim("Nothing else does.", Verdict.REFUTED, "A larger J2 does too. " * 12),
-                Claim("It always does.", "partly", "Not where the start begins in contact."),
             ],
             figures={"gap": figure},
         )
@@ -64,46 +60,21 @@ def registered(monkeypatch):
     monkeypatch.setattr(plugins, "registered", lambda group: points)
 
 
-def test_list(done, as_json):
-    out = done("study")
-    assert "Does a wider gap raise K_dyn?" in out
-    assert "No module named 'nothing'" in " ".join(out.split())
-    told = as_json("study")
+def test_a_study_is_listed_shown_and_written(done, as_json, place):
+    assert "No module named 'nothing'" in " ".join(done("study").split())
     listed = {"name": "example", "title": Example.title, "pictures": ["gap"], "files": ["gap.svg", "gap.png"]}
-    assert listed in told["studies"]
-
-
-def test_result_is_shown(done):
-    out = done("study", "example")
-    for words in (
-        "Peak over gap",
-        "gap, rad",
-        "3.1179",
-        " 1. confirmed  A wider gap",
-        " 2. refuted    Nothing",
-        "[G]",
-    ):
+    assert listed in as_json("study")["studies"]
+    out = done("study", "example", "--out", "results")
+    for words in ("Peak over gap", "3.1179", " 1. confirmed  A wider gap", " 2. refuted    Nothing", "[G]"):
         assert words in out
     assert max(map(len, out.splitlines())) <= 100
-
-
-def test_json(as_json):
     told = as_json("study", "example")
-    assert told["study"] == "example"
-    assert [claim["verdict"] for claim in told["claims"]] == ["confirmed", "refuted", "partly"]
+    assert [claim["verdict"] for claim in told["claims"]] == ["confirmed", "refuted"]
     assert told["tables"][0]["rows"] == [[0.5, 3.1179, "[G]"], [2.0, None, ""]]
-
-
-def test_files(run, place, as_json):
-    code, out, _ = run("study", "example", "--out", "results")
-    assert code == 0
     names = {path.name for path in (place / "results").iterdir()}
-    listed = {one["name"]: one["files"] for one in as_json("study")["studies"]}
-    assert set(listed["example"]) == {name for name in names if not name.endswith((".csv", ".md"))}
     assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv", "report.md"}
     table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")
     assert table == '"gap, rad",K_dyn,note\n0.5,3.1179,[G]\n2.0,,\n'
-    assert "Written to results" in out
 
 
 def test_a_study_that_fails_leaves_nothing(run, nothing_left):
@@ -115,10 +86,10 @@ def test_a_study_that_fails_leaves_nothing(run, nothing_left):
 
 @pytest.mark.parametrize(
     ("name", "says"),
-    [("exampel", 'did you mean "example"?'), ("broken", "cannot be loaded"), ("strange", "is no study")],
+    [("exampel", 'did you mean "example"'), ("broken", "cannot be loaded"), ("strange", "is no study")],
 )
 def test_studies_that_are_not_there(name, says):
-    with pytest.raises(InputError, match=says.replace("?", r"\?")):
+    with pytest.raises(InputError, match=says):
         find_study(name)
 
 

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from softstart import simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
-from softstart.drive import PARAMETERS
 from softstart.drive.doubts import doubts
 from softstart.page import links
 from softstart.page.controls import Controls
@@ -43,9 +42,9 @@ class Line:
                 asyncio.get_running_loop().call_later(0.002, self.live.drawn, number)
 
 
-async def until(true, seconds: float = 30.0) -> None:
+async def until(true) -> None:
     """Wait for a condition; a busy machine may take its time."""
-    async with asyncio.timeout(seconds):
+    async with asyncio.timeout(120.0):
         while not true():
             await asyncio.sleep(0.005)
 
@@ -113,26 +112,6 @@ def test_every_step_has_its_glance_until_the_browser_stops_drawing(monkeypatch):
     assert len(numbered) <= WINDOW
 
 
-def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
-    session = Session(controllers=["direct"])
-
-    async def hand(controls, line):
-        await until(lambda: len(rows_of_map(line)) == 17)
-        line.frames.clear()
-        controls.take({"what": "jump", "gap": 1.0, "inertia": 0.175})
-        await asyncio.sleep(0.2)
-        assert not any("map_row" in frame for _, frame in line.frames)  # gap and inertia are its axes
-        controls.take({"what": "slide", "path": "shaft.stiffness", "position": 200})
-        await until(lambda: len(rows_of_map(line)) == 17)
-        assert any(frame.get("map_is_old") for _, frame in line.frames)
-        rows = rows_of_map(line)
-        head = rows[8]["map"]
-        here = session.machine.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
-        assert rows[8]["map_row"]["k"][6] == simulate(here, "direct").k_dyn
-
-    asyncio.run(followed(session, hand))
-
-
 def test_a_map_left_half_way_is_old_until_all_its_rows_have_come():
     """Going back to the strategy before does not make the rows of both a map of one."""
     session = Session(controllers=["direct", "ramp"])
@@ -194,31 +173,17 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     assert not screen.mistakes
     shown = screen.first()["fields"]["shaft.gap"]
     assert (shown["text"], shown["position"]) == ("4", 21)
-
-
-def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
-    """Escape: the field shows six digits, so its text is not sent."""
-    session = Session(controllers=["direct"])
-    session.set("shaft.stiffness", 368.4651234567)
-    controls, screen = controls_of(session)
-    controls.take({"what": "edit", "path": "shaft.stiffness", "text": "soft"})
-    assert screen.mistakes
-    controls.take({"what": "leave", "path": "shaft.stiffness"})
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
+    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")
+    controls.take({"what": "leave", "path": "shaft.gap"})  # Escape: the drive keeps every digit
     assert not screen.mistakes
-    assert session.machine.stiffness == 368.4651234567
-
-
-def test_each_message_is_told_of_once_and_no_place_is_made_up():
-    session = Session(controllers=["direct"])
-    pokes: list[int] = []
-    screen = Screen(session)
-    session.on_change(lambda: pokes.append(1))
-    controls = Controls(session, screen, lambda: pokes.append(2))
-    controls.take({"what": "slide", "path": "shaft.gap", "position": 200, "stamp": 10**400})
-    controls.take({"what": "edit", "path": "shaft.gap", "text": "wide"})
-    controls.take({"what": "edit", "path": "no.field", "text": "1"})
-    assert pokes == [1, 2, 2]
-    assert list(screen.mistakes) == ["shaft.gap", ""]
+    assert session.machine.gap == parse("4 deg", "rad")
+    controls.take({"what": "reset", "path": "shaft.gap"})
+    controls.take({"what": "reset", "path": "load.torque"})
+    assert session.machine == session.origin
+    session.take(session.machine.replace(gap=0.005))  # another drive brings its own sliders
+    assert screen.first()["mistakes"] == {}
+    assert screen.entries["shaft.gap"].scale.high == max(screen.axes.gaps) == 0.02
 
 
 def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
@@ -239,18 +204,6 @@ def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
     assert not screen.mistakes
     assert len([frame for frame in screen.at_rest() if frame and "keep" in frame]) == 1
     assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
-
-
-def test_a_tab_that_has_not_heard_of_the_last_change_gets_what_its_link_says():
-    before = Session(controllers=["direct"])
-    before.set("shaft.gap", 0.3)
-    (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
-    before.set("shaft.gap", 0.7)
-    list(Screen(before).at_rest())  # the server keeps this one; its message is lost
-    session = Session(controllers=["direct"])
-    controls, _ = controls_of(session)
-    controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
-    assert session.machine.gap == 0.3
 
 
 def test_a_slider_sets_exactly_the_value_that_its_field_shows():
@@ -307,14 +260,6 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     assert session.machine.by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
     assert 'write for example "deg, rpm"' in screen.mistakes["units"]
-
-
-def test_a_unit_that_was_typed_is_that_of_the_page_and_stays_at_a_gap_of_0():
-    session = Session("hoist-15kw", controllers=["direct"])
-    controls, screen = controls_of(session)
-    assert screen.units.angle == "deg"
-    controls.take({"what": "slide", "path": "shaft.gap", "position": 0})
-    assert (session.machine.gap, screen.units.angle) == (0.0, "deg")
 
 
 def test_parameters_of_the_selected_strategy_are_fields():
@@ -375,62 +320,17 @@ def test_every_strategy_shows_the_values_that_it_starts_with():
         assert set(shown) >= {path for path in screen.entries if path.startswith("strategy.")}
 
 
-def test_reset_gives_the_value_of_the_drive_as_it_was_loaded():
-    session = Session(controllers=["direct"])
-    controls, _ = controls_of(session)
-    controls.take({"what": "edit", "path": "shaft.gap", "text": "1.5"})
-    controls.take({"what": "reset", "path": "shaft.gap"})
-    assert session.machine == session.origin
-
-
-def test_tuned_values_are_marked_beside_the_default():
-    session = Session(controllers=["ramp"])
-    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), session.machine)
-    session.add("ramp (robust)", tuned, select=False)
-    screen = Screen(session)
-    session.result("ramp (robust)")
-    marks = screen.first()["fields"]["strategy.time"]["marks"]
-    assert [meaning for _, meaning in marks][1:] == ["ramp (robust): 0.3"]
-    session.select("ramp (robust)")  # its gains come from a file
-    assert screen.first()["strategy"] == []
-
-
-def test_a_strategy_that_has_joined_can_be_taken_out_again():
+def test_what_is_assumed_or_can_hardly_be_is_told_at_rest():
     session = Session(controllers=["direct"])
     controls, screen = controls_of(session)
-    session.add("tuned", make_controller("ramp"))
-    assert screen.first()["added"] == ["tuned"]
-    controls.take({"what": "remove", "name": "tuned"})
-    assert (screen.first()["order"], screen.first()["selected"]) == (["direct"], "direct")
-    controls.take({"what": "remove", "name": "direct"})
-    assert "last strategy" in screen.first()["mistakes"][""]
-
-
-def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
-    session = Session(controllers=["direct"])
-    controls, screen = controls_of(session)
-    controls.take({"what": "edit", "path": "shaft.gap", "text": ""})
-    assert "empty" in screen.mistakes["shaft.gap"]
-    session.take(session.machine.replace(gap=0.005))
-    assert not screen.first()["mistakes"]
-    assert screen.entries["shaft.gap"].scale.high == 0.02
-    assert max(screen.axes.gaps) == 0.02
-
-
-@pytest.mark.parametrize("machine", ["crane-4amtkf", "crane-4-mass"])
-def test_what_is_assumed_or_can_hardly_be_is_told_at_rest(machine):
-    session = Session(machine, controllers=["direct"])
-    controls, screen = controls_of(session)
-    if machine == "crane-4amtkf":
-        known = {"assumed": "efficiency 0.95; damping ratio 0.02", "gear_ratio": 31.5}
-        session.take(session.machine.replace(**known))
-        controls.take({"what": "edit", "path": "shaft.gap", "text": "4 rad"})
-        figure = screen.first()["figure"]
-        assert figure["output_torque"] == pytest.approx(31.5 * figure["peak_torque"], rel=1e-12)
+    known = {"assumed": "efficiency 0.95; damping ratio 0.02", "gear_ratio": 31.5}
+    session.take(session.machine.replace(**known))
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "4 rad"})
+    figure = screen.first()["figure"]
+    assert figure["output_torque"] == pytest.approx(31.5 * figure["peak_torque"], rel=1e-12)
     (remarks,) = [frame for frame in screen.at_rest() if frame and "doubts" in frame]
     assert remarks["assumed"] == session.machine.assumed.split("; ")
-    assert remarks["doubts"] == doubts(session.machine)
-    assert bool(remarks["doubts"]) is (machine == "crane-4amtkf")
+    assert remarks["doubts"] == doubts(session.machine) != []
 
 
 @pytest.mark.parametrize(
@@ -450,27 +350,13 @@ def test_a_limit_is_given_and_taken_back_by_an_empty_field(machine, path, text):
     assert not session.machine.limits
 
 
-def test_every_parameter_with_a_field_is_one_of_the_drive():
-    screen = Screen(Session(controllers=["direct"]))
-    shown = [row["path"] for group in screen.first()["groups"] for row in group["rows"]]
-    assert len(set(shown)) == len(shown)
-    assert set(shown) <= {parameter.path for parameter in PARAMETERS.values()}
-
-
-KEYS = (
-    "path",
-    "text",
-    "position",
-    "gap",
-    "inertia",
-    "name",
-    "visible",
-    "kept",
-    "link",
-    "begin",
-    "end",
-    "stamp",
-)
+WHATS = [
+    "slide", "edit", "reset", "jump", "select", "show", "keep", "remove", "undo", "redo", "hello", "window",
+    "?",
+]  # fmt: skip
+KEYS = [
+    "path", "text", "position", "gap", "inertia", "name", "visible", "kept", "link", "begin", "end", "stamp",
+]  # fmt: skip
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
@@ -478,32 +364,8 @@ JSON = st.recursive(
 )
 
 
-@settings(max_examples=80, deadline=None)
-@given(
-    st.fixed_dictionaries(
-        {
-            "what": st.sampled_from(
-                [
-                    "slide",
-                    "edit",
-                    "reset",
-                    "jump",
-                    "select",
-                    "show",
-                    "keep",
-                    "remove",
-                    "undo",
-                    "redo",
-                    "hello",
-                    "window",
-                    "?",
-                ]
-            )
-        },
-        optional=dict.fromkeys(KEYS, JSON),
-    )
-    | JSON
-)
+@settings(max_examples=30, deadline=None)
+@given(st.fixed_dictionaries({"what": st.sampled_from(WHATS)}, optional=dict.fromkeys(KEYS, JSON)) | JSON)
 def test_no_message_whatever_kills_the_page(message):
     session = Session(controllers=["direct"])
     controls, screen = controls_of(session)
@@ -524,9 +386,3 @@ def test_a_message_that_the_page_does_not_send_is_dropped(wrong):
     controls = Controls(session, screen, lambda: pokes.append(1))
     controls.take({"what": "slide", "path": "shaft.gap", "position": 200, **wrong})
     assert (pokes, screen.mistakes, session.version) == ([], {}, 0)
-
-
-def test_a_text_too_long_for_a_field_is_not_read_and_not_repeated():
-    controls, screen = controls_of(Session(controllers=["direct"]))
-    controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
-    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")

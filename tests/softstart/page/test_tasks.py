@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.softstart.test_identification_chains import chain_log, stiff_behind_the_gap
 
 from softstart import (
     Chain,
@@ -32,13 +31,11 @@ from softstart import (
 )  # fmt: skip
 from softstart.controller import make_controller
 from softstart.identification.planning import made_up_log
-from softstart.identification.solving import reduced_drive
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
 from softstart.page.panels import grid_of, tunable
 from softstart.page.sentences import changed_since, plain
-from softstart.reporting import report
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -88,7 +85,7 @@ def test_checks_are_those_of_compare_fatigue_and_optimize(tmp_path: Path) -> Non
     rows = compare(drive, list(controllers)).rows
     assert all(row.against_limits in text for row in rows)
     lives = fatigue([row.run for row in rows])
-    assert f"{lives.ranked[0].relative:.4g}"[:4] in text
+    assert f"{float(f'{lives.ranked[0].relative:.3g}'):g}" in text  # three digits are shown
     best = optimize(drive, limits=True)
     assert list(found.controllers) == [f"quickest {best.end_time:.4g} s"]
     assert simulate(drive, profile_of_file(found, ".csv", tmp_path)).k_dyn == best.k_dyn
@@ -107,6 +104,7 @@ def test_checks_say_why_a_part_is_missing() -> None:
     assert (dict(found.controllers), dict(found.files)) == ({}, {})
 
 
+@pytest.mark.slow
 def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     drive = CRANE.replace(load_kind="reactive", gap=0.08, damping=0.3, start_position="mid-gap")
     log = made_up_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
@@ -117,20 +115,13 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     assert found.drive == alone.drive
     assert Drive.from_toml(found.files["identified-drive.toml"]).gap == found.drive.gap
     assert all(plain(note) in text for note in alone.notes)
+
+
+def test_columns_of_a_log_are_named() -> None:
     with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none is called time"):
-        done(tasks.identified, b"a,b\n1,2\n", "rig.csv", drive, "demand", {})
+        done(tasks.identified, b"a,b\n1,2\n", "rig.csv", CRANE, "demand", {})
     with pytest.raises(InputError, match="write signal=name"):
         tasks.columns_of("torque")
-
-
-def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path) -> None:
-    chain = replace(stiff_behind_the_gap(), units="deg, rpm")
-    played = made_up_log(reduced_drive(chain), "two levels, then reverse", log_period=4e-3, ripple=1.0)
-    chain_log(chain, played).to_csv(tmp_path / "rig.csv")
-    found, _, _ = done(tasks.identified, (tmp_path / "rig.csv").read_bytes(), "rig.csv", chain, "demand", {})
-    written = identify(Log.load(tmp_path / "rig.csv", torque_is="demand"), chain).drive
-    assert (found.drive.gap, found.drive.stiffness) == (written.gap, written.stiffness)
-    assert found.drive.units == chain.units
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
@@ -205,18 +196,6 @@ def test_the_command_line_starts_the_same_drive() -> None:
     assert words[-2:] == ["--controllers", "ramp"]
     own = CRANE.replace(name="My own; rm -rf")
     assert shlex.split(command_text(own, {}))[2] == "my-own-rm-rf.toml"
-
-
-def test_units_of_the_user_are_kept_in_the_file_the_command_and_the_report() -> None:
-    changed = CRANE.replace(gap="10 deg", units="deg, rpm")
-    assert 'units = "deg, rpm"' in changed.to_toml()
-    assert 'gap = "10 deg"' in changed.to_toml()
-    assert Drive.from_toml(changed.to_toml()) == changed
-    words = shlex.split(command_text(changed, {}))
-    assert {"units=deg, rpm", "shaft.gap=10deg"} <= set(words)
-    text = re.sub(r"<[^>]+>|\s", " ", report(changed, controllers=["direct"], budget=0.0).to_html())
-    assert "gap 10.00 deg" in text
-    assert not re.search(r"[\d.]{14,}", text.replace(changed.to_toml(), ""))
 
 
 def test_drift_names_what_was_and_what_is_another_drive() -> None:

@@ -24,7 +24,7 @@ def noted(file: str, line: str, *, progress: Any) -> tuple[int, int, str]:
 def endless(started: str, *, progress: Any) -> None:
     """Never ends, does not listen to requests to end, and has begun another process that does neither."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
+    other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(600)"])
     progress(None, "without an end")
     Path(started).write_text(f"{os.getpid()} {other.pid}", encoding="utf-8")
     while True:

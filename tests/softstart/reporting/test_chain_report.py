@@ -75,15 +75,6 @@ def test_lives_of_shafts_are_those_of_fatigue(made):
     assert "Longest life: take-up" in page
 
 
-def test_limits_pass_or_fail_by_the_worst_case(made):
-    assert "Neither passed nor failed" in made.to_html()
-    permitted = 1.5 * made.choice.chosen.run.peak_torque
-    limited = Chain.load("crane-4-mass", also={"shaft[1].permissible_torque": permitted})
-    page = report(limited, controllers=["take-up"], budget=0.0).to_html()
-    assert "Pass or fail" in page
-    assert "Neither passed" not in page
-
-
 def test_sources_of_a_drive_and_text_from_outside_stay_out():
     about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
     with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):

@@ -1,0 +1,420 @@
+"""What commands write: whole folders or nothing, which other commands can use, and going on after a stop."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shlex
+import sqlite3
+from contextlib import closing
+
+import pytest
+import xarray
+from tests.kept import parts_in
+
+from softstart import (
+    Chain,
+    Drive,
+    InputError,
+    TorqueProfile,
+    compare,
+    simulate,
+    tune,
+)
+from softstart.cli.running import WRITTEN
+from softstart.clutch import Clutch, engage
+from softstart.optimal.front import pareto
+from softstart.views.markdown import file_stem, output_folder, write_table, write_text
+
+SIXTY = ("--set", "start.target_speed=60 rad/s")
+CRANE = Drive.load("crane-4amtkf")
+CRANE_60 = CRANE.replace(target_speed=60.0)
+ANCHOR = ("optimize", *SIXTY, "--start-time", "0.2883042")
+TWO = ("pareto", *SIXTY, "--start-times", "0.2523,0.3", "--controllers", "ramp")
+GRID = ("--gaps", "0.5,2", "--inertias", "2J1,5J1")
+QUICK = ("--restarts", "1", "--workers", "1", "--no-optimum")
+RAMP = ("tune", "--controller", "ramp", *SIXTY, *GRID, *QUICK, "--free", "time")
+START = "simulate crane-4amtkf --controller reduced-two-stage --until 0.3"
+
+
+def rows_of(path):
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def pictures(*stems):
+    return {f"{stem}.{ending}" for stem in stems for ending in ("svg", "png")}
+
+
+# ---- the folder of --out -----------------------------------------------------------------------------
+
+
+def fill(target, *names, fail=False):
+    with output_folder(str(target)) as folder:
+        for name in names:
+            write_text(folder / name, name)
+            assert fail or not (target / name).is_file()
+        if fail:
+            raise RuntimeError
+
+
+def test_a_new_folder_appears_whole_with_the_usual_rights(tmp_path):
+    fill(tmp_path / "a" / "b", "x.txt")
+    (tmp_path / "usual").mkdir()
+    assert (tmp_path / "a" / "b").stat().st_mode == (tmp_path / "usual").stat().st_mode
+    assert (tmp_path / "a" / "b" / "x.txt").read_text() == "x.txt"
+    assert sorted(os.listdir(tmp_path)) == ["a", "usual"]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_failure_inside_leaves_nothing(tmp_path, there):
+    target = tmp_path / "a" / "b"
+    if there:
+        target.mkdir(parents=True)
+    with pytest.raises(RuntimeError):
+        fill(target, "x.txt", fail=True)
+    assert list(tmp_path.rglob("*.*")) == []
+    assert (tmp_path / "a").exists() == there
+
+
+def test_a_folder_where_a_file_is_to_go_is_found_before_anything_is_moved(tmp_path):
+    (tmp_path / "x.txt").mkdir()
+    with pytest.raises(InputError, match=r"x\.txt in it is a folder"):
+        fill(tmp_path, "a.txt", "x.txt")
+    assert os.listdir(tmp_path) == ["x.txt"]
+
+
+def test_a_failure_while_putting_in_place_takes_back_new_parents(tmp_path, monkeypatch):
+    def full(self, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.rename", full)
+    with pytest.raises(InputError, match="No space left"), output_folder(str(tmp_path / "a" / "b")):
+        pass
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_link_that_leads_nowhere(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    with pytest.raises(InputError, match="leads nowhere"), output_folder(str(tmp_path / "link")):
+        pass
+
+
+def test_names_of_files_and_a_table(tmp_path):
+    assert file_stem("../../etc/passwd") == "-..-etc-passwd"
+    assert file_stem("...") == "start"
+    assert file_stem("a", ["a", "a-2"]) == "a-3"
+    write_table(tmp_path / "t.csv", ["a", "b, c"], [[0.1, None], ["x", 2]])
+    assert (tmp_path / "t.csv").read_text() == 'a,"b, c"\n0.1,\nx,2\n'
+
+
+def test_the_same_command_replaces_older_files_by_the_same_and_leaves_others(run, place, refused):
+    folder = place / "results"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "report.md").write_text(f"old\n\n{WRITTEN}0.1")
+    written = []
+    for _ in range(2):
+        assert run(*START.split(), "--out", "results", "--json").code == 0
+        written.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    assert written[0] == written[1]
+    assert written[0]["notes.txt"] == b"mine"
+    assert written[0]["report.md"].startswith(b"# Crane")
+    assert not [name for name in os.listdir(folder) if name.startswith(".")]
+    (place / "report.md").write_text("# My measurements\n")
+    refused(*START.split(), "--out", ".", says=["was not written by softstart"])
+    assert (place / "report.md").read_text() == "# My measurements\n"
+
+
+# ---- which files, and that the report leads to them --------------------------------------------------
+
+FILES = {
+    START: {"drive.toml", "figures.csv", "stages.csv", "events.csv", "trace-reduced-two-stage.csv",
+            *pictures("run-reduced-two-stage")},
+    "compare good.toml --controllers direct,own.py:Good --set gap=0.6": {
+        "comparison.csv", "drive.toml", "trace-direct.csv", "trace-own.csv",
+        *pictures("comparison", "trade-off", "run-direct", "run-own"),
+    },
+    "linear --controller current-limit-feedback": {"response.csv", "drive.toml", *pictures("linear")},
+    "linear good.toml --controller ramp": {"drive.toml"},
+    "fatigue crane-4amtkf --controllers direct,s-curve --set shaft.damping=1 --slope 5": {
+        "fatigue.csv", "drive.toml", *pictures("fatigue"),
+        *(f"{kind}-{name}.csv" for kind in ("spectrum", "turning-points") for name in ("direct", "s-curve")),
+    },
+    "sweep --controller ramp --axis shaft.gap=0.5,2 --workers 1": {
+        "sweep.zarr", "sweep.csv", "cells.csv", "drive.toml", *pictures("sweep"),
+    },
+    "reduce --set shaft[3].gap=0.02 --no-starts": None,
+    "balance": {"engine.toml", "orders.csv", "residuals.csv", "torque.csv",
+                *pictures("torque", "residual", "forces")},
+    "clutch --law law.csv": {"clutch.toml", "events.csv", "phases.csv", "traces.csv",
+                             *pictures("engagement")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", FILES)
+def test_the_files_of_a_command(line, place, done):
+    (place / "law.csv").write_text("t [s],M [kgf*m]\n0,0\n1,60\n")
+    out = done(*shlex.split(line), "--out", "deep/results")
+    assert "Written to deep/results: report.md, figures and tables.\n" in out
+    folder = place / "deep" / "results"
+    assert [path.name for path in (place / "deep").iterdir()] == ["results"]
+    found = {path.name for path in folder.iterdir()}
+    if FILES[line] is not None:
+        assert found == {"report.md", *FILES[line]}
+    for path in folder.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    report = (folder / "report.md").read_text("utf-8")
+    assert {part.split(")")[0] for part in report.split("](")[1:]} <= found
+    assert f"softstart {line} --out deep/results" in report.replace("'", "")
+    CHECKS.get(line.split()[0], lambda folder: None)(folder)
+
+
+def of_a_comparison(folder):
+    drive = Drive.load(folder / "drive.toml")
+    assert (drive.gap, drive.name) == (0.6, "a drive of my own")
+    rows = rows_of(folder / "comparison.csv")
+    assert [row["controller"] for row in rows] == ["direct", "own"]
+    assert float(rows[0]["k_dyn"]) == simulate(drive, "direct").k_dyn
+    head = (folder / "trace-direct.csv").read_text("utf-8").splitlines()[0]
+    assert head == "t [s],phi1 [rad],phi2 [rad],w1 [rad/s],w2 [rad/s],u [N*m],T [N*m]"
+    assert "| shaft.gap | gap | 0.6 |" in (folder / "report.md").read_text("utf-8")
+
+
+def of_a_loop(folder):
+    """The crossings are among the frequencies: |L| passes through 1 exactly there."""
+    if (folder / "response.csv").exists():
+        rows = rows_of(folder / "response.csv")
+        assert len([row for row in rows if abs(float(row["|L|"]) - 1.0) < 1e-9]) == 2
+
+
+def of_a_sweep(folder):
+    assert xarray.open_zarr(folder / "sweep.zarr").sizes == {"gap": 2}
+    rows = rows_of(folder / "cells.csv")
+    runs = [simulate(CRANE.replace(gap=gap), "ramp") for gap in (0.5, 2.0)]
+    assert [float(row["k_dyn"]) for row in rows] == [run.k_dyn for run in runs]
+    assert [float(row["start_time [s]"]) for row in rows] == [run.start_time for run in runs]
+
+
+def of_a_reduction(folder):
+    assert Drive.load(folder / "drive.toml").gap == pytest.approx(0.1 + 0.2 + 0.4)
+    assert Chain.load(folder / "chain.toml") == Chain.load("crane-4-mass", also={"shaft[3].gap": 0.02})
+    assert len(rows_of(folder / "shapes.csv")) == 4
+
+
+def of_a_clutch(folder):
+    linear, table = engage(Clutch.load("paper-c")), engage(Clutch.load(folder / "clutch.toml"))
+    assert table.slip_work == pytest.approx(linear.slip_work, rel=1e-13)
+
+
+CHECKS = {
+    "compare": of_a_comparison, "linear": of_a_loop, "sweep": of_a_sweep, "reduce": of_a_reduction,
+    "clutch": of_a_clutch,
+}  # fmt: skip
+
+
+# ---- files that other commands take ------------------------------------------------------------------
+
+
+def test_a_profile_of_an_optimum_is_played_to_the_same_k_dyn(place, done, as_json):
+    out = done(*ANCHOR, "--out", "best")
+    assert out.endswith("Written to best: report.md, figures and tables.\n")
+    folder = place / "best"
+    assert {path.name for path in folder.iterdir()} == {
+        "report.md", "profile.csv", "profile.toml", "profile.c", "trace-optimum.csv", "drive.toml",
+        "figures.csv", *pictures("optimum"),
+    }  # fmt: skip
+    (row,) = rows_of(folder / "figures.csv")
+    assert "double" in (folder / "profile.c").read_text("utf-8")
+    for name in ("profile.csv", "profile.toml"):
+        assert isinstance(TorqueProfile.load(folder / name), TorqueProfile)
+        played = as_json(
+            "simulate", "best/drive.toml", "--controller", "profile", "--param", f"file=best/{name}"
+        )
+        assert played["k_dyn"] == pytest.approx(float(row["k_dyn"]), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_one_profile_for_two_gaps(as_json, place):
+    told = as_json("optimize", *SIXTY, "--start-time", "0.3", "--gaps", "0.4 rad", "--out", "both")
+    assert told["k_dyn"] == max(told["k_dyn_each"]) == told["k_dyn_each"][told["worst"]]
+    assert told["k_dyn_lower_bound"] <= max(told["k_dyn_if_position_known"].values()) <= told["k_dyn"]
+    assert max(told["start_times"]) <= 0.3 + 1e-12
+    played = ("simulate", "both/drive.toml", "--controller", "profile", "--param", "file=both/profile.csv")
+    for gap, wanted in zip(("0.5", "0.4"), told["k_dyn_each"], strict=True):
+        peak = as_json(*played, "--set", f"gap={gap}")["peak_torque"]
+        assert peak / told["peak_torque"] == pytest.approx(wanted / told["k_dyn"], rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def tuned(tmp_path_factory):
+    """What `RAMP` finds, and the file of its finished parts."""
+    path = tmp_path_factory.mktemp("tuned") / "tuning.sqlite"
+    options = {"restarts": 1, "workers": 1, "certified": False, "free": {"time": None}, "parameters": {}}
+    return tune(CRANE_60, "ramp", [0.5, 2.0], [0.07, 0.175], save_to=path, **options), path.read_bytes()
+
+
+@pytest.fixture
+def begun(place, tuned):
+    """A folder that holds these parts already."""
+    (place / "tuned").mkdir()
+    (place / "tuned" / "tuning.sqlite").write_bytes(tuned[1])
+    return place / "tuned"
+
+
+def test_tuned_gains_play(begun, tuned, as_json):
+    assert as_json(*RAMP, "--out", "tuned")["starts"] == 0  # all of it was there
+    assert {path.name for path in begun.iterdir()} == {
+        "report.md", "schedule.toml", "schedule.csv", "robust.toml", "robust-cells.csv", "between.csv",
+        "price.csv", "tuning.sqlite", "drive.toml", *pictures("gains", "metric", "robust", "price"),
+    }  # fmt: skip
+    assert len(rows_of(begun / "price.csv")) == 4
+    found = tuned[0]
+    for file, table in (("schedule.toml", found.schedule), ("schedule.csv", found.schedule),
+                        ("robust.toml", found.robust.cells)):  # fmt: skip
+        cell = ("--set", "gap=2", "--set", "load.inertia=0.07")
+        told = as_json("simulate", "crane-4amtkf", "--controller", f"tuned/{file}", *SIXTY, *cell)
+        assert told["k_dyn"] == float(table.k_dyn.sel(gap=2.0, load_inertia=0.07))
+    told = as_json("compare", *SIXTY, "--controllers", "ramp,tuned/robust.toml,tuned/schedule.csv")
+    names = [row["controller"] for row in told["strategies"]]
+    assert names == ["ramp", "ramp (robust)", "ramp (schedule)"]
+
+
+@pytest.mark.slow
+def test_optimal_laws_of_a_clutch_can_be_played(as_json, place):
+    (point,) = as_json("clutch", "--optimal", "--points", "1", "--out", "best")["points"]
+    assert point["work_bound"] <= point["slip_work"]
+    assert {"front.csv", "laws.csv", "law-1.csv", "report.md", "front.svg"} <= set(os.listdir(place / "best"))
+    played = as_json("clutch", "--law", "best/law-1.csv")
+    assert played["slip_work"] == pytest.approx(point["slip_work"], rel=1e-13)
+
+
+# ---- a controller set up for one drive, run on another -----------------------------------------------
+
+BELIEVED = Drive(
+    motor_inertia=0.035, starting_torque=62.0, rated_speed="880 rpm", stiffness=368.465, gap=0.5,
+    load_inertia=0.175, load_torque=7.16, name="a drive of my own",
+)  # fmt: skip
+STIFF = BELIEVED.replace(stiffness=2.0 * BELIEVED.stiffness)
+FITTED = ("good.toml", "--fitted-to", "good.toml", "--set", "shaft.stiffness=736.93")
+
+
+def test_a_controller_fitted_to_another_drive(place, as_json, refused):
+    told = as_json("simulate", *FITTED, "--controller", "shaped", "--out", "one")
+    wrong, right = simulate(STIFF, "shaped", fitted_to=BELIEVED), simulate(STIFF, "shaped")
+    assert (told["k_dyn"], told["fitted_to"]) == (wrong.k_dyn, "a drive of my own")
+    assert wrong.k_dyn > 1.5 * right.k_dyn
+    assert "shaft.stiffness 368.465 there, 736.93 here" in (place / "one" / "report.md").read_text("utf-8")
+    assert Drive.load(place / "one" / "fitted-to.toml").stiffness == BELIEVED.stiffness
+    assert Drive.load(place / "one" / "drive.toml").stiffness == STIFF.stiffness
+
+    (row,) = as_json("compare", *FITTED, "--controllers", "shaped")["strategies"]
+    assert row["k_dyn"] == wrong.k_dyn
+    worn = simulate(STIFF.replace(gap=2.0), "shaped", fitted_to=BELIEVED, base=STIFF)
+    assert row["k_dyn_worn_gap"] == worn.k_dyn
+
+    asked = ("--axis", "controller=shaped,ramp", "--axis", "shaft.stiffness=200,736.93", "--workers", "1")
+    told = as_json("sweep", "good.toml", *asked, "--fitted-to", "good.toml", "--out", "grid")
+    for cell in told["cells"]:
+        there = BELIEVED.replace(stiffness=cell["stiffness"])
+        assert cell["k_dyn"] == simulate(there, cell["controller"], fitted_to=BELIEVED).k_dyn
+    refused("sweep", "good.toml", *asked, "--out", "grid", says=["it holds a sweep with another fitted_to"])
+
+
+def test_fitted_to_the_same_drive_changes_no_bit():
+    plain = compare(STIFF, ["shaped"])
+    same = compare(STIFF, ["shaped"], fitted_to=STIFF)
+    assert same.rows[0].summary() == plain.rows[0].summary()
+    assert (plain.fitted_to, same.fitted_to) == (None, STIFF)
+
+
+# ---- going on ----------------------------------------------------------------------------------------
+
+
+def test_finished_points_and_parts_of_another_drive_are_refused(place, begun, refused):
+    pareto(CRANE_60, [0.2523], controllers=["ramp"], save_to=begun / "pareto.sqlite")
+    for command, file, change in ((RAMP, "tuning", "damping=0.6"), (TWO, "pareto", "gap=0.6")):
+        said = refused(*command, "--set", change, "--out", "tuned")
+        for words in ("--out", f"{file}.sqlite", "another drive", "give another folder"):
+            assert words in said
+
+
+def test_a_front_goes_on_where_it_was_interrupted(interrupted, place, as_json):
+    state = place / "front" / "pareto.sqlite"
+    err = interrupted(
+        "pareto", *SIXTY, "--start-times", "0.245:0.4:40", "--controllers", "direct", "--out", "front",
+        begun=lambda: len(parts_in(state)) > 1,
+    )  # fmt: skip
+    assert "finished points are kept in front/pareto.sqlite" in err
+    assert os.listdir(place / "front") == ["pareto.sqlite"]
+    kept = parts_in(state)
+    few = ",".join(repr(one["start_time_bound"]) for one in kept[:2])
+    told = as_json("pareto", *SIXTY, "--start-times", few, "--controllers", "ramp", "--out", "front")
+    seconds = {point["start_time_bound"]: point["seconds"] for point in told["points"]}
+    assert seconds == {one["start_time_bound"]: one["seconds"] for one in kept[:2]}  # not computed again
+    assert {"pareto.csv", "pareto.svg"} <= {path.name for path in (place / "front").iterdir()}
+    assert rows_of(place / "front" / "pareto.csv")[-1]["what"] == "ramp"
+
+
+LONG = (
+    "sweep", "--controller", "current-limit-feedback", "--axis", "shaft.gap=0.25:4:40", "--axis",
+    "load.inertia=0.07:0.35:50", "--workers", "2", "--chunk", "50", "--figures", "k_dyn,start_time",
+    "--out", "grid",
+)  # fmt: skip
+
+
+def test_a_sweep_goes_on_where_it_was_interrupted(interrupted, place, as_json, run):
+    home = place / "grid" / "sweep.zarr"
+    listed = home / "status" / "softstart.sqlite"
+    err = interrupted(*LONG, begun=lambda: listed.exists() and b'{"part": [' in listed.read_bytes())
+    assert "finished chunks are kept in grid/sweep.zarr; run the same command to continue." in err
+    assert [path.name for path in (place / "grid").iterdir()] == ["sweep.zarr"]
+    with closing(sqlite3.connect(listed)) as base:
+        records = [json.loads(text) for (text,) in base.execute("SELECT record FROM parts WHERE key > ''")]
+    chunks = ["/".join(map(str, one["part"])) for one in records]
+    files = [home / name / "c" / chunk for chunk in chunks for name in ("k_dyn", "status")]
+    done = {path: path.stat().st_mtime_ns for path in files}
+    assert done
+    told = as_json(*LONG, "--netcdf", "grid.nc")
+    assert told["starts"] == 2_000
+    assert 0 < told["computed"] < 2_000
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    with xarray.open_dataset(place / "grid.nc") as read:
+        assert read.k_dyn.values.tolist() == xarray.open_zarr(home).k_dyn.values.tolist()
+    code, out, err = run(*LONG, "--until", "0.1")
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: --out = grid/sweep.zarr: it holds a sweep with another until;")
+
+
+# ---- reports -----------------------------------------------------------------------------------------
+
+CHEAP = ("--controllers", "direct,ramp", "--budget", "0")
+
+
+def test_a_report_is_written_and_summed_up(place, as_json):
+    made = as_json("report", "good.toml", *CHEAP, "--out", "r.html", "--resolution", "time=5ms")
+    page = (place / "r.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert (made["recommended"], made["chosen"]) == (None, "ramp")  # the file has no limits
+    assert f"{made['k_dyn']:.3f}" in page
+    assert "softstart report good.toml" in page
+    (time,) = [one for one in made["sheets"][0]["settings"] if one["name"] == "time"]
+    assert 1e3 * time["rounded"] % 5 == 0.0
+    assert not list(place.rglob("*.part"))
+
+
+def test_an_interrupted_report_leaves_the_old_file(run, place, monkeypatch, refused):
+    (place / "r.html").write_text("old")
+
+    def stop(report):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("softstart.reporting.result.Report.to_html", stop)
+    code, out, err = run("report", "good.toml", *CHEAP, "--out", "r.html")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err
+    assert (place / "r.html").read_text() == "old"
+    assert not list(place.rglob("*.part"))
+    os.mkfifo(place / "pipe")
+    refused("report", "good.toml", *CHEAP, "--out", "pipe", says=["no ordinary file"])
