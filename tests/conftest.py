@@ -55,6 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--page", action="store_true", help="with the tests of the page in Chromium")
     parser.addoption("--docs-commands", action="store_true", help="with the commands of the documentation")
     parser.addoption("--rewrite", action="store_true", help="pages show what their commands print")
+    parser.addoption("--size", type=int, default=1, help="so many times as many cases of tests/robustness")
     parser.addoption("--few-kernels", action="store_true", help="compile nothing before the first test")
 
 
