@@ -69,8 +69,8 @@ QUICK = {
 }
 # they write files or wait for an answer, take a search of minutes, or look for a scheduler
 LEFT_OUT = {
-    "--out", "--ask", "--netcdf", "--pdf", "--confirm", "--limits", "--optimum", "--worst-case", "--scheduler",
-    "--chunk", "--drive",
+    "--out", "--ask", "--netcdf", "--pdf", "--confirm", "--limits", "--optimum", "--worst-case",
+    "--scheduler", "--chunk", "--drive",
 }  # fmt: skip
 PATHS = {
     "drive": [p.path for p in PARAMETERS.values()],
@@ -154,7 +154,7 @@ def values(rng: random.Random) -> Attack:
 
 
 def texts(rng: random.Random) -> Attack:
-    """A shipped file, damaged as an editor, a disk or a program damages files, or with a key or value wrong."""
+    """A shipped file, damaged as editors, disks and programs damage files, or with a key or value wrong."""
     command = rng.choice(list(KIND))
     text = SHIPPED[KIND[command]]()
     at = rng.randrange(len(text))
@@ -255,7 +255,7 @@ def notations(rng: random.Random) -> Attack:
     pairs = [(text, other), (comma, others)]
     if between != ",":  # "12.5,2,5" is a list with points: who mixes both marks in one list is not understood
         pairs += [(text, others), (comma, other)]
-    axis = "sweep --controller direct --json --axis".split()
+    axis = ["sweep", "--controller", "direct", "--json", "--axis"]
     start = f"simulate {CRANE} --controller direct --json --set".split()
     words, truth = rng.choice((
         ([*start, f"shaft.gap={rng.choice(forms)}"], [*start, f"shaft.gap={text}"]),
