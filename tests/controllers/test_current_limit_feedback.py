@@ -5,7 +5,6 @@ The bounds are measured figures with a margin; the figures stand beside them.
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,6 @@ from tests.controllers.starts import CRANE
 
 from softstart import Drive, records, simulate
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
-
-CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
-
-
-def crane(gap: float, J2: float, lag: float, kind: Any) -> Drive:
-    return CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
-
 
 # the start -----------------------------------------------------------------------------------------------
 
@@ -37,11 +29,13 @@ MEASURED = {
 }
 
 
-@pytest.mark.parametrize(("gap", "J2", "lag", "kind"), CRANES)
-def test_starts_softly(gap: float, J2: float, lag: float, kind: Any) -> None:
-    run = simulate(crane(gap, J2, lag, kind), CurrentLimitFeedback())
-    assert run.k_dyn < MEASURED[gap, J2, kind][lag > 0.0] + 0.03
-    assert run.contacts == 1
+def test_starts_softly() -> None:
+    for (gap, J2, kind), most in MEASURED.items():
+        for lag, k_dyn in zip((0.0, 0.002), most, strict=True):
+            drive = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
+            run = simulate(drive, CurrentLimitFeedback())
+            assert run.k_dyn < k_dyn + 0.03, (gap, J2, kind, lag)
+            assert run.contacts == 1
 
 
 @pytest.mark.parametrize(("gap", "most"), [(0.5, 1.2), (2.0, 1.4)])
@@ -84,9 +78,6 @@ def test_servo_drives() -> None:
         assert run.start_time < 1.1 * direct.start_time
 
 
-# the parts of the law ------------------------------------------------------------------------------------
-
-
 def test_damping_ratio_is_what_the_delays_allow() -> None:
     assert CurrentLimitFeedback().fitted(CRANE).damping_ratio == 0.7
     lagging = [CRANE.replace(torque_lag=lag) for lag in (2e-3, 5e-3, 2e-2)]
@@ -109,10 +100,3 @@ def test_feedback_damps_the_closed_drive_as_asked() -> None:
     assert peaks[0] == pytest.approx(2.0, abs=0.1)
     assert peaks[1] == pytest.approx(1.53, abs=0.2)
     assert peaks[2] == pytest.approx(1.25, abs=0.2)
-
-
-def test_gives_up_waiting() -> None:
-    blind = CurrentLimitFeedback(certainty=1e6, patience=0.3)
-    run = simulate(CRANE, blind)
-    assert run.start_time > 0.3
-    assert run.at([0.29, run.end_time])["u"][1] == 62.0
