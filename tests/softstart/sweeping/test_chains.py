@@ -77,21 +77,6 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bits(tmp_path):
         sweep(CHAIN.changed(gaps=1.1), "s-curve", grid, to=folder)
 
 
-@pytest.mark.parametrize(
-    ("grid", "said"),
-    [
-        ({"shaft[4].gap": [0.1]}, "there is no such axis; did you mean shaft"),
-        ({"shaft[2].gap": ["0.1 kg"]}, "not an angle"),
-        ({"mass[2].inertia": [-1.0]}, "above 0"),
-        ({"start.position": ["hangin"]}, "did you mean"),
-        ({"gap": [-1.0]}, "0 or more"),
-    ],
-)
-def test_what_is_no_axis_of_a_chain(grid, said):
-    with pytest.raises(InputError, match=said):
-        sweep(CHAIN, "direct", grid)
-
-
 def test_figures_of_a_chain_are_named():
     known = named(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)
