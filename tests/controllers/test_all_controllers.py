@@ -72,10 +72,15 @@ def test_reaches_the_target_speed_of_any_sensible_drive(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "median", "slower"),
-    [("shaped", 0.58, 1.1), ("state-feedback", 0.58, 1.12), ("current-limit-feedback", 0.65, 1.25)],
+    [
+        ("shaped", 0.58, 1.1),
+        ("state-feedback", 0.58, 1.12),
+        ("current-limit-feedback", 0.65, 1.25),
+        ("pulse-coast-hold", 0.6, 1.25),
+    ],
 )
 def test_softer_than_direct_on_random_drives(name: str, median: float, slower: float) -> None:
-    """K_dyn over that of `direct`: measured median 0.53, 0.53, 0.60; start time 1.06, 1.07, 1.11 times."""
+    """K_dyn over that of `direct`: measured median 0.53, 0.53, 0.60, 0.56; start time 1.06 to 1.11 times."""
     rng = np.random.default_rng(7)
     ratios, times = [], []
     for drive in [random_drive(rng) for _ in range(100)]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.twin import chain_of
 
 from softstart import Drive
-from softstart.chain import Chain, natural_vibration, reduce_chain
+from softstart.chain import Chain, natural_vibration
 from softstart.study import Verdict
 from softstart.vibration import elastic_frequencies
 from softstart_studies.paper_r import findings, four_to_two, tables
@@ -139,14 +139,6 @@ def test_gaps_lower_the_frequency_and_more_so_at_small_amplitudes():
     found = [free(scale_gaps(tractor(), width)).Omega / plain for width in (1.0, 4.0)]
     assert found == sorted(found, reverse=True)
     assert all(ratio < 1.0 for ratio in found)
-
-
-def test_the_two_masses_of_the_chain_tell_its_backbone_roughly():
-    """The exact formula with the reduced drive is within a tenth of the whole chain's motion."""
-    two = reduce_chain(tractor()).to_drive()
-    plain, run = findings.plain(), free(tractor())
-    exact = float(backbone(two.J1, two.J2, two.c, two.gap, plain.torque.max() / two.c))
-    assert run.Omega / plain.Omega == pytest.approx(exact / two.Omega, rel=0.1)
 
 
 def test_a_constant_torque_above_the_alternating_one_locks_all_gaps():

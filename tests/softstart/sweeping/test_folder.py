@@ -6,8 +6,6 @@ import os
 import random
 import shutil
 import signal
-import subprocess
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -208,27 +206,6 @@ def test_a_controller_from_a_file_that_changed_is_another_one(tmp_path):
     (tmp_path / "mine.py").write_text(lines.replace("31.0", "32.0"))
     with pytest.raises(InputError, match="another controller"):
         sweep(CRANE, name, {"gap": [0.5, 2.0]}, to=tmp_path / "a")
-
-
-HOLDER = """
-import sys, time
-from softstart import sweep
-sweep("crane-4amtkf", "ramp", {"gap": [0.5, 1.0, 2.0], "load_inertia": [0.1, 0.2]}, to=sys.argv[1], chunk=2,
-      workers=1, progress=lambda now: (print("held", flush=True), time.sleep(60)))
-"""
-
-
-def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
-    folder = tmp_path / "a"
-    holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder)], stdout=subprocess.PIPE, text=True)
-    assert holder.stdout.readline() == "held\n"
-    with pytest.raises(InputError, match="another process is writing this sweep now; wait for it or end it"):
-        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    holder.kill()
-    holder.communicate()
-    sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
-    assert not list(folder.rglob("*-journal"))
 
 
 def test_netcdf_is_the_same(tmp_path):

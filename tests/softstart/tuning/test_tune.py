@@ -191,21 +191,6 @@ def test_an_interrupted_tuning_goes_on_where_it_was(alone, tmp_path, word, monke
     assert third.starts == 0
 
 
-def test_parts_of_another_question_are_refused_and_kept(tmp_path):
-    kept = tmp_path / "tuning.sqlite"
-    options = {**GRID, **SMALL, "robust": False, "free": ["torque"], "save_to": kept}
-    tune(CRANE, "reduced-first-stage", **options)
-    before = kept.read_bytes()
-    with pytest.raises(InputError, match="another drive and seed; name another file"):
-        tune(CRANE.replace(damping=0.1), "reduced-first-stage", **options, seed=3)
-    kept_elsewhere = tmp_path / "notes"
-    kept_elsewhere.write_text("[1]\n")
-    with pytest.raises(InputError, match="holds something else than a tuning; name another file"):
-        tune(CRANE, "reduced-first-stage", **(options | {"save_to": kept_elsewhere}))
-    assert kept.read_bytes() == before
-    assert kept_elsewhere.read_text() == "[1]\n"
-
-
 # what is judged -------------------------------------------------------------------------------------------
 
 
