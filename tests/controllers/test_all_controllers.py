@@ -13,10 +13,9 @@ from tests import twin
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.controller import CompiledController, controller_class, make_controller
+from softstart.controller import CompiledController, make_controller
 from softstart.drive import library
 from softstart.kernel.records import NOTES
-from softstart.quantities import to_si
 
 SAMPLED = (
     "acceleration-delay", "current-limit-feedback", "ramp", "s-curve", "pulse-coast-hold", "shaped",
@@ -24,22 +23,6 @@ SAMPLED = (
 )  # fmt: skip
 ALL = ("direct", "reduced-first-stage", "reduced-two-stage", *SAMPLED)
 DRIVES = [Drive.load(name) for name in library.names()]
-
-
-@pytest.mark.parametrize("name", [*ALL, "profile"])
-def test_is_described(name: str) -> None:
-    cls = controller_class(name)
-    assert cls.name == name
-    assert cls.summary
-    assert cls.source
-    assert cls.__doc__ is not None
-    assert ">>>" in cls.__doc__
-    for field in dataclasses.fields(cls):
-        assert field.metadata["meaning"], field.name
-        assert field.metadata["default"], field.name
-        if field.metadata["kind"] == "quantity":
-            assert to_si(1.0, field.metadata["unit"]) == 1.0, field.name
-        assert field.default is None
 
 
 @pytest.mark.parametrize("name", ALL)

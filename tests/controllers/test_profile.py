@@ -135,11 +135,6 @@ def test_what_it_cannot_play_is_refused_in_one_sentence(given_: dict[str, object
     assert len(caught.value.sentences) == 1
 
 
-def test_too_many_samples_are_refused() -> None:
-    with pytest.raises(InputError, match="at most 1,000,000"):
-        simulate(CRANE, Profile(profile=TorqueProfile([0.0, 10.0], [1.0, 2.0]), period=1e-9))
-
-
 def test_knots_a_rounding_apart_do_not_stop_it() -> None:
     close = TorqueProfile([0.0, 5e-324, 1e-17, 0.1, np.nextafter(0.1, 1.0)], [5.0, 60.0, 20.0, 30.0, 50.0])
     run = simulate(CRANE, Profile(profile=close), until=0.2)

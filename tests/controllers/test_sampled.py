@@ -44,11 +44,6 @@ def test_s_curve_is_the_double_integral_of_its_jerk(rounding: float) -> None:
     assert np.allclose(got, 5.0 + 57.0 * course, rtol=0, atol=1e-6)
 
 
-def test_s_curve_without_rounding_is_the_ramp() -> None:
-    ramp, curve = demand(Ramp(time=0.1)), demand(SCurve(time=0.1, rounding=0.0))
-    assert np.allclose(ramp, curve, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("cls", [Ramp, SCurve])
 def test_begins_with_a_braking_load_and_never_below_zero(cls: type[Ramp] | type[SCurve]) -> None:
     assert cls().fitted(CRANE).initial == 7.16
@@ -86,9 +81,3 @@ def test_mean_torque_is_exact_for_any_lag(before: float, demand: float, samples:
     blurred = 2**-52 * abs(demand) / (tail * away) if away else 0.0
     tolerance = (2e-6 + min(1.0, blurred)) * away + 1e-9
     assert mean_torque(before, after, demand) == pytest.approx(exact, rel=1e-9, abs=tolerance)
-
-
-@given(torques, torques, torques)
-def test_mean_torque_lies_between_its_ends_and_the_demand(before: float, after: float, demand: float) -> None:
-    low, high = min(before, after, demand), max(before, after, demand)
-    assert low - 1e-9 <= mean_torque(before, after, demand) <= high + 1e-9

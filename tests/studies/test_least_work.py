@@ -19,7 +19,7 @@ STEPS = 60
 
 @pytest.fixture(scope="module")
 def fronts():
-    return {name: optimize_engagement(PAPER, 3, law_class=name) for name in CLASSES}
+    return {name: optimize_engagement(PAPER, 2, law_class=name) for name in CLASSES}
 
 
 @pytest.fixture(scope="module")

@@ -90,16 +90,3 @@ def test_a_periodic_torque_repeats_and_has_its_mean():
     assert power == pytest.approx(0.5 * np.sum(torque.amplitudes**2), rel=1e-12)  # Parseval
     assert torque.at(0.1).shape == ()
     assert PeriodicTorque(**torque.summary()).at(0.01) == torque.at(0.01)
-
-
-def test_bad_periodic_torques_are_refused():
-    for arguments, says in (
-        ((0.0, [1.0], [1.0], [], 10.0), "give as many of each"),
-        ((0.0, [1.0], [1.0], [0.0], 0.0), "above 0 rad/s"),
-        ((0.0, [0.0], [1.0], [0.0], 10.0), "the constant part is mean"),
-        ((math.nan, [1.0], [1.0], [0.0], 10.0), "finite"),
-    ):
-        with pytest.raises(InputError, match=says):
-            PeriodicTorque(*arguments)
-    with pytest.raises(InputError, match="from order"):
-        VAZ.torque_of_time(100.0, orders=0.1)

@@ -138,6 +138,7 @@ def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(seed, curve):
     assert on_the_curve[0].mismatch < 1e-7
 
 
+@pytest.mark.slow
 def test_a_straight_curve_has_the_loop_of_a_damped_mass():
     curved = loaded(6, curve_speed=[-1e4, 1e4], curve_torque=[-20.0, 20.0])
     masses = list(curved.masses)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
-from softstart.tuning.question import Question, gaps_of, inertias_of, recipe_of, scenarios_of
+from softstart.tuning.question import Question, recipe_of, scenarios_of
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
@@ -93,15 +93,6 @@ def test_the_users_ranges():
     with pytest.raises(InputError) as refused:
         ranges_of(ramp, {"tme": None, "period": None, "time": (2, 1)})
     assert len(refused.value.sentences) == 3
-
-
-def test_default_grids():
-    assert gaps_of(CRANE, None) == (0.25, 0.5, 1.0, 2.0)
-    assert inertias_of(CRANE, None) == (0.07, 0.175, 0.35)
-    assert inertias_of(CRANE, ["5J1", "2 J1", 0.07]) == (0.07, 0.175)
-    assert gaps_of(CRANE, 1.0) == (1.0,)
-    with pytest.raises(InputError, match="the drive has no gap"):
-        gaps_of(CRANE.replace(gap=0.0), None)
 
 
 # tolerances -----------------------------------------------------------------------------------------------
