@@ -93,6 +93,20 @@ def test_gas_torque_has_orders_of_half_the_cylinders(order):
     assert np.all(found[~kept] == 0.0)
 
 
+@pytest.mark.parametrize("order", [(1,), (1, 3, 4, 2)])
+def test_gas_orders_agree_with_an_fft_that_is_refined(order):
+    made = engine(order)
+    errors = []
+    for n in (720, 2880):
+        phi = 4.0 * np.pi * np.arange(n) / n
+        fft = 2.0 / n * np.fft.rfft(made.gas_torque(phi, W))[1:13]
+        errors.append(float(np.abs(fft - made.gas_harmonics(W)[1:13]).max()))
+    scale = float(np.abs(made.gas_harmonics(W)).max())
+    assert errors[1] < 1e-5 * scale
+    # kinks of the torque: second order, until rounding
+    assert errors[1] < 0.1 * errors[0] or errors[1] < 1e-12 * scale
+
+
 # the textbook's engines --------------------------------------------------------------------------------
 
 

@@ -170,6 +170,24 @@ def test_feedback_that_is_no_sampled_loop_is_said(controller):
     assert "no sampled loop" in view.conclusion
 
 
+class LoadSpeed(PlainController):
+    """Feeds back what only special sensors see."""
+
+    name = "load-speed"
+    sensors = Sensor.LOAD_SPEED | Sensor.SHAFT_TORQUE
+
+    def step(self, measured: object, state: tuple[float, ...]) -> Command:
+        demand = 0.3 * (60.0 - measured.load_speed) - 0.2 * measured.shaft_torque
+        return Command(demand, measured.time + 0.001)
+
+
+def test_declared_sensors_are_inputs():
+    view = linear_view(FREE, LoadSpeed())
+    assert view.loop.controller_system.input_labels[3:] == ["shaft_torque", "load_speed"]
+    D = view.loop.controller_system.D[0]
+    assert pytest.approx([0.0, 0.0, 0.0, -0.2, -0.3], abs=1e-10) == D
+
+
 class Broken(PlainController):
     def step(self, measured: object, state: tuple[float, ...]) -> Command:
         raise ZeroDivisionError("no")
