@@ -53,6 +53,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Options of this suite: `pytest --help` says what each does."""
     for option, meaning in OPTIONAL.values():
         parser.addoption(option, action="store_true", help=meaning)
+    parser.addoption("--size", type=int, default=1, help="so many times as many cases of tests/robustness")
     parser.addoption("--few-kernels", action="store_true", help="compile what a test needs when it needs it")
     parser.addoption(
         "--tiers", action="store_true", help="say which tests should be marked slow and which should not"

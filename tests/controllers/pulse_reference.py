@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -82,12 +80,3 @@ def way_lost(s: float, V: float, slope: float, a: float, c: float, d: float) -> 
     z = (V - slope * s) * t + 0.5 * slope * t * t
     T = c * z + d * (V - slope * s + slope * t)
     return float(np.sum(a * T * (s - t)) * s / n)
-
-
-def torque_moments(before: float, after: float, demand: float) -> tuple[float, float]:
-    """(int u, int int u) over a sample of length 1 of a torque that follows its demand exponentially."""
-    n = 200_000
-    t = (np.arange(n) + 0.5) / n
-    ratio = (demand - after) / (demand - before)
-    u = demand - (demand - before) * np.exp(math.log(ratio) * t)
-    return float(u.mean()), float(np.sum(u * (1.0 - t)) / n)

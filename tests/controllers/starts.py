@@ -13,6 +13,12 @@ from softstart.controller import Command, CompiledController, Measured
 from softstart.kernel.records import S_REF, S_START
 
 CRANE = Drive.load("crane-4amtkf")
+CRANES = [
+    CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
+    for gap, J2 in ((0.5, 0.175), (2.0, 0.07))
+    for lag in (0.0, 0.002)
+    for kind in ("active", "reactive")
+]
 
 
 def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:

@@ -10,7 +10,6 @@ import pytest
 from tests.controllers.starts import CRANE, raised_at, random_drive
 
 from softstart import Drive, formulas, simulate
-from softstart.kernel.motor import encoder_count
 from softstart_controllers.acceleration_delay import AccelerationDelay, window
 
 AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
@@ -22,7 +21,7 @@ def seen_after(drive: Drive, controller: AccelerationDelay = AT_ONCE) -> float:
     return raised_at(run) - run.first_contact
 
 
-@pytest.mark.parametrize(("raise_at", "share"), [("peak", 0.5), ("end", 1.0), (None, 0.5)])
+@pytest.mark.parametrize(("raise_at", "share"), [("end", 1.0), (None, 0.5)])
 def test_delay_is_that_of_the_reduced_torque(raise_at: str | None, share: float) -> None:
     """Until the peak of stage 2, [G](14), or its end, (15)."""
     fitted = AccelerationDelay(torque=0.25 * 62, raise_at=raise_at).fitted(CRANE)
@@ -30,13 +29,12 @@ def test_delay_is_that_of_the_reduced_torque(raise_at: str | None, share: float)
     assert fitted.delay == pytest.approx(share * nominal.contact_duration, rel=1e-12)
 
 
-@pytest.mark.parametrize("lines", [0, 1024, 4096])
-@pytest.mark.parametrize("lag", [0.0, 0.002])
+@pytest.mark.parametrize(("lines", "lag"), [(0, 0.002), (1024, 0.0), (4096, 0.002)])
 def test_contact_is_seen_as_late_as_documented(lines: int, lag: float) -> None:
     """Over encoder phases, gaps and inertias of the crane; worst measured: 0.9 ms off, lag or not."""
     q = 2 * math.pi / (4 * lines) if lines else 0.0
     worst = 0.0
-    for gap, J2, phase in itertools.product((0.1, 0.5, 2.0), (0.07, 0.175), np.arange(8) / 8):
+    for gap, J2, phase in itertools.product((0.1, 2.0), (0.07, 0.175), np.arange(4) / 4):
         drive = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, encoder_lines=lines)
         latency = AccelerationDelay().fitted(drive).latency
         assert latency is not None
@@ -53,7 +51,7 @@ def test_detection_over_random_drives() -> None:
     """
     rng = np.random.default_rng(3)
     errors, clean = [], []
-    for _ in range(400):
+    for _ in range(300):
         drive = random_drive(rng)
         fitted = AccelerationDelay(raise_at="end").fitted(drive)
         assert fitted.latency is not None
@@ -73,10 +71,16 @@ def test_detection_over_random_drives() -> None:
     assert max(map(abs, clean)) < 0.05
 
 
+def test_a_turning_motor_and_tiny_gaps_change_nothing() -> None:
+    turning = CRANE.replace(initial_motor_speed=10.0, initial_load_speed=10.0, torque_lag=0.002)
+    for drive in (turning, *(CRANE.replace(gap=gap) for gap in (0.0, 1e-6, 0.01))):
+        assert seen_after(drive) == pytest.approx(AccelerationDelay().fitted(drive).latency, abs=0.002)
+
+
 def test_rounding_alone_is_never_a_contact() -> None:
     """A gap so wide that the motor turns freely for seconds: nothing is seen before the contact."""
     rng = np.random.default_rng(4)
-    for lines in (16, 64, 256, 1024, 4096):
+    for lines in (16, 256, 4096):
         for _ in range(4):
             wide = CRANE.replace(
                 gap=rng.uniform(5, 60), encoder_lines=lines, start_position=rng.uniform(0, 1e-3),
@@ -84,20 +88,6 @@ def test_rounding_alone_is_never_a_contact() -> None:
             )  # fmt: skip
             patient = AccelerationDelay(delay=0.0, latency=0.0, patience=100.0)
             assert seen_after(wide, patient) > 0.0
-
-
-@pytest.mark.parametrize("motor_speed", [-3.0, 2.0, 10.0])
-def test_a_motor_already_turning_changes_nothing(motor_speed: float) -> None:
-    drive = CRANE.replace(initial_motor_speed=motor_speed, initial_load_speed=motor_speed, torque_lag=0.002)
-    latency = AccelerationDelay().fitted(drive).latency
-    assert seen_after(drive) == pytest.approx(latency, abs=0.002)
-
-
-def test_drives_without_gap_and_with_tiny_gaps() -> None:
-    for gap in (0.0, 1e-6, 1e-3, 0.01):
-        drive = CRANE.replace(gap=gap)
-        fitted = AccelerationDelay().fitted(drive)
-        assert seen_after(drive) == pytest.approx(fitted.latency, abs=0.002)
 
 
 def test_contact_not_seen_ends_with_patience() -> None:
@@ -121,14 +111,3 @@ def test_first_contact_is_that_of_method_2_and_the_second_is_not() -> None:
     assert run.k_dyn == pytest.approx(2.3894, abs=0.02)
     # raised at the peak of stage 2, where the shaft carries the most: no second landing at full torque
     assert simulate(CRANE, AccelerationDelay(torque=0.25 * 62)).k_dyn == pytest.approx(1.2716, abs=5e-5)
-
-
-def test_window_keeps_the_rounding_error_below_a_third_of_the_drop() -> None:
-    rng = np.random.default_rng(8)
-    for _ in range(200):
-        drive = random_drive(rng)
-        fitted = AccelerationDelay().fitted(drive)
-        half, stride, threshold = window(drive, fitted.torque, fitted.drop, fitted.period)
-        assert 2 <= half <= 30
-        assert stride >= 1
-        assert 2.0 * encoder_count(drive.encoder_lines) <= threshold / 3 * (1 + 1e-9)

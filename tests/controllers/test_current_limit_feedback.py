@@ -5,7 +5,6 @@ The bounds are measured figures with a margin; the figures stand beside them.
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,6 @@ from tests.controllers.starts import CRANE
 
 from softstart import Drive, records, simulate
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
-
-CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
-
-
-def crane(gap: float, J2: float, lag: float, kind: Any) -> Drive:
-    return CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
-
 
 # the start -----------------------------------------------------------------------------------------------
 
@@ -37,19 +29,13 @@ MEASURED = {
 }
 
 
-@pytest.mark.parametrize(("gap", "J2", "lag", "kind"), CRANES)
-def test_starts_softly(gap: float, J2: float, lag: float, kind: Any) -> None:
-    run = simulate(crane(gap, J2, lag, kind), CurrentLimitFeedback())
-    assert run.k_dyn < MEASURED[gap, J2, kind][lag > 0.0] + 0.03
-    assert run.contacts == 1
-
-
-@pytest.mark.parametrize(("gap", "most"), [(0.5, 1.2), (2.0, 1.4)])
-def test_costs_little_time(gap: float, most: float) -> None:
-    """Start time over that of `direct`: measured 1.11 and 1.34."""
-    drive = CRANE.replace(gap=gap)
-    ratio = simulate(drive, CurrentLimitFeedback()).start_time / simulate(drive, "direct").start_time
-    assert ratio < most
+def test_starts_softly() -> None:
+    for (gap, J2, kind), most in MEASURED.items():
+        for lag, k_dyn in zip((0.0, 0.002), most, strict=True):
+            drive = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
+            run = simulate(drive, CurrentLimitFeedback())
+            assert run.k_dyn < k_dyn + 0.03, (gap, J2, kind, lag)
+            assert run.contacts == 1
 
 
 @pytest.mark.parametrize(
@@ -84,21 +70,6 @@ def test_servo_drives() -> None:
         assert run.start_time < 1.1 * direct.start_time
 
 
-# the parts of the law ------------------------------------------------------------------------------------
-
-
-def test_damping_ratio_is_what_the_delays_allow() -> None:
-    assert CurrentLimitFeedback().fitted(CRANE).damping_ratio == 0.7
-    lagging = [CRANE.replace(torque_lag=lag) for lag in (2e-3, 5e-3, 2e-2)]
-    ratios = [CurrentLimitFeedback().fitted(drive).damping_ratio for drive in lagging]
-    assert ratios[0] == 0.7
-    assert ratios[1] is not None
-    assert 0.0 < ratios[1] < 0.7
-    assert ratios[2] == 0.0
-    damped = CRANE.replace(damping=2 * 0.3 * CRANE.c / CRANE.Omega)
-    assert CurrentLimitFeedback().fitted(damped).damping_ratio == pytest.approx(0.4)
-
-
 def test_feedback_damps_the_closed_drive_as_asked() -> None:
     """The step from rest in contact: overshoot of T is exp(-pi zeta/sqrt(1 - zeta^2)), ideally."""
     closed = CRANE.replace(gap=0.0, load_torque=0.0, encoder_lines=32768)
@@ -109,10 +80,3 @@ def test_feedback_damps_the_closed_drive_as_asked() -> None:
     assert peaks[0] == pytest.approx(2.0, abs=0.1)
     assert peaks[1] == pytest.approx(1.53, abs=0.2)
     assert peaks[2] == pytest.approx(1.25, abs=0.2)
-
-
-def test_gives_up_waiting() -> None:
-    blind = CurrentLimitFeedback(certainty=1e6, patience=0.3)
-    run = simulate(CRANE, blind)
-    assert run.start_time > 0.3
-    assert run.at([0.29, run.end_time])["u"][1] == 62.0

@@ -1,7 +1,4 @@
-"""The strategies of [G] that raise their torque at the peak of stage 2, (14), or at its end, (15).
-
-`python -m tests.controllers.test_raise_at` prints the whole map: gaps, inertias, positions, damping, lag.
-"""
+"""The strategies of [G] that raise their torque at the peak of stage 2, (14), or at its end, (15)."""
 
 from __future__ import annotations
 
@@ -11,29 +8,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, formulas, records, simulate
+from softstart import Drive, InputError, records, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.kernel.records import S_REF, S_START
 from softstart_controllers.acceleration_delay import AccelerationDelay
-from softstart_controllers.reduced import delay_of
 from softstart_controllers.reduced_two_stage import ReducedTwoStage
 
 CRANE = Drive.load("crane-4amtkf")
 NAMES = ("reduced-two-stage", "acceleration-delay")
-GAPS, INERTIAS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0), (0.4, 1.0, 2.0, 5.0, 10.0, 20.0)  # rad; over J1
+GAPS, INERTIAS = (0.05, 0.25, 1.0, 2.0), (0.4, 2.0, 5.0, 20.0)  # rad; over J1
 POSITIONS = ("mid-gap", "driving-flank", "opposite-flank", "hanging")
 
 
-def cell(name: str, where: str, damping: float, lag: float, kind: str) -> tuple[Vector, Vector]:
-    """K_dyn and start time over gaps and inertias: by how much `peak` is above `end`."""
+def cell(name: str, where: str, damping: float, kind: str) -> Vector:
+    """K_dyn over gaps and inertias: by how much `peak` is above `end`."""
     gap, inertia = (grid.ravel() for grid in np.meshgrid(GAPS, INERTIAS, indexing="ij"))
     J2 = inertia * CRANE.J1
-    drive = CRANE.replace(torque_lag=lag, load_kind=kind, start_position=where)
+    drive = CRANE.replace(torque_lag=0.004, load_kind=kind, start_position=where)
     d = [2.0 * damping * CRANE.c / CRANE.replace(load_inertia=one).Omega for one in J2.tolist()]
     drives = records(drive, gap=gap, load_inertia=J2, damping=d)
     peak, end = (simulate(drives, make_controller(name, {"raise_at": at})) for at in ("peak", "end"))
-    return (peak.k_dyn - end.k_dyn).values, (peak.start_time - end.start_time).values
+    return (peak.k_dyn - end.k_dyn).values
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -44,20 +40,7 @@ def test_the_crane(name: str) -> None:
     assert peak.k_dyn < 1.3
     assert round(peak.start_time, 3) == 0.392
     assert peak.contacts == 1
-
-
-def test_the_delays_are_those_of_g() -> None:
-    for r in (0.25, 0.5):
-        dw12 = formulas.open_stage(62 * r, 0.035, 0.175, 7.16, 0.5).dw12
-        contact = formulas.contact_stage(62 * r, 0.035, 0.175, 7.16, 368.465, dw12)
-        assert delay_of(CRANE, 62 * r, "end") == pytest.approx(contact.duration, rel=1e-12)
-        assert delay_of(CRANE, 62 * r, "peak") == pytest.approx(contact.peak_time, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_peak_is_the_default(name: str) -> None:
-    given = simulate(CRANE, make_controller(name, {"raise_at": "peak"}))
-    assert simulate(CRANE, name).k_dyn == given.k_dyn
+    assert simulate(CRANE, name).k_dyn == peak.k_dyn  # it is the default
 
 
 def test_the_torque_is_raised_at_the_located_peak() -> None:
@@ -71,31 +54,10 @@ def test_the_torque_is_raised_at_the_located_peak() -> None:
 def test_peak_is_never_harder_over_a_map(name: str) -> None:
     for where, damping, kind in itertools.product(POSITIONS, (0.0, 0.1), ("active", "reactive")):
         if (where, kind) != ("hanging", "reactive"):
-            worse, _ = cell(name, where, damping, 0.004, kind)
-            assert worse.max() < 1e-6, (where, damping, kind)
+            assert cell(name, where, damping, kind).max() < 1e-6, (where, damping, kind)
 
 
 @pytest.mark.parametrize("make", [ReducedTwoStage, AccelerationDelay])
 def test_another_word_is_refused(make: Any) -> None:
     with pytest.raises(InputError, match='write "peak" or "end"'):
-        make(raise_at="top")
-    with pytest.raises(InputError, match='write "peak" or "end"'):
         make_controller(make.name, {"raise_at": "top"})
-
-
-def print_map() -> None:
-    """Every combination, one line each."""
-    print("strategy, position, damping ratio, lag, load: peak over end in K_dyn (least, mean, most), time")
-    for name, where, damping, lag, kind in itertools.product(
-        NAMES, POSITIONS, (0.0, 0.02, 0.1, 0.3), (0.0, 0.004), ("active", "reactive")
-    ):
-        if (where, kind) != ("hanging", "reactive"):
-            k, time = cell(name, where, damping, lag, kind)
-            print(
-                f"{name}, {where}, {damping:g}, {lag:g} s, {kind}: {k.min():+.3f}, {k.mean():+.3f}, "
-                f"{k.max():+.4f}; slower in {np.sum(time > 1e-6)} of {time.size}, at most {time.max():+.4f} s"
-            )
-
-
-if __name__ == "__main__":
-    print_map()

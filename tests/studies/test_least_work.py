@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softstart.clutch import LAWS, Clutch, engage
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError
 from softstart_studies.paper_c import optimize_engagement
 from softstart_studies.paper_c.fronts import pulse_and_pause, two_steps
 from softstart_studies.paper_c.least_work import Program, Search, Slip
@@ -14,12 +14,12 @@ from softstart_studies.paper_c.least_work import Program, Search, Slip
 PAPER = Clutch.load("paper-c")
 SLIP = Slip(PAPER)
 CLASSES = ("any", "nondecreasing")
-STEPS = 120
+STEPS = 60
 
 
 @pytest.fixture(scope="module")
 def fronts():
-    return {name: optimize_engagement(PAPER, 3, law_class=name) for name in CLASSES}
+    return {name: optimize_engagement(PAPER, 2, law_class=name) for name in CLASSES}
 
 
 @pytest.fixture(scope="module")
@@ -61,29 +61,13 @@ def test_every_cut_holds_for_every_law(law_class):
         for end, P in zip(ends, (1.0, 1.2, 1.4, 1.1), strict=True)
     ]
     t = np.linspace(0.0, SLIP.tM, 1501)
-    for edges, M in random_laws(60, law_class == "nondecreasing"):
+    for edges, M in random_laws(30, law_class == "nondecreasing"):
         matrix, free = SLIP.at_tM(edges)
         *end, A = (matrix @ M + free).tolist()
         by_law, without = SLIP.torques(t, edges)
         P = float((by_law @ M + without).max()) * (1.0 + 1e-4)  # above the grid's
         for cut in cuts:
             assert cut.y @ np.array(end) - P * cut.slope + cut.k - 1e-9 * SLIP.w0 <= A
-
-
-@pytest.mark.parametrize("P", [1.0, 1.06, 1.3, 1.5])
-def test_the_bound_is_no_more_than_the_cuts_at_any_end(P, searches):
-    search, P = searches["any"], P * SLIP.Tm
-    random = np.random.default_rng(3)
-    r, angle = (P - SLIP.Tm) * np.sqrt(random.random(8000)), 2.0 * np.pi * random.random(8000)
-    s, p, q = 1.5 + 2.0 * random.random(8000), r * np.cos(angle), r * np.sin(angle)
-    A = np.max([c.y @ SLIP.state(s, p, q) + c.k - P * c.slope for c in search.cuts], axis=0)
-    turn = np.linspace(0.0, 2.0 * np.pi, 400)[1:]  # w0 - wM in the last period
-    before = SLIP.g * turn / SLIP.B + SLIP.per_q * (
-        q[:, None] - p[:, None] * np.sin(turn) - q[:, None] * np.cos(turn)
-    )
-    works = SLIP.work(A, s, p, q)[before.min(axis=1) >= 0.0]
-    assert works.size > 1000
-    assert works.min() >= search.work_bound(P)
 
 
 @pytest.mark.parametrize("law_class", CLASSES)
@@ -171,15 +155,3 @@ def test_what_the_optimum_does_not_cover_is_refused_at_once():
     assert [one.split(" = ")[0] for one in caught.value.sentences] == ["gap", "damping", "load_kind"]
     with pytest.raises(InputError, match="engagement_time = 4: with full torque"):
         optimize_engagement(PAPER.replace(engagement_time=4.0))
-
-
-def test_bad_questions_are_refused():
-    with pytest.raises(InputError) as caught:
-        optimize_engagement(PAPER, 0, law_class="nondecresing")
-    assert [one.split(" = ")[0] for one in caught.value.sentences] == ["points", "law_class"]
-    assert 'did you mean "nondecreasing"?' in caught.value.sentences[1]
-
-
-def test_an_impossible_peak_has_no_law():
-    with pytest.raises(SimulationError, match="No law with a peak"):
-        Search(PAPER, "any", 20).least_work(0.9 * SLIP.Tm)

@@ -1,4 +1,4 @@
-"""`softstart study optimal-starts`: a part of it against plant and closed forms, and what is drawn."""
+"""`softstart study optimal-starts`: a part of it against plant and closed forms."""
 
 from __future__ import annotations
 
@@ -8,14 +8,8 @@ import pytest
 from softstart import TorqueProfile, optimize, simulate
 from softstart.study import Verdict
 from softstart_studies.crane import TARGET
-from softstart_studies.optimal_starts import costs, find, limits, present, profiles
-from softstart_studies.optimal_starts.drives import (
-    Extent,
-    crane,
-    direct_time,
-    front_times,
-    shortest_time,
-)
+from softstart_studies.optimal_starts import find, limits, present
+from softstart_studies.optimal_starts.drives import Extent, crane, direct_time
 from softstart_studies.optimal_starts.limits import any_contacts_bound
 
 PART = Extent(
@@ -38,18 +32,6 @@ def found():
 @pytest.fixture(scope="module")
 def result(found):
     return present(found, lambda text: None)
-
-
-# the drives ----------------------------------------------------------------------------------------------
-
-
-def test_start_times_of_a_front_are_all_feasible_and_in_order():
-    times = front_times(0.5, 8)
-    assert times[0] > direct_time(0.5) > shortest_time(0.5)
-    assert np.all(np.diff(times) > 0.0)
-
-
-# what is found -------------------------------------------------------------------------------------------
 
 
 def test_profiles_are_those_of_the_anchor_and_end_in_step(found):
@@ -103,9 +85,6 @@ def test_landmarks(gap):
     assert idle.stages[1].peak_torque / crane(gap).mean_torque == pytest.approx(one.floor, rel=1e-9)
 
 
-# what is said and drawn ----------------------------------------------------------------------------------
-
-
 def test_verdicts(result):
     said = {claim.statement: claim.verdict for claim in result.claims}
     assert len(said) == len(result.claims)
@@ -119,21 +98,3 @@ def test_verdicts(result):
     ):
         (found,) = [verdict for statement, verdict in said.items() if statement.startswith(beginning)]
         assert found is verdict, beginning
-
-
-def test_profiles_drawn_are_the_runs(found):
-    start = found.profiles[1]
-    motor, shaft, speed = profiles.figure(found.profiles).axes
-    assert np.array_equal(motor.lines[0].get_ydata(), start.run.u)
-    np.testing.assert_allclose(shaft.lines[1].get_ydata(), start.run.T / crane().mean_torque, rtol=1e-12)
-    assert np.array_equal(speed.lines[1].get_ydata(), start.run.w2)
-    assert "0.9 x: infeasible" in motor.get_title(loc="left")
-
-
-def test_terminals_drawn_are_the_numbers(found):
-    (one,) = found.endings
-    above, below = costs.endings_figure([one]).axes
-    steady = next(line for line in above.lines if line.get_label() == "steady").get_ydata()
-    assert list(steady) == list(one.k_dyn("steady").values())
-    more = [100 * (cost - 1) for cost in one.cost("synchronous").values()]
-    assert np.allclose(below.lines[0].get_ydata(), more)

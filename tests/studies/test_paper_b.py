@@ -23,14 +23,9 @@ VERDICTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("paper-b")
-    return PaperB().run(folder, lambda doing: None), folder
-
-
-def test_verdicts(study):
-    claims = study[0].claims
+def test_verdicts_and_the_engine_is_written_as_it_was_assumed(tmp_path):
+    claims = PaperB().run(tmp_path, lambda doing: None).claims
+    assert Engine.load(tmp_path / "vaz-11113.toml") == VAZ
     assert len(claims) == len(VERDICTS)
     for claim, (begin, verdict) in zip(claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(begin)
@@ -38,10 +33,6 @@ def test_verdicts(study):
     # M_b equal in amplitude, |M| sin(phi): of A cos + B sin the part A cos + (B - |M|) sin stays
     first = VAZ.torque_harmonics(TUNING * RPM)[2]
     assert f"in amplitude instead, {abs(first + 1j * abs(first)):.1f})" in claims[6].evidence
-
-
-def test_the_engine_is_written_as_it_was_assumed(study):
-    assert Engine.load(study[1] / "vaz-11113.toml") == VAZ
 
 
 def test_printed_and_model_stand_side_by_side():
@@ -80,16 +71,6 @@ def test_assumptions_move_the_torque_as_they_should():
     assert mass[1] == pytest.approx(base[1] - 0.2 * inertia, abs=0.11)
     assert mass[4] == pytest.approx(base[1] + 0.2 * inertia, abs=0.11)
     assert rows["load 0.5, 0"][5] < 0.5 * base[2]
-
-
-def test_courses_of_figures_2_and_3():
-    found = balanced()
-    one = tables.curves(found)
-    i = found.tuning_index
-    assert one.rpm[i] == pytest.approx(4500.0)
-    assert one.shafts[i] == pytest.approx(one.sine[i], rel=1e-12)
-    assert one.shafts / one.rpm**2 == pytest.approx(one.shafts[i] / 4500.0**2, rel=1e-12)
-    assert one.inertia / one.rpm**2 == pytest.approx(one.inertia[i] / 4500.0**2, rel=1e-12)
 
 
 def test_an_arm_for_full_load_is_wrong_at_others():

@@ -9,7 +9,7 @@ from softstart_studies.paper_c import PaperC, printed, readings
 
 
 class Short(PaperC):
-    points = 3
+    points = 2
 
 
 @pytest.fixture(scope="module")

@@ -11,28 +11,13 @@ from softstart import simulate
 from softstart.study import Verdict
 from softstart_studies.crane import CRANE
 from softstart_studies.paper_g import PaperG, curves, from_flank, set_up_once, whole_start
-from softstart_studies.paper_g.crane import RATIOS, crane, simulated, ways
-
-
-@pytest.fixture(scope="module")
-def study():
-    return PaperG().run(None, lambda doing: None)
-
-
-@pytest.fixture(scope="module")
-def worn():
-    return set_up_once.worn()
-
-
-@pytest.fixture(scope="module")
-def drawn():
-    return curves.figures()
-
+from softstart_studies.paper_g.crane import RATIOS, crane, ways
 
 # figures 2, 3, 4 ---------------------------------------------------------------------------------------
 
 
-def test_curves_go_through_the_simulated_points(drawn):
+def test_curves_go_through_the_simulated_points():
+    drawn = curves.figures()
     assert [len(one) for one in drawn.values()] == [4, 4, 6]
     on_axis = [int(np.argmin(np.abs(RATIOS - r))) for r in curves.POINTS]
     for curve in (curve for one in drawn.values() for curve in one):
@@ -79,7 +64,8 @@ VERDICTS = {  # by the beginning of the statement, with the number that decides
 }
 
 
-def test_each_conclusion_has_its_verdict_and_its_number(study):
+def test_each_conclusion_has_its_verdict_and_its_number():
+    study = PaperG().run(None, lambda doing: None)
     for claim, (beginning, (verdict, number)) in zip(study.claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(beginning)
         assert (claim.verdict, number in claim.evidence) == (Verdict(verdict), True), claim
@@ -94,16 +80,8 @@ def test_method_2_is_as_hard_as_method_1_over_the_whole_start(gap):
     assert found.at_peak == pytest.approx(np.maximum(found.first_contact, 2 - found.first_contact), rel=1e-12)
 
 
-def test_second_contact_of_method_2_is_the_hard_one():
-    run = simulated(crane(), 0.25, 2)
-    peaks = [stage.peak_torque / (run.peak_torque / run.k_dyn) for stage in run.stages if stage.side != 0]
-    assert peaks[:2] == pytest.approx([1.267724, 2.389365], abs=5e-7)
-    # the flanks part at the speed they met with
-    parting = run.at(np.array([run.stages[1].end]))["v"][0]
-    assert parting == pytest.approx(-run.impact_speed, rel=1e-9)
-
-
-def test_time_switched_torque_fails_at_first_contact_of_the_worn_gap(worn):
+def test_time_switched_torque_fails_at_first_contact_of_the_worn_gap():
+    worn = set_up_once.worn()
     first, whole = worn.first["instant"], worn.whole["instant"]
     assert first[0] == pytest.approx(worn.promised[0], rel=1e-12)
     assert 1.35 < first[-1] / worn.promised[-1] < 1.45

@@ -17,9 +17,6 @@ from softstart_studies.pulse_coast_hold import (
     ideal,
     invariant_to_the_gap,
     near_the_optimum,
-    present,
-    ratios_figure,
-    rounded_up,
     run,
     starts,
     within_tolerances,
@@ -37,14 +34,6 @@ PART = Extent(
 )
 
 
-def test_drives_of_the_grid():
-    batch = starts("reactive", (0.5, 2.0), (2.0, 5.0), 4)
-    one = next(batch.elements())
-    assert (one.gap, one.load_inertia, one.encoder_phase) == (0.5, 2.0 * WITH_INVERTER.J1, 0.0)
-    assert (one.torque_lag, one.encoder_lines, one.load_kind) == (LAG, 4096, "reactive")
-    assert ideal("active", 2.0, 5.0).torque_lag == 0.0
-
-
 def test_cells_are_single_starts_over_the_optimum_of_an_ideal_torque():
     found = run("active", PART.gaps, PART.ratios, PART.phases)
     runs = [
@@ -58,12 +47,6 @@ def test_cells_are_single_starts_over_the_optimum_of_an_ideal_torque():
     for start in runs:  # what is said is no smaller than the ratio at the own start time
         own = optimize(ideal("active", 1.0, 5.0), start.start_time, terminal="reached").k_dyn
         assert start.k_dyn / own <= start.k_dyn / best.k_dyn * (1.0 + 1e-9)
-
-
-def test_rounding_up_gives_more_time():
-    times = np.linspace(0.1, 0.5, 50)[:, None, None]
-    assert np.all(rounded_up(times) >= times)
-    assert np.all(rounded_up(times) <= times * (1.01 + 1e-12))
 
 
 def test_tolerances_named_are_tolerances_run():
@@ -93,11 +76,3 @@ def test_verdicts_follow_the_numbers():
         assert near_the_optimum(found).verdict is invariant_to_the_gap(found).verdict is verdict
     assert within_tolerances([Case("active", "x", 1.2, 1.29)]).verdict is Verdict.CONFIRMED
     assert within_tolerances([Case("active", "x", 1.2, 1.31)]).verdict is Verdict.REFUTED
-    shown = ratios_figure({"reactive": good}).axes[0].collections[0].get_array()
-    np.testing.assert_allclose(shown, 1.02 / 0.97)
-
-
-def test_a_part_of_it_is_worked_out_and_drawn():
-    result = present(PART, lambda text: None)
-    assert [len(table.rows) for table in result.tables] == [2, 5, 4]
-    assert len(result.claims) == 3

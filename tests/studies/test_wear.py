@@ -7,7 +7,7 @@ import pytest
 
 from softstart import optimize, simulate
 from softstart_studies.crane import WITH_INVERTER, published
-from softstart_studies.wear import Extent, Wear, live, present
+from softstart_studies.wear import Extent, live
 
 PART = Extent(
     life=(0.5, 1.0),
@@ -18,6 +18,7 @@ PART = Extent(
     front_points=4,
 )
 NEW = WITH_INVERTER
+pytestmark = pytest.mark.slow  # all wait for the study
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +57,3 @@ def test_no_start_is_gentler_than_the_optimum_in_its_time(life):
             assert np.all(
                 course.ratio[np.isfinite(course.ratio)] > 0.99
             )  # half a percent of interpolation, and rounding
-
-
-def test_tables_claims_and_figures(life):
-    result = present(life, lambda text: None)
-    assert len(result.tables[0].rows) == 2 * 4
-    assert len(result.claims) == 3
-    assert set(result.figures) == set(Wear.pictures)
-    panel = result.figures["wear-life"].axes[0]
-    lines = {line.get_label(): line for line in panel.lines}
-    assert np.array_equal(lines["scheduled"].get_ydata(), life.courses["ramp"]["scheduled"].k_dyn)

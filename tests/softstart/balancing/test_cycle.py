@@ -42,9 +42,7 @@ cycles = st.builds(
 )
 
 
-@pytest.mark.parametrize(
-    ("m", "start", "duration", "opening"), [(2.0, 0.3, 1.0, 2.4), (0.5, 0.1, 0.8, 2.0), (4.0, 0.6, 1.6, 3.0)]
-)
+@pytest.mark.parametrize(("m", "start", "duration", "opening"), [(0.5, 0.1, 0.8, 2.0), (4.0, 0.6, 1.6, 3.0)])
 def test_burning_obeys_the_first_law(m, start, duration, opening):
     # dp = [(n - 1) Q dx - n p dV]/V, integrated with nothing of the module but Q and the first pressure
     cycle = SimpleCycle(
@@ -76,7 +74,7 @@ def test_burning_obeys_the_first_law(m, start, duration, opening):
     assert there == pytest.approx([burning.y[0, -1], expanding.y[0, -1]], rel=3e-9)  # of the integration
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(cycles, st.floats(0.0, 1.0))
 def test_mean_torque_is_the_indicated_work(cycle, load):
     # int p dV by a quadrature of its own against 4 pi times the mean torque
@@ -121,15 +119,9 @@ def test_load_scales_intake_and_heat():
 
 BAD = {
     "compression_ratio": ({"compression_ratio": 1.0}, "must be above 1"),
-    "exponent": ({"expansion_exponent": 0.9}, "must be above 1"),
-    "idle": ({"idle_pressure": 2e5}, "must not be above intake_pressure"),
-    "several pressures": ({"mean_indicated_pressure": (8e5, 9e5)}, "speeds: 0 for 2 in mean"),
     "falling": ({"mean_indicated_pressure": (8e5, 9e5), "speeds": (2.0, 1.0)}, "several rising speeds"),
     "late": ({"combustion_duration": "200 deg"}, "it burns from -15 to 185 deg"),
-    "early": ({"combustion_start": "180 deg"}, "burn from above -180 deg on"),
-    "exhaust": ({"exhaust_opening": "190 deg"}, "opens at 190 deg"),
     "blowdown": ({"blowdown": "300 deg"}, "until 430 deg"),
-    "unit": ({"intake_pressure": "1 N"}, "N is a force, not a pressure"),
 }
 
 

@@ -14,12 +14,6 @@ VAZ = Engine.load("vaz-11113")
 GOOD = VAZ.to_toml()
 
 
-def test_shipped_engine_says_what_is_assumed():
-    assert VAZ.source.startswith("[B]")
-    assert all(name in VAZ.assumed for name in ("masses.*", "cylinders.bore", "cycle.*"))
-    assert "balancer.tuning_speed" not in VAZ.assumed  # printed
-
-
 def test_engines_are_values():
     assert Engine.from_toml(GOOD) == VAZ
     assert hash(Engine.from_toml(GOOD)) == hash(VAZ)
@@ -32,13 +26,9 @@ def test_engines_are_values():
 
 BAD = {
     "rod": ("cylinders.rod_length", "30 mm", "[cylinders] rod_length = 0.03 m: the rod must be longer"),
-    "firing": ("cylinders.firing_angles", ["0 deg", "720 deg"], "from 0 to below 720 deg"),
     "order": ("cylinders.firing_order", [1, 2], "both are given"),
-    "speeds": ("operation.highest_speed", "500 rpm", "must be above lowest_speed"),
     "frequency": ("operation.highest_speed", "50 Hz", "Hz is a frequency"),
-    "tuning": ("balancer.tuning_speed", 0, "must be above 0"),
     "key": ("masses.reciprocatin", 1, "did you mean masses.reciprocating?"),
-    "cycle": ("cycle.compression_ratio", 0.5, "[cycle] compression_ratio = 0.5: it must be above 1"),
 }
 
 
@@ -72,11 +62,6 @@ def test_firing_order_and_angles():
         engine(shafts=[BalancerShaft(0.01, 30)])
 
 
-def test_shipped_name_misspelt():
-    with pytest.raises(InputError, match=r"did you mean vaz-11113\?"):
-        Engine.load("vaz-1111")
-
-
 # the torque for a chain --------------------------------------------------------------------------------
 
 
@@ -105,16 +90,3 @@ def test_a_periodic_torque_repeats_and_has_its_mean():
     assert power == pytest.approx(0.5 * np.sum(torque.amplitudes**2), rel=1e-12)  # Parseval
     assert torque.at(0.1).shape == ()
     assert PeriodicTorque(**torque.summary()).at(0.01) == torque.at(0.01)
-
-
-def test_bad_periodic_torques_are_refused():
-    for arguments, says in (
-        ((0.0, [1.0], [1.0], [], 10.0), "give as many of each"),
-        ((0.0, [1.0], [1.0], [0.0], 0.0), "above 0 rad/s"),
-        ((0.0, [0.0], [1.0], [0.0], 10.0), "the constant part is mean"),
-        ((math.nan, [1.0], [1.0], [0.0], 10.0), "finite"),
-    ):
-        with pytest.raises(InputError, match=says):
-            PeriodicTorque(*arguments)
-    with pytest.raises(InputError, match="from order"):
-        VAZ.torque_of_time(100.0, orders=0.1)

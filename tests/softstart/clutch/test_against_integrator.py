@@ -146,15 +146,6 @@ def test_a_swinging_load_drives_the_clutch_side_past_the_driving_side():
     assert all(phase.friction_work >= 0.0 for phase in run.phases)
 
 
-def test_locked_means_locked_within_what_the_clutch_can_hold():
-    run = engage(Clutch.load("paper-c"), until=8.0)
-    t = np.linspace(run.slip_time + 1e-9, 8.0, 4001)
-    traces = run.at(t)
-    assert np.abs(traces["slip"]).max() == 0.0
-    assert np.all(np.abs(traces["T"]) <= traces["M"])
-    assert traces["F"] == pytest.approx(traces["T"])
-
-
 def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():
     clutch = Clutch.load("paper-c").replace(law="quadratic-convex")
     run = engage(clutch, until=20.0)

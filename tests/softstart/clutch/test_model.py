@@ -26,15 +26,6 @@ def test_shipped_clutches_name_their_source_and_run(name):
     assert Clutch.from_toml(clutch.to_toml()) == clutch
 
 
-def test_the_data_of_the_paper():
-    g = 9.80665
-    assert [PAPER.clutch_inertia / g, PAPER.load_inertia / g, PAPER.stiffness / g] == pytest.approx(
-        [0.1, 0.5, 5]
-    )
-    assert [PAPER.clutch_torque / g, PAPER.load_torque / g] == pytest.approx([60, 20])
-    assert (PAPER.drive_speed, PAPER.engagement_time, PAPER.load_kind) == (230.0, 1.0, "active")
-
-
 def test_all_mistakes_of_a_file_at_once():
     text = PAPER.to_toml().replace("230.0", '"50 Hz"').replace("gap = 0.0", "gapp = 0.1") + "\n[cluch]\nx = 1"
     found = sentences(lambda: Clutch.from_toml(text, where="my.toml"))
@@ -51,15 +42,9 @@ def test_all_mistakes_of_a_file_at_once():
 
 REFUSED = {
     "weak clutch": ({"load_torque": 600.0}, "load_torque = 600: the clutch holds 588.399 N m and"),
-    "negative load": ({"load_torque": -1.0}, "load_torque = -1.0: the torque Mc of the load must be"),
-    "unknown law": ({"law": "cubic"}, 'law = "cubic": the engagement law is'),
     "no inertia": ({"load_inertia": 0.0}, "load_inertia = 0.0: the inertia Ic of the load must be above 0"),
-    "stray name": ({"inertia": 1.0}, 'inertia = 1.0: a clutch has no parameter "inertia"'),
     "table without points": ({"law": "table"}, "there are 0 and 0 values; a table has a torque"),
     "points without table": ({"law_times": [0, 1]}, 'only the law "table" has law_times'),
-    "uneven table": (
-        {"law": "table", "law_times": [0, 1], "law_torques": [0, 1, 2]}, "there are 2 and 3 values"
-    ),
     "late table": (
         {"law": "table", "law_times": [0.1, 1], "law_torques": [0, 588]}, "begins at 0 s, and its"
     ),
@@ -69,12 +54,7 @@ REFUSED = {
     "table too strong": (
         {"law": "table", "law_times": [0, 1], "law_torques": [0, 700]}, "law_torques[1] = 700: more than the"
     ),
-    "table too weak": (
-        {"law": "table", "law_times": [0, 1], "law_torques": [0, 100]}, "the clutch holds 100 N m and cannot"
-    ),
-    "no time constant": ({"law": "exponential", "time_constant": 0}, "time_constant = 0: engagement_time is"),
     "a step for a law": ({"law": "exponential", "time_constant": 1e-4}, "more than 500 of these"),
-    "area": ({"lining_area": "5 mm"}, "mm is a length, not an area"),
 }  # fmt: skip
 
 

@@ -23,7 +23,6 @@ CHAIN = Chain.from_toml(
     ("drive", "controller"),
     [
         (CRANE.replace(damping=0.0, torque_lag=0.0), "current-limit-feedback"),
-        (CRANE, SpeedPI(2.0, 5.0)),
         (CRANE.replace(encoder_lines=1024, computing_delay="0.4 ms"), SpeedPI(1.0, 3.0)),
     ],
 )
@@ -74,7 +73,7 @@ def random_chain(seed):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", [3, 4, 6, 11])
+@pytest.mark.parametrize("seed", [3, 11])
 def test_small_motions_of_the_whole_chain_are_those_of_the_loop(seed):
     """After small displacements in each direction the exact plant, under the controller, follows the loop."""
     start = SampledStart.of(random_chain(seed), SpeedPI(0.1, 0.5, 10.0), CRANE)
@@ -82,7 +81,7 @@ def test_small_motions_of_the_whole_chain_are_those_of_the_loop(seed):
     assert points[0].mismatch < 1e-7
 
 
-@pytest.mark.parametrize("seed", range(12, 18))
+@pytest.mark.parametrize("seed", range(12, 15))
 def test_the_plant_in_contact_swings_at_its_natural_frequencies(seed):
     chain = random_chain(seed)
     undamped = Chain(
@@ -108,15 +107,6 @@ def test_with_all_gaps_open_the_motor_turns_alone_or_with_what_is_joined_to_it()
     assert "limit_cycles" in view.summary()
 
 
-def test_modes_of_the_closed_loop_hold_those_of_the_chain():
-    """A weak controller leaves the chain its own modes."""
-    view = linear_view(CHAIN, SpeedPI(1e-4))
-    own = natural_vibration(CHAIN).Omega[1:]
-    swinging = [mode.frequency for mode in view.loop.modes if mode.value.imag > 0.0]
-    for Omega in own[own < math.pi / view.loop.period]:
-        assert min(abs(one / Omega - 1.0) for one in swinging) < 1e-2
-
-
 def test_what_has_no_loop_is_refused():
     rigid = Chain(CHAIN.masses, [Shaft(math.inf), *CHAIN.shafts[1:]], CHAIN.motor)
     with pytest.raises(InputError, match="a shaft beside the motor is rigid"):
@@ -133,7 +123,7 @@ def loaded(seed, **curve):
     return replace(chain, masses=tuple(masses))
 
 
-@pytest.mark.parametrize("seed", [3, 4, 11])
+@pytest.mark.parametrize("seed", [4])
 @pytest.mark.parametrize(
     "curve",
     [
@@ -148,6 +138,7 @@ def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(seed, curve):
     assert on_the_curve[0].mismatch < 1e-7
 
 
+@pytest.mark.slow
 def test_a_straight_curve_has_the_loop_of_a_damped_mass():
     curved = loaded(6, curve_speed=[-1e4, 1e4], curve_torque=[-20.0, 20.0])
     masses = list(curved.masses)
@@ -160,12 +151,3 @@ def test_a_straight_curve_has_the_loop_of_a_damped_mass():
     assert by_curve.variations[-1].margins.phase_margin == pytest.approx(
         damped.variations[-1].margins.phase_margin, rel=1e-6
     )
-
-
-def test_a_load_held_by_a_shaft_to_the_ground():
-    wall = Chain(
-        [*CHAIN.masses, Mass(math.inf, name="wall")], [*CHAIN.shafts, Shaft(2e6, damping_ratio=0.05)],
-        CHAIN.motor, load_mass=CHAIN.masses[-1].name, target_speed=60.0, position="driving-flank",
-    )  # fmt: skip
-    start = SampledStart.of(wall, SpeedPI(0.1, 0.5, 10.0), CRANE)
-    assert operating_points(start, run_until_steady(start))[0].mismatch < 1e-7

@@ -39,7 +39,7 @@ def test_an_integrator(gain):
     assert found.delay_margin == pytest.approx(found.phase_margin / w, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_as_python_control_has_them(seed):
     rng = np.random.default_rng(seed)
     poles = [*rng.uniform(0.3, 0.95, 2), 0.9 * np.exp(1j * rng.uniform(0.3, 2.0))]
@@ -65,13 +65,9 @@ LAGGING = FREE.replace(torque_lag=0.02, computing_delay=0.01, damping=2.0)
 def views():
     """Loops with a lag, a delay, an observer, encoder differences."""
     return [
-        linear_view(LAGGING, SpeedPI(4.0, 20.0)),
         linear_view(LAGGING.replace(encoder_lines=1024), SpeedPI(2.0, 5.0)),
         linear_view(CRANE, "state-feedback"),
-        *(
-            linear_view(CRANE.replace(torque_lag=lag), "current-limit-feedback")
-            for lag in (0.0005, 0.001, 0.002)
-        ),
+        linear_view(CRANE.replace(torque_lag=0.001), "current-limit-feedback"),
     ]
 
 

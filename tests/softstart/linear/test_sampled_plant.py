@@ -21,11 +21,3 @@ def test_whole_samples_of_delay_are_powers_of_z(lag, differencing):
             late = sampled(plant, 0.001, 0.003 + fraction, (1, 2, 3), differencing)
             expected = plain.system.response(Z) * (Z**-3)[:, None, None]
             assert late.system.response(Z) == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_a_delay_of_all_but_a_sample_goes_over_into_one():
-    plant = in_contact(CRANE)
-    almost = sampled(plant, 0.001, 0.001 * (1 - 1e-9), (1, 2, 3), True).system.response(Z)
-    whole = sampled(plant, 0.001, 0.001, (1, 2, 3), True).system.response(Z)
-    # the torque measured just before a sample is then that of the demand before; all else is continuous
-    assert almost[:, :2] == pytest.approx(whole[:, :2], rel=1e-6)

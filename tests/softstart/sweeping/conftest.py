@@ -1,4 +1,4 @@
-"""Sweeps in processes of their own, which can be killed."""
+"""A long sweep in a process of its own, which can be killed."""
 
 from __future__ import annotations
 
@@ -6,51 +6,40 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import ClassVar
 
+import numpy as np
 import pytest
 from tests.kept import parts_in
 
-LONG = (
-    "from softstart import sweep\n"
-    "import sys, numpy as np\n"
-    "sweep('crane-4amtkf', 'current-limit-feedback', GRID, to=sys.argv[1], chunk=CHUNK,\n"
-    "      workers=int(sys.argv[2]), progress=lambda now: print(now.done, flush=True))\n"
-)
-PROCESSES = (
-    "from softstart.sweeping import entry\n"
-    "first_start = entry.first_start\n"
-    "entry.first_start = lambda *asked: first_start(*asked) and False  # as if not compiled\n"
-)
+LONG = """
+from softstart import sweep
+from softstart.sweeping import entry
+from tests.softstart.sweeping.conftest import Sweeping
+import sys
+if sys.argv[3] == "True":
+    first_start = entry.first_start
+    entry.first_start = lambda *asked: first_start(*asked) and False  # as if not compiled
+sweep("crane-4amtkf", "current-limit-feedback", Sweeping.grid, to=sys.argv[1], chunk=Sweeping.chunk,
+      workers=int(sys.argv[2]), progress=lambda now: print(now.done, flush=True))
+"""
 
 
 class Sweeping:
-    """A long sweep: 12,000 sampled starts in 60 chunks, a second or two of one processor."""
+    """12,000 sampled starts in 60 chunks, a second or two of one processor."""
 
-    chunk = 200
-
-    def __init__(self) -> None:
-        import numpy as np
-
-        self.grid = {
-            "load.kind": ["active", "reactive"],
-            "gap": np.linspace(0.25, 4.0, 60),
-            "load_inertia": np.linspace(0.07, 0.35, 100),
-        }
-        self.chunks = 60
-        self.code = LONG.replace("CHUNK", str(self.chunk)).replace(
-            "GRID",
-            "{'load.kind': ['active', 'reactive'], 'gap': np.linspace(0.25, 4.0, 60),"
-            " 'load_inertia': np.linspace(0.07, 0.35, 100)}",
-        )
+    grid: ClassVar = {
+        "load.kind": ["active", "reactive"],
+        "gap": np.linspace(0.25, 4.0, 60),
+        "load_inertia": np.linspace(0.07, 0.35, 100),
+    }
+    chunk, chunks = 200, 60
 
     def begin(self, folder: Path, workers: int, processes: bool) -> subprocess.Popen[str]:
         """Start it, with processes instead of threads if asked."""
         return subprocess.Popen(
-            [
-                sys.executable, "-W", "error", "-c", PROCESSES + self.code if processes else self.code,
-                str(folder), str(workers),
-            ],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            [sys.executable, "-W", "error", "-c", LONG, str(folder), str(workers), str(processes)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3],
         )  # fmt: skip
 
     def finished(self, folder: Path) -> dict[str, int]:
@@ -74,11 +63,11 @@ def sweeping():
 
 
 @pytest.fixture(scope="package")
-def uninterrupted(sweeping):
+def uninterrupted():
     """What the long sweep finds if nothing happens to it."""
     from softstart import sweep
 
-    return sweep("crane-4amtkf", "current-limit-feedback", sweeping.grid, workers=1)
+    return sweep("crane-4amtkf", "current-limit-feedback", Sweeping.grid, workers=1)
 
 
 def alive(pid: int) -> bool:
@@ -93,12 +82,10 @@ def alive(pid: int) -> bool:
 def children(pid: int) -> list[int]:
     """The processes that a process has started."""
     found = []
-    for path in Path("/proc").iterdir():
-        if path.name.isdigit():
-            try:
-                parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
-            except OSError:
-                continue
-            if parent == pid:
-                found.append(int(path.name))
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+        found += [int(path.name)] if parent == pid else []
     return found

@@ -32,38 +32,23 @@ def test_names_and_units():
 
 
 ONE_SENTENCE = {
-    "no grid": ({}, "direct", "mapping of names to values"),
     "not a grid": ([1, 2], "direct", "mapping of names to values"),
     "unknown": ({"gapp": [1]}, "direct", "gapp: there is no such axis; did you mean gap?"),
-    "a symbol": ({"J2": [1]}, "direct", "did you mean load_inertia?"),
-    "two meanings": ({"inertia": [1]}, "direct", "did you mean motor_inertia or load_inertia?"),
     "a bare parameter": ({"full_torque": [1]}, "ramp", "did you mean controller.full_torque?"),
-    "nothing near": ({"zzz": [1]}, "direct", "controller.NAME"),
     "no such parameter": (
         {"controller.tim": [1]}, "ramp", "ramp has no such parameter; did you mean controller.time?"
     ),
     "one value": ({"gap": 0.5}, "direct", "gap = 0.5: give the values of this axis in a list"),
-    "a text": ({"gap": "0.5"}, "direct", "in a list"),
-    "empty": ({"gap": []}, "direct", "gap = []: an empty list holds no value"),
-    "two rows": ({"gap": [[1, 2], [3, 4]]}, "direct", "shape (2, 2)"),
     "negative": ({"gap": [0.5, -1]}, "direct", "gap[1] = -1.0: the total angular gap must be 0 or more"),
-    "wrong unit": ({"load.inertia": ["1 N"]}, "direct", 'load.inertia[0] = "1 N"'),
-    "not finite": ({"gap": [np.nan]}, "direct", "gap"),
     "twice": ({"gap": [0.5, 1, 0.5]}, "direct", "gap = 0.5: this value is given twice"),
     "same axis": ({"gap": [1], "shaft.gap": [2]}, "direct", "shaft.gap: gap is an axis already"),
-    "kind": ({"load.kind": ["activ"]}, "direct", 'did you mean "active"?'),
     "a kind that is a number": ({"load.kind": [1]}, "direct", "takes names"),
-    "the drive's name": ({"name": ["a"]}, "direct", "changes no start"),
     "controller and axis": ({"controller": ["direct"]}, "ramp", "one of the two"),
-    "no controller": ({"gap": [1]}, None, "name one, or make several an axis"),
-    "unknown in the axis": ({"controller": ["direct", "rmp"]}, None, 'did you mean "ramp"?'),
     "not shared": (
         {"controller": ["direct", "ramp"], "controller.time": [1]}, None,
         "controller.time: not all of direct, ramp have this parameter",
     ),
     "samples of two lengths": ({"sample": {"gap": [1], "damping": [1, 2]}}, "direct", "gap has 1, damp"),
-    "samples of texts": ({"sample": {"load.kind": ["active"]}}, "direct", "samples are numbers"),
-    "no samples": ({"sample": {}}, "direct", "no parameter"),
     "samples called like a parameter": ({"gap": {"gap": [1], "damping": [2]}}, "direct", "none of their"),
 }  # fmt: skip
 
@@ -90,34 +75,16 @@ def test_all_mistakes_at_once():
         )
     told = "\n".join(caught.value.sentences)
     assert len(caught.value.sentences) == 7
-    for words in (
-        "gapp",
-        "load.inertia",
-        "controller.tme",
-        "stiffness",
-        "did you mean k_dyn?",
-        "until",
-        "fitted_to",
-    ):
+    for words in ("gapp", "load.inertia", "controller.tme", "stiffness", "k_dyn?", "until", "fitted_to"):
         assert words in told
 
 
-def test_a_parameter_is_fixed_or_an_axis():
-    with pytest.raises(InputError, match=r"controller\.time: the parameter time has one value already"):
-        sweep(CRANE, "ramp", {"controller.time": [0.1]}, parameters={"time": 0.2})
-    with pytest.raises(InputError, match="with several controllers"):
-        sweep(CRANE, None, {"controller": ["ramp", "direct"]}, parameters={"time": 0.2})
-
-
 IMPOSSIBLE = {
-    "one axis": ({"load.torque": [5, 70]}, "starting_torque = 62 N.m: .* load_torque = 70 N"),
     "two axes": (
         {"starting_torque": [10, 60], "load.torque": [5, 12], "maximum_torque": [80]},
         "starting_torque = 10 N.m: .* load_torque = 12 N",
     ),
     "a kind": ({"load.kind": ["active", "reactive"], "load.torque": [1, -1]}, "load_torque = -1 N"),
-    "limit below": ({"maximum_torque": [70, 61]}, "maximum_torque = 61 N"),
-    "speeds": ({"start.target_speed": [20, 60], "initial_load_speed": [0, 30]}, "initial_load_speed = 30"),
     "samples": ({"sample": {"starting_torque": [10, 60], "load_torque": [3, 60], "maximum_torque": [70, 71]}},
                 r"starting_torque\[1\] = 60"),
     "a controller's": ({"controller.time": [0.1, -0.1]}, "time = -0.1"),

@@ -57,41 +57,6 @@ def test_samples_and_parameters_of_the_controller_set_up_for_another_chain():
     same(results, fitted_to=nominal)
 
 
-def test_an_interrupted_sweep_goes_on_to_the_same_bits(tmp_path):
-    grid = {"gap": ["0.5x", "1x", "2x"], "shaft[3].gap": [0.0, 0.02]}
-    whole = sweep(CHAIN, "s-curve", grid, chunk=1, workers=1)
-
-    def stopped(progress):
-        if progress.done >= 2:
-            raise KeyboardInterrupt
-
-    folder = tmp_path / "sweep.zarr"
-    with pytest.raises(KeyboardInterrupt):
-        sweep(CHAIN, "s-curve", grid, chunk=1, to=folder, workers=1, progress=stopped)
-    told = []
-    again = sweep(CHAIN, "s-curve", grid, chunk=1, to=folder, workers=2, progress=told.append)
-    assert told[0].done >= 2
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(whole[name].values, again[name].values)
-    with pytest.raises(InputError, match="another"):
-        sweep(CHAIN.changed(gaps=1.1), "s-curve", grid, to=folder)
-
-
-@pytest.mark.parametrize(
-    ("grid", "said"),
-    [
-        ({"shaft[4].gap": [0.1]}, "there is no such axis; did you mean shaft"),
-        ({"shaft[2].gap": ["0.1 kg"]}, "not an angle"),
-        ({"mass[2].inertia": [-1.0]}, "above 0"),
-        ({"start.position": ["hangin"]}, "did you mean"),
-        ({"gap": [-1.0]}, "0 or more"),
-    ],
-)
-def test_what_is_no_axis_of_a_chain(grid, said):
-    with pytest.raises(InputError, match=said):
-        sweep(CHAIN, "direct", grid)
-
-
 def test_figures_of_a_chain_are_named():
     known = named(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)

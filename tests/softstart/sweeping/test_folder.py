@@ -6,8 +6,6 @@ import os
 import random
 import shutil
 import signal
-import subprocess
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -88,9 +86,6 @@ def test_it_is_a_zarr_folder_that_says_what_is_missing(tmp_path):
     whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
     memory = sweep(CRANE, "ramp", GRID, **OPTIONS)
     assert whole.drop_attrs().identical(memory.drop_attrs())
-    assert (
-        xarray.open_zarr(tmp_path / "a").status.attrs["flag_meanings"] == memory.status.attrs["flag_meanings"]
-    )
 
 
 @pytest.fixture(scope="module")
@@ -114,32 +109,21 @@ def swap(path):
     other.write_bytes(content)
 
 
-def in_the_way(path):
-    shutil.rmtree(path.parent)
-    path.parent.write_text("a file")
-
-
-def as_folder(path):
-    path.unlink()
-    path.mkdir()
-
-
 def as_pipe(path):
     path.unlink()
     os.mkfifo(path)
 
 
-DAMAGES = [flip, swap, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
-           lambda path: path.write_bytes(path.read_bytes() + b"more")]  # fmt: skip
-
-
-CHUNKS = ["k_dyn/c/0/0", "status/c/0/0"]
-CASES = [  # exchanging the two chunks of status changes nothing: they are the same
-    (name, damage) for name in CHUNKS for damage in DAMAGES if (name, damage) != ("status/c/0/0", swap)
-]
-
-
-@pytest.mark.parametrize(("name", "damage"), CASES)
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("k_dyn/c/0/0", flip),
+        ("k_dyn/c/0/0", swap),
+        ("status/c/0/0", as_pipe),
+        ("status/c/0/0", Path.unlink),
+        ("k_dyn/c/0/0", lambda path: os.truncate(path, 9)),
+    ],
+)
 def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, name, damage):
     folder = Path(shutil.copytree(pristine, tmp_path / "a"))
     damage(folder / name)
@@ -160,68 +144,40 @@ def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, n
     }
 
 
-@pytest.mark.parametrize("damage", [flip, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
-def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
-    files = ("zarr.json", "k_dyn/zarr.json", "status/zarr.json", "gap/c/0")
-    for number, name in enumerate(files):
-        folder = Path(shutil.copytree(pristine, tmp_path / str(number)))
-        damage(folder / name)
-        told = []
-        with pytest.warns(DamagedWarning, match=f"{name} is damaged"):
-            again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
-        assert [now.before for now in told] == [6]
-        assert again.identical(xarray.open_zarr(pristine, chunks=None))
-        assert {
-            path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
-        } == {path.relative_to(pristine): path.read_bytes() for path in pristine.rglob("*") if path.is_file()}
-
-
-@pytest.mark.filterwarnings("ignore::softstart.errors.DamagedWarning")  # it is named, too
-@pytest.mark.parametrize(("name", "damage"), [("k_dyn/c/0/0", in_the_way), ("status/c/0/0", as_folder),
-                                               ("gap/zarr.json", as_folder)])  # fmt: skip
-def test_what_is_no_file_of_a_sweep_is_not_removed(pristine, tmp_path, name, damage):
+@pytest.mark.parametrize("name", ["zarr.json", "k_dyn/zarr.json", "gap/c/0"])
+def test_damaged_descriptions_are_mended(pristine, tmp_path, name):
     folder = Path(shutil.copytree(pristine, tmp_path / "a"))
-    damage(folder / name)
-    with pytest.raises(InputError, match=r"to = .*: nothing can be written there"):
-        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    flip(folder / name)
+    told = []
+    with pytest.warns(DamagedWarning, match=f"{name} is damaged"):
+        sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
+    assert [now.before for now in told] == [6]
+    files = [path.relative_to(pristine) for path in pristine.rglob("*") if path.is_file()]
+    assert [(folder / file).read_bytes() for file in files] == [
+        (pristine / file).read_bytes() for file in files
+    ]
 
 
-@pytest.mark.parametrize("damage", [Path.unlink, as_folder, lambda path: path.write_bytes(bytes(4096))])
-def test_without_its_list_a_sweep_is_refused(pristine, tmp_path, damage):
+def test_what_is_no_sweep_is_refused_and_not_removed(pristine, tmp_path):
     folder = Path(shutil.copytree(pristine, tmp_path / "a"))
-    damage(folder / "status" / "softstart.sqlite")
-    with pytest.raises(InputError, match=r"to = .*; give another folder") as caught:
-        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    said = "is damaged", "holds something else"
-    assert any(words in str(caught.value) for words in said)
-
-
-def test_other_readers_notice_a_flipped_bit_too(pristine, tmp_path):
-    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
-    flip(folder / "k_dyn" / "c" / "1" / "0")
-    with pytest.raises(ValueError, match="checksum"):
-        xarray.open_zarr(folder).k_dyn.load()
-
-
-def test_a_folder_that_was_deleted_leaves_no_memory(tmp_path):
-    sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
-    shutil.rmtree(tmp_path / "a")
-    other = {"gap": [0.5, 1.0, 2.0, 4.0]}
-    found = sweep(CRANE, "ramp", other, to=tmp_path / "a", workers=1)
-    assert found.drop_attrs().identical(sweep(CRANE, "ramp", other).drop_attrs())
+    (folder / "status" / "softstart.sqlite").unlink()
+    full, file = tmp_path / "full", tmp_path / "file"
+    full.mkdir()
+    for path in (file, full / "letter.txt"):
+        path.write_text("dear")
+    for place in (folder, full, file, file / "below"):
+        with pytest.raises(InputError, match="to = "):
+            sweep(CRANE, "ramp", GRID, to=place, **OPTIONS)
+    assert file.read_text() == (full / "letter.txt").read_text() == "dear"
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
         ({"drive": CRANE.replace(damping=1.0)}, "another drive;"),
-        ({"controller": "s-curve"}, "another controller;"),
         ({"parameters": {"time": 0.2}}, "another controller;"),
         ({"grid": {**GRID, "gap": [0.5, 1.0, 2.5]}}, "another axis gap;"),
-        ({"grid": dict(reversed(GRID.items()))}, "another order of the axes;"),
         ({"grid": {**GRID, "stiffness": [300.0]}}, "another order of the axes and axis stiffness;"),
-        ({"until": 0.5}, "another until;"),
-        ({"chunk": 1}, "another chunk;"),
         ({"figures": ["k_dyn"], "fitted_to": CRANE}, "another figures and fitted_to;"),
     ],
 )  # fmt: skip
@@ -252,48 +208,9 @@ def test_a_controller_from_a_file_that_changed_is_another_one(tmp_path):
         sweep(CRANE, name, {"gap": [0.5, 2.0]}, to=tmp_path / "a")
 
 
-def test_folders_that_hold_something_else(tmp_path):
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "letter.txt").write_text("dear")
-    (tmp_path / "file").write_text("dear")
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="holds something else than a sweep"):
-        sweep(CRANE, "ramp", GRID, to=tmp_path / "full", **OPTIONS)
-    for place in ("file", "file/below"):
-        with pytest.raises(InputError, match=r"to = .*file"):
-            sweep(CRANE, "ramp", GRID, to=tmp_path / place, **OPTIONS)
-    sweep(CRANE, "ramp", GRID, to=tmp_path / "empty", **OPTIONS)
-    (tmp_path / "empty" / "status" / "softstart.sqlite").unlink()  # as those of before were
-    with pytest.raises(InputError, match="holds something else than a sweep"):
-        sweep(CRANE, "ramp", GRID, to=tmp_path / "empty", **OPTIONS)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "file", "full"]
-
-
-HOLDER = """
-import sys, time
-from softstart import sweep
-sweep("crane-4amtkf", "ramp", {"gap": [0.5, 1.0, 2.0], "load_inertia": [0.1, 0.2]}, to=sys.argv[1], chunk=2,
-      workers=1, progress=lambda now: (print("held", flush=True), time.sleep(60)))
-"""
-
-
-def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
-    folder = tmp_path / "a"
-    holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder)], stdout=subprocess.PIPE, text=True)
-    assert holder.stdout.readline() == "held\n"
-    with pytest.raises(InputError, match="another process is writing this sweep now; wait for it or end it"):
-        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    holder.kill()
-    holder.communicate()
-    sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
-    assert not list(folder.rglob("*-journal"))
-
-
-@pytest.mark.parametrize("to", [None, "a"])
-def test_netcdf_is_the_same(tmp_path, to):
+def test_netcdf_is_the_same(tmp_path):
     grid = {"sample": {"gap": [0.5, 1.0, 2.0], "damping": [0, 1, 2]}, "controller": ["ramp", "direct"]}
-    results = sweep(CRANE, None, grid, to=to and tmp_path / to, workers=1, chunk=2)
+    results = sweep(CRANE, None, grid, to=tmp_path / "a", workers=1, chunk=2)
     results.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as read:
         assert set(read.coords) == {"sample", "controller", "gap", "damping"} == set(results.coords)

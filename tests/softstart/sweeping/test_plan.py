@@ -40,7 +40,3 @@ def test_small_grids_have_work_for_many(size):
     plan = Plan.of([size], [False])
     assert plan.chunk[0] <= 16_384
     assert math.prod(plan.counts) >= min(64, size // 1024)
-
-
-def test_the_last_index_is_the_fastest():
-    assert list(Plan((2, 4), (1, 2)).indices()) == [(0, 0), (0, 1), (1, 0), (1, 1)]

@@ -19,6 +19,7 @@ from .conftest import alive, children
 CRANE = Drive.load("crane-4amtkf")
 
 
+@pytest.mark.slow
 def test_a_killed_process_costs_nothing(sweeping, uninterrupted, tmp_path, monkeypatch):
     monkeypatch.setattr(entry, "first_start", lambda *asked: False)  # as if not compiled: no threads
     others, killed = set(children(os.getpid())), []  # those of earlier tests in this process

@@ -9,7 +9,7 @@ from tests.softstart.tuning.test_trials import trials
 from softstart import InputError, simulate, tune
 from softstart.chain import Chain
 from softstart.controller import make_controller
-from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
+from softstart.tuning.question import gaps_of, inertias_of
 
 CHAIN = Chain.load("crane-4-mass")
 DAMPED = Chain.from_toml(CHAIN.to_toml(), also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
@@ -17,8 +17,7 @@ OFF = {"shaft[2].gap": "20 %", "load_torque": "10 %"}
 QUICK = {"restarts": 1, "generations": 3, "workers": 1}
 
 
-@pytest.mark.parametrize("name", ["s-curve", "take-up", "acceleration-delay"])
-@pytest.mark.parametrize("position", ["mid-gap", "unknown"])
+@pytest.mark.parametrize(("name", "position"), [("s-curve", "unknown"), ("take-up", "mid-gap")])
 def test_each_candidate_is_the_start_that_simulate_makes(name, position):
     chain = CHAIN.with_values({"start_position": position})
     tried = trials(name, chain, OFF, gaps=(0.5, 1.0), load_inertias=(40.0, 69.2))
@@ -51,8 +50,6 @@ def test_the_torque_of_one_shaft_is_a_metric():
     found = tune(DAMPED, "s-curve", ["1x"], ["1x"], metric="k_dyn_3", free=["time"], schedule=False, **QUICK)
     run = simulate(DAMPED, found.robust.controller, base=DAMPED)
     assert found.robust.worst == run.k_dyns[2]
-    with pytest.raises(InputError, match="did you mean k_dyn_3"):
-        tune(DAMPED, "s-curve", ["1x"], ["1x"], metric="k_dyn_4", **QUICK)
 
 
 def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
@@ -80,12 +77,9 @@ def test_gaps_and_inertias_of_a_chain():
     assert inertias_of(CHAIN, "5 J1") == (62.0,)
     with pytest.raises(InputError, match="no gap that could be widened"):
         gaps_of(CHAIN.changed(gaps=0.0), ["0.5"])
-    with pytest.raises(InputError, match=r"did you mean shaft\[2\].gap"):
-        scenarios_of(CHAIN, {"shaft[2].gaps": "10 %"})
-    two = CHAIN.moved(1.0, 69.2).design_drive
-    assert two.gap == 1.0
 
 
+@pytest.mark.slow
 def test_an_optimum_stands_beside_the_gains_where_it_is_asked_for():
     short = DAMPED.with_values({"target_speed": 20.0})
     found = tune(

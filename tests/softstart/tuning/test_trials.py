@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
-from softstart.tuning.question import Question, gaps_of, inertias_of, recipe_of, scenarios_of
+from softstart.tuning.question import Question, recipe_of, scenarios_of
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
@@ -25,7 +25,7 @@ def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
     return Trials(Question(**(asked | change)), robust)
 
 
-@pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback", "s-curve"])
+@pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback"])
 def test_each_candidate_is_the_start_that_simulate_makes(name):
     tried = trials(name, tolerances={"load_torque": "20 %"})
     assert tried.compiled
@@ -52,14 +52,6 @@ def test_one_set_is_set_up_for_the_nominal_drive():
             run = simulate(drive, "acceleration-delay", parameters={"torque": torque}, fitted_to=CRANE)
             assert judged.metric[k, cell] == pytest.approx(run.k_dyn, rel=1e-12)
             assert judged.start_time[k, cell] == pytest.approx(run.start_time, rel=1e-12)
-
-
-def test_what_follows_from_a_gain_follows_the_candidate():
-    """The default delay is the length of stage 2 under the candidate's torque, not under the default's."""
-    tried = trials("acceleration-delay", ranges=ranges_of(make_controller("acceleration-delay"), ["torque"]))
-    judged = tried.judged(np.array([3]), {"torque": np.array([20.0])})
-    run = simulate(tried.question.drive_of(3), "acceleration-delay", parameters={"torque": 20.0})
-    assert judged.metric[0, 0] == run.k_dyn
 
 
 def test_a_candidate_that_its_controller_refuses_is_the_worst_and_alone():
@@ -90,13 +82,6 @@ def test_places_and_values(place, default, low, high, logarithmic):
     assert float(one.value(1.0, default)) == pytest.approx(high * default)
 
 
-def test_multiples_of_nothing_and_narrowed_ones():
-    wide = Range("x", "1", multiples=(0.2, 5.0), between=(0.0, 1.0), logarithmic=True)
-    assert wide.value([0.0, 1.0], 0.5).tolist() == [0.1, 1.0]
-    assert wide.value([0.0, 1.0], 0.0).tolist() == [0.0, 0.0]
-    assert wide.place([0.0, 9.0], 0.5).tolist() == [0.0, 1.0]
-
-
 def test_the_users_ranges():
     ramp = make_controller("ramp")
     wide, narrow, share = ranges_of(
@@ -108,15 +93,6 @@ def test_the_users_ranges():
     with pytest.raises(InputError) as refused:
         ranges_of(ramp, {"tme": None, "period": None, "time": (2, 1)})
     assert len(refused.value.sentences) == 3
-
-
-def test_default_grids():
-    assert gaps_of(CRANE, None) == (0.25, 0.5, 1.0, 2.0)
-    assert inertias_of(CRANE, None) == (0.07, 0.175, 0.35)
-    assert inertias_of(CRANE, ["5J1", "2 J1", 0.07]) == (0.07, 0.175)
-    assert gaps_of(CRANE, 1.0) == (1.0,)
-    with pytest.raises(InputError, match="the drive has no gap"):
-        gaps_of(CRANE.replace(gap=0.0), None)
 
 
 # tolerances -----------------------------------------------------------------------------------------------
