@@ -40,6 +40,8 @@ def test_each_point_is_the_optimum_of_its_start_time(front: Front) -> None:
         assert point.contacts == 1
         alone = optimize(CRANE, point.start_time_bound, terminal="reached")
         assert point.k_dyn == pytest.approx(alone.k_dyn, rel=1e-6)
+    k_dyn = [point.k_dyn for point in front.points]
+    assert k_dyn == sorted(k_dyn, reverse=True)  # type: ignore[type-var]
 
 
 def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
@@ -63,9 +65,6 @@ def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
     assert [p.k_dyn for p in points] == [None, 3.0, 3.0, 3.0, 2.8, 2.8]
     assert [p.k_dyn_lower_bound for p in points[1:]] == [2.5, 2.6, None, 2.4, 2.0]
     assert [p.start_time for p in points[1:]] == [0.2, 0.2, 0.2, 0.5, 0.5]
-    assert points[0] is found[0]
-    assert points[2].why == "the start for 0.2 s is gentler, and may arrive early"
-    assert points[3].status == "OPTIMAL"
     assert all((p.k_dyn or 0.0) >= (p.k_dyn_lower_bound or 0.0) for p in points[1:])
 
 
