@@ -99,11 +99,7 @@ class Answer(PlainController):
 
 @pytest.mark.parametrize(
     "answer",
-    [
-        Command(1.0, math.inf, (), 5.0),
-        Command(1.0, 0.1, (), math.nan),
-        Command(math.inf, 0.1, (), -1.0),
-    ],
+    [Command(1.0, math.inf, (), 5.0), Command(1.0, 0.1, (), math.nan), Command(math.inf, 0.1, (), -1.0)],
 )
 def test_a_slope_without_an_end_is_refused(answer: Command) -> None:
     with pytest.raises(SimulationError, match="slope without an end"):
