@@ -294,9 +294,8 @@ class InfeasibleError(RuntimeError):
     Examples
     --------
     >>> from softstart import Drive, InfeasibleError, optimize
-    >>> drive = Drive.load("crane-4amtkf").replace(gap=0.0, target_speed=20.0)
     >>> try:
-    ...     optimize(drive, 0.05, terminal="reached")
+    ...     optimize(Drive.load("crane-4amtkf").replace(gap=0.0, target_speed=20.0), 0.05, terminal="reached")
     ... except InfeasibleError as error:
     ...     print(round(error.verdict.shortest_start_time, 4))
     0.0804

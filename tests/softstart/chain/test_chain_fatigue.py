@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.twin import chain_of
@@ -47,15 +45,6 @@ def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
         rises = np.diff(points[:, 1])
         assert (rises[1:] * rises[:-1] < 0.0).all()
         assert (np.diff(points[:, 0]) >= 0.0).all()
-
-
-def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(chain: Chain) -> None:
-    anywhere = replace(chain, position="unknown")
-    found = fatigue(simulate(anywhere, "ramp")).rows
-    runs = [simulate(one, "ramp", fitted_to=found[0].run.told) for one in anywhere.positions.values()]
-    each = [fatigue(run).rows for run in runs]
-    for k, life in enumerate(found):
-        assert life.equivalent_torque == pytest.approx(max(row[k].equivalent_torque for row in each))
 
 
 def test_estimated_damping_is_the_ratio_of_the_first_natural_vibration() -> None:

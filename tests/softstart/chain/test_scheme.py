@@ -42,12 +42,6 @@ def test_everything_is_named_and_inside(name: str) -> None:
     assert first.get_ydata() == pytest.approx(vibration.shape[1])
 
 
-def test_discs_go_with_the_fourth_root_of_inertia() -> None:
-    row, _ = drawn(Chain([Mass(16), Mass(1)], [Shaft(1)]))
-    first, second = (one.get_height() for one in row.patches)
-    assert first / second == pytest.approx(2.0)
-
-
 def test_gaps_are_to_scale() -> None:
     """The distance of the two stops, less the least one."""
     row, _ = drawn(Chain([Mass(1)] * 3, [Shaft(1, gap=0.1), Shaft(1, gap=0.3)]))

@@ -29,10 +29,7 @@ def test_a_drive_is_a_chain_of_two_masses(changes):
     """To the kernel it is the same: all that it is given of both agrees to rounding."""
     drive = CRANE.replace(**changes)
     ours, theirs = rows_of(drive), rows_of(chain_of(drive))
-    shafts = (
-        theirs.shafts[..., :-1],
-        ours.shafts[..., :-1],
-    )  # but for the place of the gear: none
+    shafts = (theirs.shafts[..., :-1], ours.shafts[..., :-1])  # but for the place of the gear: none
     for other, one in ((theirs.machines, ours.machines), (theirs.masses, ours.masses), shafts):
         np.testing.assert_allclose(other, one, rtol=1e-14)
 

@@ -11,7 +11,7 @@ import pytest
 from tests.controllers.several_gaps import random_chains
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, SimulationError, simulate
+from softstart import Drive, SimulationError, simulate
 from softstart.chain import Chain, Mass, reduce_chain, two_mass_error, verify_on_chain
 from softstart.chain.two_masses import error_under, torques_to_try
 
@@ -97,11 +97,6 @@ def test_a_strategy_that_does_not_start_the_chain_counts(monkeypatch):
     assert found.failed == {"ramp": "too many events"}
     assert found.error == np.inf
     assert not found.enough
-
-
-def test_a_controller_named_by_hand_must_suit_the_drive():
-    with pytest.raises(InputError, match="profile"):
-        two_mass_error("crane-4-mass", controllers=["profile"])
 
 
 def chains_of_all_kinds(seed: int, count: int) -> Iterator[Chain]:

@@ -35,35 +35,29 @@ def case(seed: int) -> dict[str, Any]:
     return drawn
 
 
+FIELDS = {
+    "J1": "motor_inertia", "J2": "load_inertia", "c": "stiffness", "d": "damping", "gap": "gap",
+    "Mc": "load_torque", "kind": "load_kind", "law": "contact_law", "theta0": "start_position",
+    "lag": "torque_lag", "rate": "torque_rate", "target": "target_speed", "friction": "motor_friction",
+    "w1_0": "initial_motor_speed", "w2_0": "initial_load_speed",
+    "b1": "motor_viscous_friction", "b2": "load_viscous_friction",
+}  # fmt: skip
+
+
 def drive_of(drawn: dict[str, Any]) -> Drive:
-    """The drive of this start."""
+    """The drive of this start, whose motor has all that the pieces ask for."""
     pieces = drawn["torque_pieces"]
     ends = [*(piece[0] for piece in pieces[1:]), drawn["t_end"]]
     torques = [u for _, u, *_ in pieces]
     torques += [u + (end - t) * sum(slope) for (t, u, *slope), end in zip(pieces, ends, strict=True)]
-    Ms = max(*torques, 1.1 * drawn["Mc"], 1e-09)
-    return Drive(
-        motor_inertia=drawn["J1"],
-        load_inertia=drawn["J2"],
-        stiffness=drawn["c"],
-        damping=drawn["d"],
-        gap=drawn["gap"],
-        load_torque=drawn["Mc"],
-        load_kind=drawn["kind"],
-        contact_law=drawn["law"],
-        start_position=drawn["theta0"],
-        initial_motor_speed=drawn["w1_0"],
-        initial_load_speed=drawn["w2_0"],
-        torque_lag=drawn["lag"],
-        torque_rate=drawn["rate"],
-        starting_torque=Ms,
-        minimum_torque=min(0.0, *torques),
-        target_speed=drawn["target"],
-        motor_friction=drawn.get("friction", 0.0),
-        motor_viscous_friction=drawn.get("b1", 0.0),
-        load_viscous_friction=drawn.get("b2", 0.0),
-        **brake_of(drawn),
-    )
+    limits = {
+        "starting_torque": max(*torques, 1.1 * drawn["Mc"], 1e-09),
+        "minimum_torque": min(0.0, *torques),
+    }
+    fields = {FIELDS[name]: value for name, value in drawn.items() if name in FIELDS}
+    release = drawn.get("release", 0.0)
+    brake = {"brake": "motor", "release": "torque" if math.isinf(release) else release} if release else {}
+    return Drive(**fields, **limits, **brake)
 
 
 def run_of(drawn: dict[str, Any]) -> Run:
@@ -82,12 +76,6 @@ def in_other_units(drawn: dict[str, Any], mass: float, time: float) -> dict[str,
     scaled = drawn | {name: drawn[name] * unit for name, unit in units.items() if name in drawn}
     scaled["torque_pieces"] = [(t * time, u * torque) for t, u in drawn["torque_pieces"]]
     return scaled
-
-
-def brake_of(drawn: dict[str, Any]) -> dict[str, Any]:
-    """The brake as a Drive has it."""
-    release = drawn.get("release", 0.0)
-    return {"brake": "motor", "release": "torque" if math.isinf(release) else release} if release else {}
 
 
 @pytest.mark.hypothesis

@@ -11,15 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from tests import twin
 
-from softstart import (
-    Command,
-    Drive,
-    InputError,
-    PlainController,
-    SimulationError,
-    TorqueProfile,
-    simulate,
-)
+from softstart import Command, Drive, InputError, PlainController, SimulationError, TorqueProfile, simulate
 from softstart.controller import make_controller
 from softstart.kernel.motor import encoder_count, gauss
 

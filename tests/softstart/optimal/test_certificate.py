@@ -1,4 +1,4 @@
-"""The certificate is never above a start that can be had: random starts, judged without its formulas."""
+"""The certificate is never above a start that can be had, nor its parts above sums without its formulas."""
 
 from __future__ import annotations
 
@@ -13,34 +13,25 @@ from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from scipy.optimize import linprog
-from tests.softstart.optimal.drives import CRANE, played
+from tests.softstart.optimal.drives import CRANE
 
-from softstart import Drive, TorqueProfile, optimize
+from softstart import Drive, optimize
 from softstart.arrays import Vector
-from softstart.optimal import certificate, contact_motion
+from softstart.optimal import certificate
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.certificate import _Dual, _Multipliers, _Search, not_certified
 from softstart.optimal.contact_motion import Contact, entries
 from softstart.optimal.problem import Problem, Terminal
 
-UNBOUNDED = 1e9  # rad/s: a target that is set later to what is reached
-
 
 @dataclass
 class Start:
-    """What happens from te on: masses in contact under steps of torque, by matrix exponentials alone."""
+    """Masses in contact from `entered` on under steps of torque, by matrix exponentials alone."""
 
     drive: Drive
-    terminal: Terminal
-    te: float
     entered: Vector  # z, z', w2, u, 1
     tau: float
     u: Vector
-
-    @property
-    def pulls(self) -> bool:
-        return bool(self.drive.contact_law == "dead-zone" and self.drive.d > 0.0)
 
     def step(self, s: float) -> Vector:
         drive, A = self.drive, np.zeros((5, 5))
@@ -53,88 +44,9 @@ class Start:
     def torque(self, x: Vector) -> Vector:
         return np.asarray(self.drive.c * x[..., 0] + self.drive.d * x[..., 1])
 
-    def motion(self, first: Vector, levels: Vector, length: float, samples: int) -> Vector:
-        E, x, out = self.step(length / samples), first.copy(), [first.copy()]
-        for level in levels:
-            x[3] = level
-            for _ in range(samples):
-                x = E @ x
-                out.append(x)
-            x = x.copy()
-        return np.array(out)
-
-    def crest(self, x: Vector, length: float) -> float:
-        """Greatest |T|, between samples by parabolas: at 0.03 radian apart they are true to 1e-8."""
-        T = self.torque(x)
-        inner = np.abs(T[1:-1])
-        left, right = np.abs(T[:-2]), np.abs(T[2:])
-        bend = 2.0 * inner - left - right
-        peaked = (bend > 0.0) & (inner >= left) & (inner >= right)
-        more = np.where(peaked, (right - left) ** 2 / np.maximum(8.0 * bend, 1e-300), 0.0)
-        return float(max(np.abs(T).max(), (inner + more).max()))
-
-    def judged(self) -> tuple[float, float] | None:
-        """(peak of |T| in N m, load speed at the end); None if this is no start of the class."""
-        drive = self.drive
-        length = self.tau / self.u.size
-        x = self.motion(self.entered, self.u, length, max(4, math.ceil(length * float(drive.Omega) / 0.03)))
-        T, end = self.torque(x), x[-1]
-        kept = drive.c * x[1:, 0] if self.pulls else T
-        if kept.min() < -1e-9 * drive.Ms:
-            return None
-        if drive.load_kind == "reactive" and drive.Mc > 0.0 and x[:, 2].min() < -1e-9:
-            return None
-        peak = self.crest(x, length)
-        if self.terminal == "reached":
-            if x[:-1, 2].max() > end[2] or self.torque(end) < drive.Mc * (1.0 - 1e-9):
-                return None  # it was there before
-            tail = self.motion(end, np.zeros(1), math.pi / float(drive.Omega), 400)
-            falling = np.flatnonzero(np.diff(self.torque(tail)) < 0.0)
-            last = int(falling[0]) + 2 if falling.size else 401
-            peak = max(peak, self.crest(tail[: max(last, 3)], 0.0) if last > 1 else 0.0)
-        return peak, float(end[2])
-
-    def programmed(self, n: int, cost: Vector | None, target: float | None) -> Vector | None:
-        """Torques of a program made of matrix exponentials: least P for a target, or least cost."""
-        drive, checks = self.drive, 3
-        E, Ms = self.step(self.tau / (n * checks)), float(drive.Ms)
-        X = np.zeros((5, n + 1))
-        X[:, n] = self.entered
-        T_rows, z_rows = [], []
-        for k in range(n):
-            X[3], X[3, k] = 0.0, 1.0
-            for _ in range(checks):
-                X = E @ X
-                T_rows.append(self.torque(X.T))
-                z_rows.append(drive.c * X[0])
-        X[3] = 0.0
-        T, z, ones = np.array(T_rows), np.array(z_rows), np.ones((n * checks, 1))
-        kept = z if self.pulls else T
-        above = np.where(np.arange(n * checks) < checks, 0.0, 1e-3 * Ms)
-        rows = [np.hstack([a[:, :n], b]) for a, b in ((T, -ones), (-T, -ones), (-kept, 0.0 * ones))]
-        most = [-T[:, n], T[:, n], kept[:, n] - above]
-        equal = [(X[2], target)] if target is not None else []
-        if self.terminal == "reached":
-            quarter = self.step(math.pi / float(drive.Omega) / 40.0)
-            x = X
-            after = np.array([self.torque((x := quarter @ x).T) for _ in range(40)])
-            rows += [np.hstack([after[:, :n], -np.ones((40, 1))]), np.append(-T[-1, :n], 0.0)[None, :]]
-            most += [-after[:, n], T[-1:, n] - drive.Mc]
-        else:
-            equal.append((X[1], 0.0))
-        if self.terminal == "steady":
-            equal.append((T[-1], drive.Mc))
-        found = linprog(
-            np.append(np.zeros(n), 1.0) if cost is None else np.append(cost, 0.1), np.vstack(rows),
-            np.concatenate(most), np.array([np.append(row[:n], 0.0) for row, _ in equal]) if equal else None,
-            np.array([right - row[n] for row, right in equal]) if equal else None,
-            [(0.0, Ms)] * n + [(0.0, None)], method="highs",
-        )  # fmt: skip
-        return np.asarray(found.x[:n]) if found.status == 0 else None
-
 
 def random_drive(rng: np.random.Generator) -> Drive:
-    """Loads of both kinds, damped or not, from the gap, from a flank or in contact."""
+    """Loads of both kinds, damped or not, from the gap, from a flank or in contact, moving or not."""
     J1, Ms = 10 ** rng.uniform(-2, 0), 10 ** rng.uniform(0.5, 2.5)
     J2 = J1 * 10 ** rng.uniform(-1, 1.2)
     Omega = 2.0 * math.pi * 10 ** rng.uniform(0.5, 1.5)
@@ -147,106 +59,28 @@ def random_drive(rng: np.random.Generator) -> Drive:
         position = 0.5 * gap + (Mc if reactive else Ms) / c * rng.uniform(0.0, 0.9)
     moving = 0.0 if reactive else rng.choice([0.0, 1.0])
     w2 = moving * rng.uniform(-1.0, 1.0) * Ms / (J2 * Omega)
+    gained = (Ms - Mc) / (J1 + J2) * 2.0 * math.pi / Omega * 10 ** rng.uniform(-0.3, 0.5)
     return Drive(
         motor_inertia=J1, load_inertia=J2, starting_torque=Ms, load_torque=Mc, stiffness=c, gap=gap,
-        load_kind="reactive" if reactive else "active", start_position=position, target_speed=UNBOUNDED,
+        load_kind="reactive" if reactive else "active", start_position=position,
         damping=0.0 if reactive else 2.0 * rng.choice([0.0, 0.02, 0.1, 0.5, 1.5]) * c / Omega,
         contact_law=rng.choice(["no-pull", "dead-zone"]).item(), initial_load_speed=w2,
         initial_motor_speed=w2 + moving * rng.uniform(0.0, 1.0) * Ms / (J1 * Omega),
+        target_speed=max(w2, 0.0) + gained,
     )  # fmt: skip
 
 
-def entered(rng: np.random.Generator, drive: Drive) -> tuple[float, Vector] | None:
-    """(te, state) that the exact plant reaches under random pulses before both masses move in contact."""
-    quick = math.sqrt(2.0 * float(drive.J1) * max(float(drive.gap), 0.2 * drive.Ms / drive.c) / drive.Ms)
-    levels = float(drive.Ms) * np.append(1.0, rng.choice([0.0, 1.0, rng.random()], 3))
-    times = np.concatenate([[0.0], np.cumsum(quick * 10 ** rng.uniform(-1.0, 0.2, levels.size))])
-    if float(drive.theta0) >= 0.5 * float(drive.gap) and drive.load_kind == "active":
-        z, v = drive.theta0 - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
-        return 0.0, np.array([z, v, drive.initial_load_speed, 0.0, 1.0], dtype=np.float64)
-    run = played(drive, TorqueProfile.steps(times, levels), float(times[-1]) + 40.0 * quick)
-    reactive = drive.load_kind == "reactive"
-    first = "load starts" if reactive else "gap closed"
-    begins = [event.time for event in run.events if event.kind == first]
-    opened = [event.time for event in run.events if event.kind == "gap opened"]
-    if not begins or (opened and opened[0] < begins[0]):
-        return None
-    state = run.at(begins[0])
-    z = float(drive.Mc / drive.c) if reactive else 0.0
-    return begins[0], np.array([z, float(state["v"]), float(state["w2"]), 0.0, 1.0])
-
-
-def random_start(rng: np.random.Generator, terminal: Terminal) -> Start | None:
-    drive = random_drive(rng)
-    if not_certified(Problem(drive, 1.0, terminal)):
-        return None
-    entry = entered(rng, drive)
-    if entry is None:
-        return None
-    tau = float(drive.elastic_period) * 10 ** rng.uniform(-0.5, 0.4)
-    start = Start(drive, terminal, *entry, tau, np.zeros(1))
-    if terminal == "reached" and rng.random() < 0.4:
-        n = int(rng.integers(1, 10))
-        start.u = float(drive.Ms) * rng.choice([0.0, 1.0, rng.random()], n)
-        return start
-    u = start.programmed(20, rng.normal(size=20) * float(drive.Ms) / 20.0, None)
-    if u is None:
-        return None
-    start.u = u
-    return start
-
-
-def pressed(rng: np.random.Generator, start: Start, target: float, peak: float) -> tuple[Start, float]:
-    """The best of several random entries, each with the least peak for the same target and end."""
-    best, end = start, start.te + start.tau
-    for k in range(3):
-        entry = (start.te, start.entered) if k == 0 else entered(rng, start.drive)
-        if entry is None or entry[0] >= end:
-            continue
-        other = Start(start.drive, start.terminal, *entry, end - entry[0], np.zeros(1))
-        u = other.programmed(30, None, target)
-        if u is None:
-            continue
-        other.u = u
-        judged = other.judged()
-        if judged is not None and judged[0] < peak and abs(judged[1] - target) < 1e-8 * abs(target):
-            best, peak = other, judged[0]
-    return best, peak
-
-
-@pytest.mark.parametrize("terminal", get_args(Terminal))
-def test_no_start_at_all_gets_below(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each start sets its own target and time; half of them are improved by programs at random entries."""
-    monkeypatch.setattr(certificate, "MOST_PROGRAMS", 3)
-    monkeypatch.setattr(certificate, "MOST_CELLS", 150)
-    monkeypatch.setattr(contact_motion, "ENTRY_CELLS", 60)
-    rng = np.random.default_rng(20)
-    ratios: list[float] = []
-    while len(ratios) < 8:
-        start = random_start(rng, terminal)
-        judged = start.judged() if start is not None else None
-        if start is None or judged is None or judged[1] <= max(start.drive.initial_load_speed, 0.0):
-            continue
-        peak, target = judged
-        if len(ratios) % 3:
-            start, peak = pressed(rng, start, target, peak)
-        problem = Problem(start.drive.replace(target_speed=target), start.te + start.tau, terminal)
-        near = start.te if rng.random() < 0.5 else None
-        cells = entries(problem, start.te + start.tau, near)
-        k = max(int(np.searchsorted(cells.te, start.te)) - 1, 0)  # the cell of this entry
-        speeds = cells.slowest[k], start.entered[1], cells.fastest[k]
-        assert np.all(np.diff(speeds) >= -1e-8 * cells.fastest.max())
-        search = _Search(problem, cells, 1.002 * peak, near)
-        bound = search.least()
-        assert bound <= peak * (1.0 + 1e-7)
-        for dual in search.duals:  # at this very entry and duration, without any cell
-            one_sided = np.abs(dual.by.of_T) if start.pulls else np.maximum(dual.by.of_T, 0.0)
-            assert one_sided.sum() + dual.by.tail.sum() < 1.0 + 1e-9
-            fixed, by_v = dual.at(start.tau)
-            missing = target - float(start.entered[2])
-            assert fixed + by_v * start.entered[1] + dual.by.speed * missing <= peak * (1.0 + 1e-7)
-        ratios.append(bound / peak)
-    assert max(ratios) > 0.98  # and it says something
+# the terminal goes with the seed; these drives have a certificate, and a start that quick
+@pytest.mark.parametrize(
+    "seed", [7, 15, 16, 23, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 3, 6, 9, 10, 11, 12, 17))]
+)
+def test_the_gentlest_start_found_is_hardly_above(seed: int) -> None:
+    """No start is below; the exact K_dyn of the optimum is the sharpest one known."""
+    terminal: Any = ("reached", "synchronous", "steady")[seed % 3]
+    best = optimize(random_drive(np.random.default_rng([20, seed])), "1.3x", terminal=terminal)
+    assert best.run.contacts == 1
+    assert best.bound.kind == "certificate"
+    assert 0.97 * best.k_dyn < best.bound.k_dyn <= best.k_dyn * (1.0 + 1e-7)
 
 
 def random_multipliers(rng: np.random.Generator, problem: Problem) -> _Multipliers:
@@ -312,7 +146,7 @@ def test_any_numbers_at_all_make_a_bound(
                 v, w2 = rng.uniform(low, high), -rng.choice(missing)
                 if weights is q:
                     v, w2 = low if dual.at(t)[1] > 0.0 else high, -missing[np.argmin(by.speed * missing)]
-                start = Start(problem.drive, terminal, 0.0, np.array([cells.z0, v, w2, 0.0, 1.0]), t, u)
+                start = Start(problem.drive, np.array([cells.z0, v, w2, 0.0, 1.0]), t, u)
                 value = the_sum(start, by)
                 scale = 1e-9 * (abs(value) + Ms)
                 assert value >= least - scale
@@ -360,7 +194,7 @@ def test_the_curvature_over_tau_is_enclosed(given: dict[str, Any]) -> None:
             cells.fastest[:], cells = v, replace(cells, z0=z0)
             x, tau = np.array([z0, v, 0.0, 0.0, 1.0]), angle * step
             dual, taus = _Dual(problem, cells, by, 0.1), (tau - step, tau, tau + step)
-            f = [the_sum(Start(problem.drive, "reached", 0.0, x, one, np.array(u)), by) for one in taus]
+            f = [the_sum(Start(problem.drive, x, one, np.array(u)), by) for one in taus]
             bent = abs(f[0] - 2.0 * f[1] + f[2]) / step**2
             most = max(most, bent / (dual.still + dual.growing * taus[2]))
         sharp.append(most)

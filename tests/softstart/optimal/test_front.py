@@ -40,6 +40,8 @@ def test_each_point_is_the_optimum_of_its_start_time(front: Front) -> None:
         assert point.contacts == 1
         alone = optimize(CRANE, point.start_time_bound, terminal="reached")
         assert point.k_dyn == pytest.approx(alone.k_dyn, rel=1e-6)
+    k_dyn = [point.k_dyn for point in front.points]
+    assert k_dyn == sorted(k_dyn, reverse=True)  # type: ignore[type-var]
 
 
 def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
@@ -63,9 +65,6 @@ def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
     assert [p.k_dyn for p in points] == [None, 3.0, 3.0, 3.0, 2.8, 2.8]
     assert [p.k_dyn_lower_bound for p in points[1:]] == [2.5, 2.6, None, 2.4, 2.0]
     assert [p.start_time for p in points[1:]] == [0.2, 0.2, 0.2, 0.5, 0.5]
-    assert points[0] is found[0]
-    assert points[2].why == "the start for 0.2 s is gentler, and may arrive early"
-    assert points[3].status == "OPTIMAL"
     assert all((p.k_dyn or 0.0) >= (p.k_dyn_lower_bound or 0.0) for p in points[1:])
 
 
@@ -89,7 +88,7 @@ def test_start_times_that_are_too_short_are_marked() -> None:
     front = pareto(QUICK, [0.06, 0.05, 0.1], controllers=[])
     assert [point.status for point in front.points] == ["INFEASIBLE", "INFEASIBLE", "OPTIMAL"]
     for point in front.points[:2]:
-        assert 0.21 * 20.0 / (62.0 - 7.16) < point.shortest_start_time <= simulate(QUICK, "direct").start_time
+        assert point.shortest_start_time == pytest.approx(simulate(QUICK, "direct").start_time, rel=1e-3)
         assert point.k_dyn is None
         assert f"{point.shortest_start_time:.6g}" in point.status_text
         assert f"{point.start_time_bound:g} s" in point.status_text
@@ -194,10 +193,9 @@ def test_table(tmp_path: Path, front: Front) -> None:
 
 
 def test_default_start_times() -> None:
-    """From hardly more than the shortest start to well beyond that of constant torque."""
+    """From hardly more than the shortest start, which is under constant torque where there is no gap."""
     times, direct = default_start_times(QUICK), simulate(QUICK, "direct").start_time
-    assert 0.21 * 20.0 / (62.0 - 7.16) < times[0] < 1.021 * direct
-    assert optimize(QUICK, times[0], terminal="reached").end_time <= times[0]
+    assert times[0] == pytest.approx(1.02 * direct, rel=1e-3)
     assert times[-1] == pytest.approx(1.6 * direct)
     assert times == sorted(times)
 

@@ -239,30 +239,6 @@ def test_nobody_is_gentler(seed: int) -> None:
 
 
 @SLOW
-def test_no_perturbed_profile_is_better() -> None:
-    """Torque moved from one span to another, within the limits and in time, of a damped drive."""
-    drive = CRANE.replace(damping=1.0)
-    best = solved(drive, 0.29, terminal="reached")
-    rng = np.random.default_rng(7)
-    until = best.end_time + float(drive.elastic_period)
-    grid, kept_in_time = np.linspace(0.0, until, 601), 0
-    edges = np.union1d(grid, best.profile.time[best.profile.time <= until])
-    level = best.profile.at(0.5 * (edges[:-1] + edges[1:]))
-    for _ in range(600):
-        extra = np.zeros(600)
-        for sign in (1.0, -1.0):
-            first, width = int(rng.integers(0, int(600 * best.end_time / until))), int(rng.integers(1, 40))
-            extra[first : first + width] += sign * 10 ** rng.uniform(-2, 1) / width
-        extra += abs(rng.normal()) * 0.003  # most of what is only moved comes too late
-        more = extra[np.minimum(np.searchsorted(grid, edges[:-1], "right") - 1, 599)]
-        run = played(drive, TorqueProfile.steps(edges, np.clip(level + more, 0.0, drive.Ms)), until)
-        if run.start_time <= 0.29:
-            kept_in_time += 1
-            assert run.k_dyn >= best.k_dyn * (1 - 1e-3)
-    assert kept_in_time > 15
-
-
-@SLOW
 def test_an_answer_nearby_is_used_and_does_no_harm() -> None:
     drive = CRANE.replace(damping=0.5)
     near = solved(*CLASSES["damped"][:2])
@@ -281,9 +257,9 @@ def test_too_short_a_start_time() -> None:
     with pytest.raises(
         InfeasibleError, match=r"No torque brings .* the shortest start found takes"
     ) as raised:
-        optimize(QUICK, 0.05, **asked)
+        optimize(QUICK, 0.03, **asked)
     shortest = raised.value.verdict.shortest_start_time
-    assert 0.21 * 20.0 / (62.0 - 7.16) < shortest <= simulate(QUICK, "direct").start_time
+    assert shortest == pytest.approx(simulate(QUICK, "direct").start_time, rel=1e-3)  # without a gap
     with pytest.raises(InfeasibleError, match="No torque was found that brings"):
         optimize(QUICK, 0.999 * shortest, **asked)
     assert kept(optimize(QUICK, 1.002 * shortest, **asked)).end_time <= 1.002 * shortest

@@ -140,25 +140,3 @@ def test_instants_move_with_the_contacts() -> None:
 def contacts(played: Played) -> Any:
     events = played.recorded.events
     return events[(events["kind"] == at.CLOSED) & (events["time"] > 0.0)]
-
-
-def test_a_start_knows_its_peak_its_time_and_its_instants() -> None:
-    """The peak is located, instants have both sides of each joint, integrals are exact."""
-    player = Player(CRANE.replace(torque_lag=0.004))
-    profile = TorqueProfile([0.0, 0.01, 0.01, 0.3], [62.0, 62.0, 10.0, 60.0])
-    played = player.play(profile, 0.3)
-    times = played.instants(player.fastest / 32)
-    assert (np.diff(times) > 0.0).all()
-    assert np.diff(times).max() <= player.fastest / 32 * (1.0 + 1e-9)
-    for joint in played.recorded.spans[1:, at.S_START]:
-        assert np.abs(times - joint).min() == 0.0
-    with_peaks = played.with_peaks(times)
-    assert np.abs(played.recorded.at(with_peaks)["T"]).max() == pytest.approx(played.peak, rel=1e-12)
-    dense = np.linspace(0.0, 0.25, 400_001)
-    when, weights = played.quadrature(0.25)
-    u = played.recorded.at(dense)["u"]
-    assert weights.sum() == pytest.approx(0.25, rel=1e-12)
-    assert weights @ played.recorded.at(when)["u"] ** 2 == pytest.approx(np.trapezoid(u * u, dense), rel=1e-6)
-    peak, reached, speed = player.figures(profile, 0.3)
-    assert (peak, speed) == pytest.approx((played.peak, float(played.recorded.at([0.3])["w"][0, -1])))
-    assert reached == pytest.approx(played.reached(60.0, 0.3, 1)) if reached < 0.3 else speed < 60.0

@@ -119,12 +119,7 @@ def test_random_drives_agree_with_the_linear_programs(seed):
 
 
 @pytest.mark.parametrize(
-    "changes",
-    [
-        {"torque_lag": 0.005},
-        pytest.param({"release": 0.05}, marks=pytest.mark.slow),
-    ],
-    ids=str,
+    "changes", [{"torque_lag": 0.005}, pytest.param({"release": 0.05}, marks=pytest.mark.slow)], ids=str
 )
 def test_a_brake_holds_the_motor_first(changes):
     hoist = Drive.load("hoist-15kw").replace(
