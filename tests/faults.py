@@ -1,4 +1,4 @@
-"""Which tests find the small faults of `faults.toml`: `python tests/faults.py [WORD]`, in half an hour.
+"""Which tests find the small faults of `faults.toml`: `python tests/faults.py [WORD]`, half an hour.
 
 Each fault is put into a copy of the checkout, and the tests that could see it are run, but the slow ones. A
 table says how many of them fail, and names one; exit code 1 if a fault is found by none. A test that alone
@@ -32,12 +32,12 @@ def failing(folder: Path, fault: dict[str, str]) -> list[str]:
         raise SystemExit(f"{fault['path']}: {fault['right']!r} does not stand there once; mend faults.toml.")
     path.write_text(source.replace(fault["right"], fault["wrong"]))
     packages = os.pathsep.join(str(folder / one) for one in PARTS[:3])
-    tests = [f"tests/{one}" for one in fault["tests"].split()]
     words = ["-q", "-rfE", "--tb=no", "-p", "no:cacheprovider"]
-    words += ["--few-kernels", "-m", "not slow", f"--maxfail={ENOUGH}"]
+    words += ["--few-kernels", "-m", "not slow", f"--maxfail={ENOUGH}", fault["path"]]
+    words += [f"tests/{one}" for one in fault["tests"].split()]
     try:
         said = subprocess.run(
-            [sys.executable, "-m", "pytest", *words, fault["path"], *tests],
+            [sys.executable, "-m", "pytest", *words],
             cwd=folder, env={**os.environ, "PYTHONPATH": packages}, capture_output=True, text=True,
             timeout=PATIENCE, check=False,
         ).stdout  # fmt: skip
