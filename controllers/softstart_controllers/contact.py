@@ -469,9 +469,15 @@ def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float
     for i in range(int(p.queued), -1, -1):
         if length > 0.0:
             demand = m.sent[i]
-            left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
-            mean = demand + (u - demand) * (1.0 - left) * p.lag / length
-            u = demand + (u - demand) * left
+            if p.slew > 0.0:
+                reach = p.rate * length
+                after = min(max(demand, u - reach), u + reach)
+                mean = mean_of_ramp(u, after, reach)
+                u = after
+            else:
+                left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
+                mean = demand + (u - demand) * (1.0 - left) * p.lag / length
+                u = demand + (u - demand) * left
             _, w1, z, w2 = move(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.reactive)
         length = p.period
     return w1, z, w2, u

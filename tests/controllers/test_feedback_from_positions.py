@@ -50,7 +50,7 @@ def test_none_stalls_rattles_or_is_harder_than_direct(name: str) -> None:
     [
         {"torque_lag": 0.005, "brake": "none"},
         {"torque_rate": 2000.0},
-        {"computing_delay": 0.001},
+        {"torque_rate": 2000.0, "computing_delay": 0.001},
         {"release": 0.1, "torque_lag": 0.005},
         {"gap": "24 deg"},
     ],
