@@ -1,6 +1,6 @@
 # softstart: two commands do everything on a machine with Python 3.11+ and make.
 #   make compare        the main job on the crane drive: table, plots, report in results/
-#   make test           the test suite, five minutes on two cores; without the slow tests
+#   make test           the test suite, three minutes on two cores; without the slow tests
 #   make serve          the interactive page, in the browser
 # and for those who work on it (CONTRIBUTING.md):
 #   make check                 lint, types, layers and the tests of what has changed: under two minutes
@@ -27,7 +27,7 @@ UV := $(BIN)/uv pip install --quiet --python $(BIN)/python
 install = ($(PIP) install --only-binary :all: uv && $(UV) --editable '$(1)') || $(PIP) install --editable '$(1)'
 EVERYTHING := .[dev,docs,page,package]
 
-unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules and rewrite all tests anew
+unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules anew
 
 .PHONY: compare test slow check fuzz everything floors pythons serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
