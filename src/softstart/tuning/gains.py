@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,14 +14,13 @@ from softstart.arrays import Indices, Vector
 from softstart.errors import InputError
 from softstart.parallel import Pool
 from softstart.store import Records
-from softstart.tuning.search import CONVERGED, Costs, Populations, evolve, polish, populations
+from softstart.tuning.search import CONVERGED, Costs, Populations, evolve, populations
 from softstart.tuning.trials import TIE, Judged, Trials, in_time, shared_costs
 
 SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
 EQUALLY_GOOD = 1e-3  # share of the metric that smoothness may cost
 WIDER = 2  # times the population of a cell: a worst case over many starts is rougher than one start
-POLLS = 1.5  # of the polish, at most, for each generation
 KEPT_EACH = 1.0  # s, after which an unfinished search is written down again
 
 
@@ -71,22 +69,17 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
             "this figure; choose another metric, or give parameters with which it starts."
         )
     jobs, restarts = len(trials.drives), question.restarts
-    searched = _searched(trials, costs, kept, log, schedule)
-    restart_costs = searched[1].reshape(jobs, restarts)
+    last = _searched(trials, costs, kept, log, schedule)
+    restart_costs = last.best[1].reshape(jobs, restarts)
     best = np.arange(jobs) * restarts + restart_costs.argmin(axis=1)
-    places, found = (part[best] for part in searched)
+    places, found = (part[best] for part in last.best)
     if not trials.robust:
         places = _smooth(trials, costs, places, found)
     return _settled(trials, places, restart_costs)
 
 
-def _searched(
-    trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None
-) -> tuple[Vector, Vector]:
-    """The best place of each search and its cost, the restarts of each job in a row.
-
-    The populations are kept; the polish of an interrupted search begins anew.
-    """
+def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None) -> Populations:
+    """All searches to their end: the restarts of each job in a row. What is kept is gone on from."""
     question = trials.question
     title = "robust set" if trials.robust else "schedule"
     part, random = [title, schedule is not None], (question.seed, 2 + trials.robust)
@@ -119,8 +112,7 @@ def _searched(
         log.tell(title, now.generation, question.generations)
     if unkept:
         keep()
-    log.tell(f"{title}, polish")
-    return polish(tried, *now.best, (*random, 1), math.ceil(POLLS * question.generations))
+    return now
 
 
 def _seeds(trials: Trials, schedule: Found | None, searches: Any, most: int) -> Vector:

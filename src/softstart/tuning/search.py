@@ -1,4 +1,4 @@
-"""Differential evolution of many populations at once, then a polish: each generation of all is one call.
+"""Differential evolution of many populations at once: every generation of all of them is one call.
 
 A point is a place in a unit box. Costs are only compared, so that jumps of the cost do no harm.
 """
@@ -17,7 +17,6 @@ Costs = Callable[[Indices, Vector], Vector]  # which search each place (one a ro
 CONVERGED = 1e-4  # standard deviation of a population's costs, over their mean
 WEIGHTS = 0.5, 1.0  # of the difference of two members, drawn for each candidate
 CROSSOVER = 0.7  # share of the parameters that are changed
-FIRST_STEP, LAST_STEP = 0.08, 2e-4  # of the box, of the polish
 AGREES = 0.01  # of the best: within this share of it searches agree
 
 
@@ -91,39 +90,6 @@ def _candidates(places: Vector, costs: Vector, rng: np.random.Generator) -> Vect
     changed = rng.random(places.shape) < CROSSOVER
     changed |= np.arange(size) == rng.integers(size, size=(searches, members, 1))  # at least one
     return np.where(changed, mutant, places)
-
-
-def polish(
-    costs: Costs, places: Vector, cost: Vector, random: tuple[int, ...], polls: int
-) -> tuple[Vector, Vector]:
-    """The least costs near the best place of each search (one a row), and where: a mesh search.
-
-    A poll tries a step along every axis and along as many random orthogonal directions, both ways. The best
-    that is better becomes the centre; where none is, the step is halved. Evolution alone ends up to 4 % above
-    it, with a dozen parameters.
-
-    >>> bowl = lambda which, x: np.sum((x - 0.3) ** 2, axis=1)
-    >>> polish(bowl, np.full((1, 2), 0.9), np.full(1, 0.72), (0,), 60)[0].round(3).tolist()
-    [[0.3, 0.3]]
-    """
-    places, cost, step = places.copy(), cost.copy(), np.full(len(cost), FIRST_STEP)
-    searches, size = places.shape
-    for poll in range(polls):
-        active = np.flatnonzero(step >= LAST_STEP)
-        if not active.size:
-            break
-        drawn = np.random.default_rng((*random, poll)).normal(size=(searches, size, size))
-        ways = np.concatenate([np.broadcast_to(np.eye(size), drawn.shape), np.linalg.qr(drawn)[0]], axis=1)
-        moves = step[active, None, None] * np.concatenate([ways, -ways], axis=1)[active]
-        tried = np.clip(places[active, None] + moves, 0.0, 1.0)
-        found = costs(np.repeat(active, tried.shape[1]), np.concatenate(tried)).reshape(tried.shape[:2])
-        k = found.argmin(axis=1)
-        least = np.take_along_axis(found, k[:, None], axis=1)[:, 0]
-        better = least < cost[active]
-        moved = active[better]
-        places[moved], cost[moved] = tried[better, k[better]], least[better]
-        step[active[~better]] *= 0.5
-    return places, cost
 
 
 def latin(rng: np.random.Generator, count: int, size: int) -> Vector:

@@ -39,7 +39,7 @@ from softstart.tuning.tables import (
 )
 from softstart.tuning.trials import Part, Trials
 
-GENERATIONS = 40
+GENERATIONS = 60
 DRAWN = 100  # drives that stand for an identification
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
