@@ -354,6 +354,12 @@ class ChainOracle:
             found = (math.inf, -1)
             for i, j in step.crossings(values, upwards=True):
                 found = min(found, (step.root(self.E[i], self.F[i], grid[j], grid[j + 1]), i))
+            EA, EB = self.E @ self.A, self.E @ self.B
+            for i, j in step.crossings(EA @ states + EB @ self.inputs(grid, states), upwards=False):
+                if values[i, j] < 0 and values[i, j + 1] < 0 and not self.F[i, 1:].any():  # a touch
+                    top = step.root(EA[i], EB[i], grid[j], grid[j + 1])
+                    if self.E[i] @ step.state(top) + self.F[i, 0] > 0:
+                        found = min(found, (step.root(self.E[i], self.F[i], grid[j], top), i))
             KA, KB = self.K @ self.A, self.K @ self.B
             for i, j in step.crossings(KA @ states + KB @ self.inputs(grid, states), upwards=False):
                 when = step.root(KA[i], KB[i], grid[j], grid[j + 1])
