@@ -554,15 +554,16 @@ def _within_limits(problem: Problem, near: TorqueProfile | None) -> Optimum:
 
 
 def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimum, float]:
-    """The gentlest start of the first start time at which `share` of it is 1 or less, by regula falsi.
+    """The gentlest start of the first start time at which `share` of it is 1 or less.
 
-    K_dyn of the gentlest start falls with the start time. Also the time before which no start has a K_dyn of
-    `most` or less, by momentum.
+    K_dyn of the gentlest start falls with the start time: regula falsi with the Illinois rule (M. Dowell,
+    P. Jarratt, BIT 11 (1971) 168-174, doi:10.1007/BF01934364), which halves the value of an end that stays.
+    Also the time before which no start has a K_dyn of `most` or less, by momentum.
     """
     timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
     soonest = _soonest(timed, most)
     low, high, end = 0.0, math.inf, soonest * (1.0 + WITHIN)
-    f_low, f_high, found, near = math.inf, -math.inf, None, None
+    f_low, f_high, found, near, kept = math.inf, -math.inf, None, None, False
     for _ in range(MOST_TRIALS):
         try:
             best = solve(replace(timed, start_time=end), near)
@@ -577,11 +578,13 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
             continue
         near, over = best.profile, share(best) - 1.0
         if over <= 0.0:
-            found, high, f_high = best, end, over
+            f_low *= 0.5 if kept else 1.0
+            found, high, f_high, kept = best, end, over, True
             if over > -WITHIN:
                 break
         else:
-            low, f_low = end, over
+            f_high *= 1.0 if kept or found is None else 0.5
+            low, f_low, kept = end, over, False
         if high - low <= WITHIN * end or (end <= soonest * (1.0 + 2.0 * WITHIN) < end and over <= 0.0):
             break
         if math.isinf(high):
