@@ -50,7 +50,9 @@ ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
-MOST_TRIALS = 24
+NO_SHARE = 1e-9  # of a limit: its logarithm is taken, as a life falls with a power of the torque
+STAYS = 4  # times that one end stays: then the middle is tried
+MOST_TRIALS = 32
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
 TIGHT = 1e-5  # a bound within this share needs no other one
@@ -557,13 +559,14 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
     """The gentlest start of the first start time at which `share` of it is 1 or less.
 
     K_dyn of the gentlest start falls with the start time: regula falsi with the Illinois rule (M. Dowell,
-    P. Jarratt, BIT 11 (1971) 168-174, doi:10.1007/BF01934364), which halves the value of an end that stays.
-    Also the time before which no start has a K_dyn of `most` or less, by momentum.
+    P. Jarratt, BIT 11 (1971) 168-174, doi:10.1007/BF01934364), which halves the value of an end that stays,
+    over the logarithm of the share; where an end stays too long, the middle. Also the time before which no
+    start has a K_dyn of `most` or less, by momentum.
     """
     timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
     soonest = _soonest(timed, most)
     low, high, end = 0.0, math.inf, soonest * (1.0 + WITHIN)
-    f_low, f_high, found, near, kept = math.inf, -math.inf, None, None, False
+    f_low, f_high, found, near, stays = math.inf, -math.inf, None, None, 0
     for _ in range(MOST_TRIALS):
         try:
             best = solve(replace(timed, start_time=end), near)
@@ -576,20 +579,20 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
             low, f_low = max(end, none.verdict.shortest_start_time), math.inf
             end = low * (1.0 + EDGE) if math.isinf(high) else 0.5 * (low + high)
             continue
-        near, over = best.profile, share(best) - 1.0
+        near, over = best.profile, math.log(max(share(best), NO_SHARE))
         if over <= 0.0:
-            f_low *= 0.5 if kept else 1.0
-            found, high, f_high, kept = best, end, over, True
+            f_low *= 0.5 if stays > 0 else 1.0
+            found, high, f_high, stays = best, end, over, max(stays, 0) + 1
             if over > -WITHIN:
                 break
         else:
-            f_high *= 1.0 if kept or found is None else 0.5
-            low, f_low, kept = end, over, False
+            f_high *= 0.5 if stays < 0 and found is not None else 1.0
+            low, f_low, stays = end, over, min(stays, 0) - 1
         if high - low <= WITHIN * end or (end <= soonest * (1.0 + 2.0 * WITHIN) < end and over <= 0.0):
             break
         if math.isinf(high):
             end *= 1.0 + min(max(over, 0.02), 1.0)
-        elif math.isfinite(f_low):
+        elif math.isfinite(f_low) and abs(stays) < STAYS:
             end = low + (high - low) * min(max(f_low / (f_low - f_high), 0.02), 0.98)
         else:
             end = 0.5 * (low + high)
