@@ -25,7 +25,10 @@ program would be wrong beside each contact, and descents stall.
 CasADi hands the program to HiGHS. Of the rows of peaks and of the curve only those that matter are in it: it
 begins with the instants near the peak, thinned, and takes in local maxima that its answer would let through.
 The step is then run exactly; what counts is the merit of that start, its objective with its located peak plus
-penalty times what it misses. The trust region follows how far the program was right. Where the terminal
+penalty times what it misses. A step that would be refused and misses the terminal condition is corrected first,
+by the smallest changes that lead to it: the condition is curved, and long steps along its tangent would all be
+refused (Maratos effect; second-order correction, R. Fletcher, Practical Methods of Optimization, 2nd ed. (1987)
+14.4). The trust region follows how far the program was right. Where the terminal
 condition stays missed, missing it costs ten times as much, and so on.
 
 Knots: even ones and those of the first demand; then intervals beside bends of the torque are halved, a few
@@ -62,6 +65,7 @@ ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of t
 STEPS, INTO = 60, 16
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 MISSED = 1e-5
+CORRECTED = 2  # Newton steps towards the terminal condition, before a step that misses it is refused
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
 TASTE, HOPEFUL = 8, 1.03  # steps from a demand around, and the merit up to which it is followed on
 STRETCH, BUMPS, HEIGHT = 0.15, 10, 0.15  # of time; their number; of the highest torque
@@ -349,6 +353,10 @@ class Descent:
                         self.allowed(found.torques + change), min(found.end + later, self.latest)
                     )
                     gained = -math.inf if tried is None else found.merit - tried.merit
+                    if tried is not None and gained <= ACCEPTED * promised and tried.missed > MISSED:
+                        nearer = self.finished(tried, rounds=CORRECTED)
+                        if nearer is not None and nearer.merit < tried.merit:
+                            tried, gained = nearer, found.merit - nearer.merit
                     if promised < least * found.merit and not (model.squares and trust > NARROW):
                         return tried if tried is not None and gained > 0.0 else found
                     if gained > ACCEPTED * promised:
@@ -362,12 +370,12 @@ class Descent:
             trust = min((2.0 if came > GOOD else 0.5 if came < POOR else 1.0) * trust, MOST_TRUST)
         return found
 
-    def finished(self, found: Found, reserve: float = 1e-8) -> Found | None:
+    def finished(self, found: Found, reserve: float = 1e-8, rounds: int = 8) -> Found | None:
         """The same with the terminal condition met to rounding, by the smallest changes of the torques."""
         from scipy.optimize import lsq_linear
 
         reached = self.problem.terminal == "reached"
-        for _ in range(8):
+        for _ in range(rounds):
             if found.lacking.max() <= (0.0 if reached else 1e-10):
                 return found
             rows, _ = terminal_rows(self, found)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 from softstart.chain.machines import Machine, one_machine
 from softstart.controller import ready_controller_names
@@ -253,7 +252,15 @@ def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
     if shortest is None or shortest[0] > problem.start_time:
         raise _too_short(problem, math.inf if shortest is None else shortest[0])
     end = min(shortest[0] * (1.0 + EDGE), problem.start_time)
-    found = searched(replace(problem, start_time=end), shortest[1])
+    shorter = replace(problem, start_time=end)
+    found = searched(shorter, shortest[1])
+    if found is None or found[1].missed > MISSED:  # not the gentlest of its time then, but a start
+        search = Descent(shorter)
+        search.apart = APART
+        start = search.into(shortest[1], end)
+        start = None if start is None else search.finished(start)
+        if start is not None:
+            found = "", start, TorqueProfile(search.time, start.torques).simplified()
     if found is None or found[1].missed > MISSED:
         raise OptimumError(
             f"No start of {problem.drive.name} within {problem.start_time:.6g} s was found that keeps all "
@@ -485,6 +492,7 @@ def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[floa
     while high - low > SHORTEST * high:
         middle = 0.5 * (low + high)
         search = Descent(replace(timed, start_time=middle))
+        search.apart = APART  # else the knots of all middles add up
         tried = search.into(demand, middle)
         if tried is not None and tried.missed <= MISSED:
             high, demand = middle, TorqueProfile(search.time, tried.torques)
@@ -526,12 +534,12 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
     bound = Limit("K_dyn", "1", "k_dyn", problem.k_dyn)
 
-    def share(best: Optimum) -> float:
-        return best.k_dyn / bound.most
+    def margins(best: Optimum) -> tuple[Margin, ...]:
+        return (Margin(bound, best.k_dyn, ""),)
 
-    best, at_least = _first_that_keeps(problem, share, problem.k_dyn)
+    best, at_least, refused = _first_that_keeps(problem, margins, problem.k_dyn)
     best = replace(best, problem=problem, claimed=best.end_time)
-    kept = _kept(best, Limits(), at_least, (Margin(bound, best.k_dyn, ""),))
+    kept = _kept(best, Limits(), at_least, margins(best), refused)
     return replace(best, kept=kept, seconds=time.perf_counter() - began)
 
 
@@ -546,27 +554,36 @@ def _within_limits(problem: Problem, near: TorqueProfile | None) -> Optimum:
         )
     timeless = replace(limits, start_time=None)
 
-    def share(best: Optimum) -> float:
-        margins = (margin for run in best.runs for margin in Row(run, None, worst_case=()).margins(timeless))
-        return max((1.0 - one.share for one in margins), default=0.0)
+    def margins(best: Optimum) -> tuple[Margin, ...]:
+        return tuple(one for run in best.runs for one in Row(run, None, worst_case=()).margins(timeless))
 
     most = math.inf if limits.shaft_torque is None else limits.shaft_torque / problem.base_torque
-    best, at_least = _first_that_keeps(problem, share, most)
-    return replace(best, kept=_kept(best, limits, at_least), seconds=time.perf_counter() - began)
+    best, at_least, refused = _first_that_keeps(problem, margins, most)
+    kept = _kept(best, limits, at_least, refused=refused)
+    return replace(best, kept=kept, seconds=time.perf_counter() - began)
 
 
-def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimum, float]:
-    """The gentlest start of the first start time at which `share` of it is 1 or less.
+def _first_that_keeps(
+    problem: Problem, margins: Callable[[Optimum], tuple[Margin, ...]], most: float
+) -> tuple[Optimum, float, Margin | None]:
+    """The first start that keeps its limits, among the gentlest of each start time.
 
     K_dyn of the gentlest start falls with the start time: regula falsi with the Illinois rule (M. Dowell,
     P. Jarratt, BIT 11 (1971) 168-174, doi:10.1007/BF01934364), which halves the value of an end that stays,
-    over the logarithm of the share; where an end stays too long, the middle. Also the time before which no
-    start has a K_dyn of `most` or less, by momentum.
+    over the logarithm of the share of the limit; where an end stays too long, the middle. A life may be kept
+    by a start that is not the gentlest: then the one that keeps it is followed to shorter times.
+
+    Also the time before which no start has a K_dyn of `most` or less, by momentum, and by what the next
+    quicker start exceeds its limits; None if there is no such start.
     """
+
+    def share_left(best: Optimum) -> tuple[float, Margin | None]:
+        return min(((one.share, one) for one in margins(best)), key=lambda pair: pair[0], default=(1.0, None))
+
     timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
     soonest = _soonest(timed, most)
     low, high, end = 0.0, math.inf, soonest * (1.0 + WITHIN)
-    f_low, f_high, found, near, stays = math.inf, -math.inf, None, None, 0
+    f_low, f_high, found, near, stays, refused = math.inf, -math.inf, None, None, 0, None
     for _ in range(MOST_TRIALS):
         try:
             best = solve(replace(timed, start_time=end), near)
@@ -576,10 +593,15 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
         except InfeasibleError as none:
             if math.isinf(none.verdict.shortest_start_time):
                 raise
-            low, f_low = max(end, none.verdict.shortest_start_time), math.inf
+            low, f_low, refused = max(end, none.verdict.shortest_start_time), math.inf, None
             end = low * (1.0 + EDGE) if math.isinf(high) else 0.5 * (low + high)
             continue
-        near, over = best.profile, math.log(max(share(best), NO_SHARE))
+        left, tight = share_left(best)
+        if found is not None and left < 0.0 and tight is not None and tight.of.figure == "used_life":
+            other = _followed(best.problem, found.profile, end / found.end_time, time.perf_counter())
+            best = best if other is None else max(best, other, key=lambda one: share_left(one)[0])
+            left, tight = share_left(best)
+        near, over = best.profile, math.log(max(1.0 - left, NO_SHARE))
         if over <= 0.0:
             f_low *= 0.5 if stays > 0 else 1.0
             found, high, f_high, stays = best, end, over, max(stays, 0) + 1
@@ -587,7 +609,7 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
                 break
         else:
             f_high *= 0.5 if stays < 0 and found is not None else 1.0
-            low, f_low, stays = end, over, min(stays, 0) - 1
+            low, f_low, stays, refused = end, over, min(stays, 0) - 1, tight
         if high - low <= WITHIN * end or (end <= soonest * (1.0 + 2.0 * WITHIN) < end and over <= 0.0):
             break
         if math.isinf(high):
@@ -600,7 +622,7 @@ def _first_that_keeps(problem: Problem, share: Any, most: float) -> tuple[Optimu
         name = problem.drive.name
         sentence = f"limits: no start of {name} that keeps them was found up to {end:.4g} s."
         raise InfeasibleError(Verdict(problem, math.inf, sentence))
-    return found, soonest
+    return found, soonest, refused
 
 
 def _soonest(problem: Problem, most: float) -> float:
@@ -627,13 +649,19 @@ def _soonest(problem: Problem, most: float) -> float:
     return high
 
 
-def _kept(best: Optimum, limits: Limits, at_least: float, more: tuple[Margin, ...] = ()) -> Kept:
+def _kept(
+    best: Optimum,
+    limits: Limits,
+    at_least: float,
+    more: tuple[Margin, ...] = (),
+    refused: Margin | None = None,
+) -> Kept:
     margins = (*Row(best.run, None, worst_case=()).margins(limits), *more)
     covers = (
         "every torque within the limits of the motor, by whatever controller, however often the gap closes"
     )
     unchecked = unchecked_life(best.problem.drive) if limits.shaft_torque or limits.life else ""
-    return Kept(margins, at_least, covers, unchecked)
+    return Kept(margins, at_least, covers, unchecked, refused)
 
 
 # several machines ------------------------------------------------------------------------------------------

@@ -64,19 +64,27 @@ class Kept:
         For which starts that is proved.
     unchecked : str
         Why the life that is asked for was left out; "" if it was not.
+    refused : Margin or None
+        What the next quicker start that was found exceeds most; None if there is none.
     """
 
     margins: tuple[Margin, ...]
     at_least: float
     covers: str
     unchecked: str
+    refused: Margin | None = None
+
+    @property
+    def tight(self) -> Margin | None:
+        """A limit of which nothing is left; None where there is none."""
+        used = [one for one in self.margins if one.name != "start time" and one.share < BINDING]
+        return min(used, key=lambda one: one.share, default=None)
 
     @property
     def binding(self) -> str:
         """The limit that forbids a quicker start; "" where it is the motor torque that does."""
-        used = [one for one in self.margins if one.name != "start time"]
-        tight = min(used, key=lambda one: one.share, default=None)
-        return tight.name if tight is not None and tight.share < BINDING else ""
+        one = self.tight or self.refused
+        return "" if one is None else one.name
 
     @property
     def kept(self) -> bool:
@@ -91,6 +99,7 @@ class Kept:
             "start_time_at_least": self.at_least,
             "start_time_covers": self.covers,
             "unchecked": self.unchecked,
+            "refused": None if self.refused is None else self.refused.summary(),
             "margins": [one.summary() for one in self.margins],
         }
 

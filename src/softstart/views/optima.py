@@ -127,8 +127,9 @@ def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
         none = "" if kept.kept else "No start keeps all limits. "
         text = f"{none}{least}: {best.end_time:.4g} s. {_capital('; '.join(map(str, kept.margins)))}."
     forbids = f"The {what} forbids" if what else "No limit but the motor torque forbids"
+    by = "" if kept.tight or kept.refused is None else f" (the next one found: {kept.refused})"
     less = 100.0 * (1.0 - kept.at_least / best.end_time)
-    text += f" {forbids} a quicker start. None takes less than {kept.at_least:.6g} s ({less:.2g} % less)."
+    text += f" {forbids} a quicker start{by}. None takes less than {kept.at_least:.6g} s ({less:.2g} % less)."
 
     def keeps(run: Run) -> bool:
         if not limits:

@@ -493,9 +493,12 @@ def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
     assert best.kept is not None
     used = {one.name: one.value for one in best.kept.margins}
     assert best.kept.binding == "used life"
-    assert used["used life"] == pytest.approx(100.0, rel=1e-3)
     assert used["used life"] <= 100.0
     assert used["shaft torque"] < 170.0
+    assert best.end_time < 0.2011  # the gentlest starts keep it from 0.20129 s on
+    assert best.kept.refused is not None
+    assert best.kept.refused.name == "used life"
+    assert not best.kept.refused.kept
 
 
 @SLOW
