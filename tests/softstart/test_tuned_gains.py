@@ -12,6 +12,7 @@ from softstart.controller.tuned import (
     RobustFile,
     ScheduleFile,
     read_gain_file,
+    read_gains,
     robust_text,
     schedule_csv,
     schedule_text,
@@ -46,6 +47,12 @@ def test_a_schedule_is_read_back_to_the_bit(tmp_path, ending):
     assert [(name, gain.scale, gain.values.tolist()) for name, gain in read.gains.items()] == [
         (name, gain.scale, gain.values.tolist()) for name, gain in SAVED.gains.items()
     ]
+
+
+def test_a_robust_set_is_read_back_to_the_bit(tmp_path):
+    gains = {"time": 1.0 / 3.0, "initial": 0.1 + 0.2}
+    saved = RobustFile("ramp", gains, CRANE.replace(damping=0.1, torque_lag="2 ms"))
+    assert read_gains(robust_text(saved, {"worst": 1.0}), tmp_path / "x.toml") == saved
 
 
 # interpolation --------------------------------------------------------------------------------------------
