@@ -12,7 +12,7 @@ from tests.softstart.balancing.engines import RPM, engine
 from softstart.balancing import BalancerShaft, Counterweights, Engine, balance
 from softstart.balancing.design import arm, free_force, two_shafts
 from softstart.balancing.engine import ORDERS, TURNS, force_at, largest, shaking_of_shafts
-from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
+from softstart.balancing.slider_crank import inertia_torque_harmonics
 from softstart.errors import InputError
 
 VAZ = Engine.load("vaz-11113")
@@ -158,30 +158,6 @@ def test_a_four_cylinder_engine_has_nothing_for_two_shafts_at_crank_speed():
     with pytest.raises(InputError, match="gives the gas torque; add one"):
         replace(made, gas=None).torque(PHI, 300.0)
     assert free_force(made) == 0.0
-
-
-def second_order_shafts(made, upper, lower):
-    """Two shafts at twice the crank speed in opposite senses, as of Lanchester and Mitsubishi."""
-    A2 = acceleration_harmonics(made.cylinders.crank.ratio, 2)[2]
-    whole = 4.0 * made.masses.reciprocating * made.cylinders.crank.r * A2
-    return [
-        BalancerShaft(whole / 8.0, 2, math.pi, height=upper, offset=0.1),
-        BalancerShaft(whole / 8.0, -2, math.pi, height=lower, offset=-0.1),
-    ]
-
-
-def test_shafts_at_two_heights_balance_the_second_order_torque_at_a_speed():
-    # Mitsubishi: one shaft above the other; the sine of the second order at one speed, the force at all
-    bare = engine((1, 3, 4, 2))
-    w = 3000.0 * RPM
-    unit = (shaking_of_shafts(second_order_shafts(bare, 0.5, -0.5))[2][4] * w**2).imag
-    torque = bare.torque_harmonics(w)[4].imag
-    distance = torque / unit
-    made = engine((1, 3, 4, 2), shafts=second_order_shafts(bare, 0.5 * distance, -0.5 * distance))
-    force, _, moment = shaking_of_shafts(made.shafts)
-    left = -made.torque_harmonics(w)[4] + w**2 * moment[4]
-    assert left.imag == pytest.approx(0.0, abs=1e-10 * abs(torque))
-    assert largest(made.crank_shaking[0] + force)[2] < 1e-15
 
 
 def test_speed_fluctuation_by_the_energy():

@@ -67,7 +67,7 @@ def test_drawn_clutches(clutch):
 
 
 @pytest.mark.parametrize(
-    ("given", "seen"),
+    ("given", "seen", "times"),
     [
         (  # T rises barely above what the clutch can hold: slip of 1.3 s begins in a graze
             {
@@ -77,7 +77,7 @@ def test_drawn_clutches(clutch):
                 "engagement_time": 0.5487575604877146, "damping": 0.012479462449332927,
                 "gap": 13.448804748870037, "load_kind": "reactive", "law": "quadratic-concave",
             },
-            "slips again",
+            "slips again", 1,
         ),
         (  # synchronous while the clutch can hold less than the shaft pulls, in the other direction
             {
@@ -87,7 +87,7 @@ def test_drawn_clutches(clutch):
                 "gap": 0.1725945342311675, "law": "table", "law_times": [0.0, 0.5, 1.0, 1.5],
                 "law_torques": [77.87308289113429, 15.297497799825784, 0.0, 77.87308289113429],
             },
-            "overrun",
+            "overrun", 1,
         ),
         (  # a damped impact tears a standing load off at once
             {
@@ -95,55 +95,46 @@ def test_drawn_clutches(clutch):
                 "stiffness": 40.0, "drive_speed": 50.0, "engagement_time": 0.5, "damping": 4.0, "gap": 2.0,
                 "load_kind": "reactive",
             },
-            "load moves",
+            "load moves", 1,
+        ),
+        (  # friction falls 3700 N m/s to zero: rounding of the instant is worth more than the torque's own
+            {
+                "clutch_inertia": 0.12, "load_inertia": 5.85, "clutch_torque": 221.0, "load_torque": 45.0,
+                "stiffness": 0.352, "damping": 0.138, "drive_speed": 0.43, "engagement_time": 0.294,
+                "load_kind": "reactive", "law": "table", "law_times": [0, 0.0587, 0.1175, 0.1762, 0.235],
+                "law_torques": [0, 221.0, 221.0, 0, 221.0],
+            },
+            "slips again", 1,
         ),
     ],
 )  # fmt: skip
-def test_where_an_integrator_needs_short_steps(given, seen):
+def test_where_an_integrator_needs_short_steps(given, seen, times):
     """Where the two once differed the integrator had stepped over an event; with short steps it agrees."""
     run = engage(Clutch(**given))
-    assert seen in [event.name for event in run.events]
+    assert [event.name for event in run.events].count(seen) == times
     other = integrate(Clutch(**given), run.end_time, finest=0.06)
     assert run.friction_work == pytest.approx(other.work, rel=1e-10)
     assert run.peak_torque == pytest.approx(other.peak, rel=1e-10)
     assert run.slip_time == pytest.approx(other.slip_time, rel=1e-10, nan_ok=True)
 
 
-BASE = {
-    "clutch_inertia": 0.2, "load_inertia": 1.0, "clutch_torque": 100.0, "load_torque": 30.0,
-    "stiffness": 80.0, "drive_speed": 60.0, "engagement_time": 0.4,
-}  # fmt: skip
-
-
-def dipping(low, load_torque, **more):
-    """Engaged, then let go for a while, then engaged again: the locked clutch slips again."""
-    base = Clutch(**{**BASE, "load_torque": load_torque, **more})
-    start = engage(base).slip_time
-    times = [0.0, 0.4, start + 0.1, start + 0.3, start + 0.9, start + 1.1]
-    return base.with_table(times, [0.0, 100.0, 100.0, low, low, 100.0]), start
-
-
 @pytest.mark.parametrize("kind", ["active", "reactive"])
 @pytest.mark.parametrize("gap", [0.0, 0.5])
 def test_a_clutch_let_go_slips_again_and_locks_again(kind, gap):
-    clutch, start = dipping(10.0, 30.0, load_kind=kind, gap=gap, damping=0.5)
-    run = engage(clutch, until=start + 4.0)
+    clutch = Clutch(
+        clutch_inertia=0.2, load_inertia=1.0, clutch_torque=100.0, load_torque=30.0, stiffness=80.0,
+        drive_speed=60.0, engagement_time=0.4, load_kind=kind, gap=gap, damping=0.5,
+    )  # fmt: skip
+    start = engage(clutch).slip_time
+    times = [0.0, 0.4, start + 0.1, start + 0.3, start + 0.9, start + 1.1]
+    run = engage(clutch.with_table(times, [0.0, 100.0, 100.0, 10.0, 10.0, 100.0]), until=start + 4.0)
     assert [phase.kind for phase in run.phases][:3] == ["slip", "locked", "slip"]
-    other = integrate(clutch, start + 4.0)
+    assert all(phase.friction_work >= 0.0 for phase in run.phases)
+    other = integrate(run.clutch, start + 4.0)
     assert other.reslips >= 1
     assert run.friction_work == pytest.approx(other.work, rel=1e-8)
     assert run.peak_torque == pytest.approx(other.peak, rel=1e-8)
     assert run.energy.residual < 1e-12
-
-
-def test_a_swinging_load_drives_the_clutch_side_past_the_driving_side():
-    clutch, start = dipping(3.0, 0.0)
-    run = engage(clutch, until=start + 3.0)
-    faster = run.at(run.t)["wM"].max()
-    assert faster > 60.0 * (1.0 + 1e-3)  # slip in the other direction
-    other = integrate(clutch, start + 3.0)
-    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
-    assert all(phase.friction_work >= 0.0 for phase in run.phases)
 
 
 def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():
@@ -153,19 +144,6 @@ def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():
     assert len(again) >= 5
     assert all(later < earlier for earlier, later in pairwise(again))
     assert run.locked_peak_torque <= clutch.clutch_torque * (1.0 + 1e-12) or run.peak_time < run.slip_time
-
-
-def test_a_clutch_let_go_to_nothing_slips_at_once_and_only_once():
-    # friction falls 3700 N m/s to zero: rounding of the instant is worth more than the torque's own
-    clutch = Clutch(
-        clutch_inertia=0.12, load_inertia=5.85, clutch_torque=221.0, load_torque=45.0, stiffness=0.352,
-        damping=0.138, drive_speed=0.43, engagement_time=0.294, load_kind="reactive",
-        law="table", law_times=[0, 0.0587, 0.1175, 0.1762, 0.235], law_torques=[0, 221.0, 221.0, 0, 221.0],
-    )  # fmt: skip
-    run = engage(clutch, until=1.0)
-    other = integrate(clutch, 1.0)
-    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
-    assert sum(event.name == "slips again" for event in run.events) == 1
 
 
 def test_a_damped_impact_makes_a_locked_clutch_slip_at_once():
