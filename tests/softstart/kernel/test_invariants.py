@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.softstart.kernel.pieces import Pieces, TwoSteps
+from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_against_oracle import case, case_with_friction, run_of
 
 from softstart import Drive, simulate
@@ -108,7 +108,7 @@ def test_the_instants_of_asking_change_nothing(make: Any, seed: int) -> None:
 def test_time_shift(wait: float, torque: float, damping: float, lag: float) -> None:
     """A reactive load waits without moving: the same start later is the same start."""
     drive = Drive.load("crane-4amtkf").replace(load_kind="reactive", damping=damping, torque_lag=lag)
-    now = simulate(drive, TwoSteps(first=torque, switch=0.05, second=62.0))
+    now = simulate(drive, Pieces(pieces=((0.0, torque), (0.05, 62.0))))
     later = simulate(drive, Pieces(pieces=((wait, torque), (wait + 0.05, 62.0))), time_limit=200.0)
     assert later.k_dyn == pytest.approx(now.k_dyn, rel=1e-9)
     assert later.start_time == pytest.approx(now.start_time + wait, rel=1e-10)
