@@ -21,8 +21,7 @@ from tests.oracle import integrate
 from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_against_oracle import run_of
 
-from softstart import Drive, InputError, Run, SimulationError, Status, TorqueProfile, records, simulate
-from softstart_controllers.profile import Profile
+from softstart import InputError, Run, SimulationError, Status, simulate
 
 PATIENCE = 2.0  # s for the oracle
 SAME = 1e-7  # of peaks and final states
@@ -42,7 +41,10 @@ def extreme(number: int) -> dict[str, Any]:
     c = Omega**2 / (1.0 / J1 + 1.0 / J2)
     Ms, speed, t_end = c * twist, Omega * twist, period * float(rng.uniform(2.0, 12.0))
     gap, Mc = twist * decades(1e-6, 1e5, 0.95), Ms * decades(1e-5, 0.95, 0.9)
-    theta0 = gap * float(rng.choice([-0.5, 0.0, 0.5, rng.uniform(-0.5, 0.5)]))
+    lag, rate = period * decades(1e-8, 1e4, 0.6), Ms / period * decades(1e-3, 1e6, 0.5, math.inf)
+    # at rest on a flank, under a torque that begins at zero, rounding chooses the instant of contact
+    flank = 0.5 if lag == 0.0 and math.isinf(rate) else 0.4
+    theta0 = gap * float(rng.choice([-flank, 0.0, flank, rng.uniform(-0.5, 0.5)]))
     if rng.random() < 0.2:
         theta0 = float(rng.choice([-1, 1])) * (0.5 * gap + twist * float(rng.uniform(0.0, 2.0)))
     release = float(rng.choice([*[0.0] * 8, math.inf, t_end * rng.uniform(0.02, 0.6)]))
@@ -57,8 +59,7 @@ def extreme(number: int) -> dict[str, Any]:
         "law": str(rng.choice(["no-pull", "dead-zone", "modelica"])) if gap > 0.0 else "dead-zone",
         "w1_0": 0.0 if release else w1, "w2_0": w2, "release": release,
         "torque_pieces": list(zip(knots, levels.tolist(), slopes.tolist(), strict=True)),
-        "lag": period * decades(1e-8, 1e4, 0.6),
-        "rate": Ms / period * decades(1e-3, 1e6, 0.5, math.inf),
+        "lag": lag, "rate": rate,
         "target": max(speed * decades(1e-3, 10.0), w2 + 1e-3 * abs(w2) + 1e-12 * speed),
     }  # fmt: skip
 
@@ -159,30 +160,3 @@ def test_extreme_drives(first: int, pytestconfig: pytest.Config) -> None:
     found = {number: judged(number) for number in range(first, first + count)}
     assert not {number: wrong for number, (_, wrong) in found.items() if wrong}
     assert sum(how == "oracle" for how, _ in found.values()) >= 0.8 * len(found)
-
-
-@pytest.mark.parametrize("size", [6, pytest.param(100, marks=pytest.mark.slow)])
-def test_events_are_located_where_rates_lie_decades_apart(size: int, pytestconfig: pytest.Config) -> None:
-    """Each start of drives with rates decades apart, behind lags of any length, comes to its end."""
-    rng = np.random.default_rng([0, 77])
-    size *= pytestconfig.getoption("size")
-
-    def decades(low: float, high: float) -> np.ndarray:
-        return 10.0 ** rng.uniform(math.log10(low), math.log10(high), size)
-
-    profile = TorqueProfile([0.0, 0.15, 0.15, 0.3, 0.3], [40.0, 40.0, 15.0, 15.0, -25.0])
-    for law in ("no-pull", "dead-zone", "modelica"):
-        for kind in ("active", "reactive"):
-            gap = decades(1e-3, 10.0)
-            lag = np.where(rng.random(size) < 0.5, decades(1e-42, 1e-3), decades(1e-3, 10.0))
-            J1, J2, c = decades(1e-3, 0.1), decades(0.01, 1.0), decades(1e2, 1e4)
-            critical = 2.0 * np.sqrt(c / (1.0 / J1 + 1.0 / J2))
-            drives = records(
-                Drive.load("crane-4amtkf").replace(load_kind=kind, contact_law=law, minimum_torque=-64.0),
-                motor_inertia=J1, load_inertia=J2, stiffness=c, gap=gap, torque_lag=lag,
-                damping=critical * decades(1e-3, 1e4), load_torque=decades(1e-3, 20.0),
-                start_position=gap * rng.uniform(-0.5, 0.5, size),
-            )  # fmt: skip
-            batch = simulate(drives, Profile(profile=profile), 0.6)
-            assert set(batch.status.values.tolist()) <= {"REACHED", "STOPPED_EARLY"}
-            assert np.all(np.isfinite(batch.peak_torque.values))

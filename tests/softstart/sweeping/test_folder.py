@@ -119,7 +119,6 @@ def replaced(make):
         ("k_dyn/c/0/0", lambda path: shutil.rmtree(path.parent)),
         ("status/c/0/0", Path.unlink),
         ("status/c/0/0", replaced(os.mkfifo)),
-        ("status/c/0/0", replaced(Path.mkdir)),
         ("status/c/0/0", replaced(lambda path: path.symlink_to(path.name))),
     ],
 )
@@ -203,18 +202,3 @@ def test_a_controller_from_a_file_that_changed_is_another_one(tmp_path):
     (tmp_path / "mine.py").write_text(lines.replace("31.0", "32.0"))
     with pytest.raises(InputError, match="another controller"):
         sweep(CRANE, name, {"gap": [0.5, 2.0]}, to=tmp_path / "a")
-
-
-def test_netcdf_is_the_same(tmp_path):
-    grid = {"sample": {"gap": [0.5, 1.0, 2.0], "damping": [0, 1, 2]}, "controller": ["ramp", "direct"]}
-    results = sweep(CRANE, None, grid, to=tmp_path / "a", workers=1, chunk=2)
-    results.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
-    with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as read:
-        assert set(read.coords) == {"sample", "controller", "gap", "damping"} == set(results.coords)
-        for name in results.data_vars:
-            np.testing.assert_array_equal(read[name], results[name])
-            assert read[name].dtype == results[name].dtype
-            assert read[name].attrs["long_name"] == results[name].attrs["long_name"]
-        assert read.controller.values.tolist() == ["ramp", "direct"]
-        assert read.status.attrs["flag_values"].tolist() == results.status.attrs["flag_values"]
-        assert read.gap.attrs["units"] == "rad"
