@@ -118,31 +118,17 @@ def played(
     return K, found.start_time.values / np.array([rigid_time(chain) for chain in chains])
 
 
-def without(name: str) -> Controller:
-    """`take-up` without one of its parts."""
-    own = make_controller("take-up").fitted(NOMINAL.design_drive).parameters
-    changes = {
-        "damping by the load's speed": {"damping_ratio": 0.0},
-        "damping by T'": {"rate_damping_ratio": 0.0},
-        "both dampings": {"damping_ratio": 0.0, "rate_damping_ratio": 0.0},
-        "slowing before a falling load": {"slowing": 0.0},
-        "telling the load from a light part": {"contact_share": 0.2 * own["contact_share"]},
-        "low speed (the speed 3 times)": {"take_up_speed": 3.0 * own["take_up_speed"]},
-        "stiff speed loop (a quarter)": {"speed_gain": 0.25 * own["speed_gain"]},
-    }
-    return make_controller("take-up", changes.get(name, {}))
-
-
-PARTS = (
-    "nothing",
-    "damping by the load's speed",
-    "damping by T'",
-    "both dampings",
-    "slowing before a falling load",
-    "telling the load from a light part",
-    "low speed (the speed 3 times)",
-    "stiff speed loop (a quarter)",
-)
+OWN = make_controller("take-up").fitted(NOMINAL.design_drive).parameters
+PARTS: dict[str, dict[str, float]] = {  # `take-up` without one of them
+    "nothing": {},
+    "damping by the load's speed": {"damping_ratio": 0.0},
+    "damping by T'": {"rate_damping_ratio": 0.0},
+    "both dampings": {"damping_ratio": 0.0, "rate_damping_ratio": 0.0},
+    "slowing before a falling load": {"slowing": 0.0},
+    "telling the load from a light part": {"contact_share": 0.2 * OWN["contact_share"]},
+    "low speed (the speed 3 times)": {"take_up_speed": 3.0 * OWN["take_up_speed"]},
+    "stiff speed loop (a quarter)": {"speed_gain": 0.25 * OWN["speed_gain"]},
+}
 STRATEGIES = ("take-up", "current-limit-feedback", "pulse-coast-hold", "state-feedback", "s-curve")
 
 
@@ -171,8 +157,7 @@ IDLE = 0.05  # of Ms
 
 def at_speeds(cells: Sequence[Chain], shares: Iterable[float]) -> Any:
     """K_dyn of each start (columns) at shares of the take-up speed (rows), all else as it is."""
-    own = make_controller("take-up").fitted(NOMINAL.design_drive).parameters
-    speed, impulse = own["take_up_speed"], own["contact_share"] * own["take_up_speed"]
+    speed, impulse = OWN["take_up_speed"], OWN["contact_share"] * OWN["take_up_speed"]
     made = [{"take_up_speed": x * speed, "contact_share": impulse / (x * speed)} for x in shares]
     return np.array([played(cells, make_controller("take-up", one), NOMINAL)[0] for one in made])
 
@@ -323,11 +308,9 @@ def main() -> None:
     """Print the tables."""
     groups = crane_cells(3, 8)
     if "--aims" in sys.argv:
-        aims()
-        return
+        return aims()
     if "--optima" in sys.argv:
-        optima(groups)
-        return
+        return optima(groups)
     rows = []
     for group, cells in groups.items():
         found = [played(cells, name, NOMINAL) for name in STRATEGIES]
@@ -336,8 +319,9 @@ def main() -> None:
     K, time = played([NOMINAL], "take-up", NOMINAL)
     print(f"nominal: K_dyn {K[0]:.3f} in {time[0] * rigid_time(NOMINAL):.3f} s\n")
     rows = []
-    for part in PARTS:
-        worth = [played(cells, without(part), NOMINAL)[0] for cells in groups.values()]
+    for part, changes in PARTS.items():
+        other = make_controller("take-up", changes)
+        worth = [played(cells, other, NOMINAL)[0] for cells in groups.values()]
         rows.append([part, *(f"{K.mean():.2f}, {K.max():.2f}" for K in worth)])
     table(["without", *groups], rows)
     limits(groups)

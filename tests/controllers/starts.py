@@ -31,18 +31,14 @@ def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
     Omega = 2 * math.pi * frequency
     c = Omega**2 * J1 * J2 / (J1 + J2)
     given: dict[str, Any] = {
-        "motor_inertia": J1,
-        "load_inertia": J2,
-        "starting_torque": Ms,
-        "load_torque": Mc,
+        "motor_inertia": J1, "load_inertia": J2, "starting_torque": Ms, "load_torque": Mc, "stiffness": c,
         "load_kind": rng.choice(["active", "reactive"]).item(),
-        "stiffness": c,
         "damping": 2 * rng.choice([0, 0, 0.02, 0.3]) * c / Omega,
         "gap": Ms / c * rng.choice([0, 10 ** rng.uniform(-2, 1)]),
         "torque_lag": rng.choice([0, 0, 0.02, 0.2]) / frequency,
         "encoder_lines": rng.choice([0, 1024, 4096, 32768]).item(),
         "target_speed": (Ms - Mc) / (J1 + J2) * 10 ** rng.uniform(0.3, 1.7) / frequency,
-    }
+    }  # fmt: skip
     given["start_position"] = given["gap"] * rng.choice([0, -0.5, rng.uniform(-0.5, 0.5)])
     return Drive(**(given | fixed))
 

@@ -97,10 +97,9 @@ def test_contact_not_seen_ends_with_patience() -> None:
 
 def test_follows_wear_where_a_fixed_time_fails() -> None:
     """[G]: the contact of a gap four times as wide is seen as well, set up for the new drive."""
-    worn = CRANE.replace(gap=2.0)
-    run = simulate(worn, AccelerationDelay(), fitted_to=CRANE)
-    fitted = AccelerationDelay().fitted(CRANE)
-    assert raised_at(run) - run.first_contact == pytest.approx(fitted.delay, abs=0.003)
+    run = simulate(CRANE.replace(gap=2.0), AccelerationDelay(), fitted_to=CRANE)
+    delay = AccelerationDelay().fitted(CRANE).delay
+    assert raised_at(run) - run.first_contact == pytest.approx(delay, abs=0.003)
 
 
 def test_first_contact_is_that_of_method_2_and_the_second_is_not() -> None:

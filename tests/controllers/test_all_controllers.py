@@ -34,9 +34,8 @@ def test_defaults_are_numbers_and_a_twin_in_plain_python_gives_the_same_bits(nam
         values = controller.fitted(drive).parameters
         assert all(isinstance(values.pop(text), str) for text in texts)
         assert all(isinstance(value, float) and math.isfinite(value) for value in values.values()), values
-        one, two = (
-            simulate(drive, played).recorded for played in (controller, twin.plain(controller, drive))
-        )
+        both = controller, twin.plain(controller, drive)
+        one, two = (simulate(drive, played).recorded for played in both)
         assert all(np.array_equal(one.notes[name], two.notes[name], equal_nan=True) for name in NOTES.names)
         assert np.array_equal(one.states, two.states)
         assert np.array_equal(one.events, two.events)
@@ -99,7 +98,7 @@ def test_odd_starts_come_to_their_end(name: str, given: dict[str, str], harder: 
         assert run.k_dyn < harder * direct.k_dyn, (changes, kind)
 
 
-@pytest.mark.parametrize("name", ["current-limit-feedback", "shaped", "state-feedback"])
+@pytest.mark.parametrize("name", ["current-limit-feedback", "shaped", "state-feedback", "pulse-coast-hold"])
 def test_gives_up_waiting(name: str) -> None:
     run = simulate(CRANE, name, parameters={"certainty": 1e6, "patience": 0.3})
     assert float(run.at(0.29)["u"]) < 40.0
@@ -124,9 +123,10 @@ def test_asks_at_whole_sample_periods_only(name: str) -> None:
         ("pulse-coast-hold", {"certainty": math.nan}),
         ("take-up", {"slowing": -1.0}),
         ("state-feedback", {"torque_weight": 0.0}),
+        ("shaped", {"shaper": "ei"}),
     ],
 )
-def test_refuses_impossible_parameters_in_one_sentence(name: str, wrong: dict[str, float]) -> None:
+def test_refuses_impossible_parameters_in_one_sentence(name: str, wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError) as caught:
         make_controller(name, wrong)
     (key,) = wrong

@@ -14,16 +14,14 @@ from hypothesis import strategies as st
 from tests.controllers.pulse_reference import FreeMotor, Shaft, way_lost
 from tests.controllers.starts import CRANE, CRANES, index, random_drive, traced
 
-from softstart import Drive, records, simulate
+from softstart import Drive, TorqueProfile, records, simulate
 from softstart.controller import CompiledController
 from softstart.kernel.records import size
 from softstart_controllers import contact, current_limit_feedback, shaped, state_feedback
 from softstart_controllers import shaft_filter as sf
-from softstart_controllers.contact import (
-    deviation,
-    time_since_contact,
-)
+from softstart_controllers.contact import deviation, time_since_contact
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
+from softstart_controllers.profile import Profile
 from softstart_controllers.shaped import Shaped
 from softstart_controllers.state_feedback import StateFeedback
 
@@ -79,10 +77,8 @@ def test_filter_of_the_shaft_is_the_extended_kalman_filter(d: float) -> None:
         sf.shaft_update(x, angle, 1.2e-8, 0.0, 1e3)
         other.update(angle, 1.2e-8)
     assert row[:5] == pytest.approx(other.x, rel=2e-5)
-    P = x.P
     deviations = np.sqrt(np.diag(other.P))
-    assert np.abs(P - other.P).max() < 1e12  # finite
-    assert np.abs((P - other.P) / np.outer(deviations, deviations)).max() < 2e-3
+    assert np.abs((x.P - other.P) / np.outer(deviations, deviations)).max() < 2e-3
 
 
 @given(st.floats(1e-4, 6e-3), st.floats(2.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
@@ -142,14 +138,7 @@ def test_rounding_alone_is_never_a_contact(controller: type[CompiledController])
 
 
 @pytest.mark.parametrize("controller", [one for one, _ in LANDING])
-@pytest.mark.parametrize(
-    ("name", "lag"),
-    [
-        ("conveyor-11kw", 0.005),
-        ("crane-4amtkf", 0.0),
-        ("crane-4amtkf-light-worn", 0.0),
-    ],
-)
+@pytest.mark.parametrize(("name", "lag"), [("conveyor-11kw", 0.005), ("crane-4amtkf-light-worn", 0.0)])
 def test_the_computing_delay_is_counted(controller: type[CompiledController], name: str, lag: float) -> None:
     """K_dyn over that without delay: at most 0.035, 0.069 for steps that are planned once (shaped)."""
     drive = Drive.load(name).replace(start_position="mid-gap", torque_lag=lag)
@@ -162,9 +151,6 @@ def test_the_computing_delay_is_counted(controller: type[CompiledController], na
 @settings(max_examples=20, deadline=None)
 def test_looks_ahead_by_dead_time_and_lag(dead: float, lag: float, seed: int) -> None:
     """In contact, under drawn demands, against the plant: twist, speeds, motor torque at the end."""
-    from softstart.profile import TorqueProfile
-    from softstart_controllers.profile import Profile
-
     h = 0.001
     demands = np.random.default_rng(seed).uniform(20.0, 60.0, 12)
     knots = h * np.arange(13)

@@ -10,13 +10,11 @@ import control
 import numpy as np
 import pytest
 from tests.controllers.several_gaps import (
-    CRANE,
     NOMINAL,
     crane_cells,
     played,
     random_chains,
     rigid_time,
-    seen,
 )
 
 from softstart import Drive, compare, simulate
@@ -97,18 +95,6 @@ def test_other_chains():
     assert np.isfinite(ours).all()
     assert ours[:, 0].mean() < 0.7 * curve[:, 0].mean()
     assert ours[:, 0].max() < 0.8 * curve[:, 0].max()
-
-
-def test_compare_recommends_it_on_a_chain():
-    """By the same rule as on a drive: the simplest that keeps the limit, wide gaps and light load too."""
-    chain = seen(CRANE)
-    first = chain.shafts[0].replace(permissible_torque=1.6 * chain.mean_torque)
-    limited = replace(chain, shafts=(first, *chain.shafts[1:]))
-    names = ["direct", "ramp", "s-curve", "pulse-coast-hold", "current-limit-feedback", "take-up"]
-    found = compare(limited, names).recommendation
-    assert found.recommended is not None
-    assert found.recommended.name == "take-up"
-    assert "take-up" in {row.name for row in compare(chain, names).recommendation.best}
 
 
 @pytest.mark.parametrize("steps", [-360, -200, 60])

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.page.conftest import INSTRUMENT, SOFTSTART, comes_to, settled
+from tests.page.conftest import INSTRUMENT, SOFTSTART, comes_to
 
 from softstart import Chain, DataSheet, Drive, simulate
-from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
 SHEET = {
@@ -123,31 +122,8 @@ def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
         assert float(height) == pytest.approx(841.9, abs=1.0)
 
 
-def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path: Path) -> None:
-    drive = CRANE.replace(load_kind="reactive", gap=0.08, damping=0.3)
-    log = made_up_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
-    log.to_csv(tmp_path / "rig.csv")
-    page.get_by_role("tab", name="Files", exact=True).click()
-    guess = drive.replace(gap=0.1, start_position="mid-gap")
-    put(page, "guess.toml", guess.to_toml().encode())
-    page.get_by_text("is loaded").first.wait_for()
-    page.get_by_role("tab", name="Log", exact=True).click()
-    upload = page.locator('[data-testid="log-upload"] input[type="file"]')
-    upload.set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
-    page.get_by_test_id("log-trouble").get_by_text("there are the columns a, b").wait_for()
-    content = (tmp_path / "rig.csv").read_bytes()
-    upload.set_input_files({"name": "rig.csv", "mimeType": "text/csv", "buffer": content})
-    page.get_by_test_id("log-answer").get_by_text("shaft.gap").wait_for(timeout=60_000)
-    name, saved_drive = saved(page, "log-file")
-    assert name == "identified-drive.toml"
-    found = Drive.from_toml(saved_drive.decode())
-    assert found.gap == pytest.approx(0.08, rel=0.05)
-    page.get_by_test_id("log-use").click()
-    page.get_by_text("is loaded").last.wait_for()
-
-
 def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
-    """Figures, fields and flanks are those of the chain; its report, a link and undo know it."""
+    """Figures, fields and flanks are those of the chain."""
     chain = Chain.load("crane-4-mass")
     put(files, "mine.toml", chain.to_toml().encode())
     field = files.locator('[data-path="shaft[2].gap"] input[type=text]')
@@ -171,14 +147,3 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
     ]
     pins = [one["share"] for one in files.evaluate(f"{INSTRUMENT}.scheme.states")]
     assert pins == pytest.approx(shares, abs=0.05)
-    link = settled(files, "location.href")
-    name, page = saved(files, "export-report")
-    assert name.endswith("report.html")
-    assert b"The strategies compared" in page
-    files.get_by_role("button", name="Undo").click()
-    k_dyn(files, f"{simulate(chain, 'direct').k_dyn:.3f}")
-    files.get_by_role("button", name="Undo").click()
-    k_dyn(files, f"{simulate(CRANE, 'direct').k_dyn:.3f}")
-    files.goto("about:blank")
-    files.goto(link)
-    k_dyn(files, f"{run.k_dyn:.3f}")

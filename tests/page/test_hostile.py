@@ -5,7 +5,6 @@ Nothing may be printed, no process left, and after all of it another tab gets it
 
 from __future__ import annotations
 
-import http.client
 import json
 import random
 import re
@@ -70,10 +69,6 @@ class Tab:
         self.happen("4", "act", {"stamp": self.stamp, **message})
         return self.stamp
 
-    def named(self, name: str) -> str:
-        """The element of a name."""
-        return next(k for k, e in self.elements.items() if e.get("props", {}).get("data-testid") == name)
-
     def answer(self, stamp: float) -> dict[str, Any]:
         """The first full frame that knows of a message; each is answered, so that the next ones are sent."""
         latest = time.monotonic() + 60.0
@@ -96,7 +91,7 @@ class Tab:
 
 @pytest.fixture(scope="module")
 def attacked(start_server: Callable[..., Any]) -> Any:
-    """A server that only these tests see."""
+    """A server that only this test sees."""
     server = start_server()
     server.seen = 0
     return server
@@ -159,59 +154,3 @@ def test_frames_of_junk(own: Any) -> None:
             tab.close()
             tab = Tab(own.url)
     tab.close()
-
-
-def test_files_that_are_no_drive(own: Any) -> None:
-    text = Drive.load("crane-4amtkf").to_toml().encode()
-    head = b'--B\r\nContent-Disposition: form-data; name="f"; filename="../../a.toml"\r\n\r\n'
-    form = "multipart/form-data; boundary=B"
-    with closing(Tab(own.url)) as tab:
-        for content in (
-            b"", b"\x00" * 100, b"\xff\xfe" * 100, b"[" * 60_000, b"a = [\n" + b"[\n" * 20_000,
-            b"a." * 900 + b"a = 1", b"\n".join(b"[" + b"a." * 900 + b"a%d]" % k for k in range(30)),
-            b"\n" * 60_000, b'a = "' + b"x" * 60_000, b"[motor]\ninertia = " + b"9" * 1900,
-            b"[shaft]\ngap = [0.1, 0.2]", b"a" * 3_000_000,
-            text.replace(b"crane", b"<script>alert(1)</script>"), text.replace(b"=", b"= ="), text + text,
-        ):  # fmt: skip
-            assert post(tab, head + content + b"\r\n--B--\r\n", form) < 500
-            tab.answer(tab.act(what="select", name="ramp"))
-        for body in (b"", b"--B", b"--B\r\nContent-Disposition: x\r\n\r\n1\r\n--B--"):
-            for kind in (form, "multipart/form-data", "text/plain"):
-                post(tab, body, kind)
-        tab.answer(tab.act(what="select", name="direct"))
-
-
-def post(tab: Tab, body: bytes, kind: str) -> int:
-    """The status that comes back from the upload of a drive; 0 where the line was cut."""
-    line = http.client.HTTPConnection(tab.place, timeout=60)
-    try:
-        url = tab.elements[tab.named("drive-upload")]["props"]["url"]
-        line.request("POST", url, body, {"Content-Type": kind})
-        return line.getresponse().status
-    except (ConnectionError, http.client.HTTPException):
-        return 0
-    finally:
-        line.close()
-
-
-@pytest.mark.slow
-def test_tabs_that_close_in_the_middle_of_a_job(own: Any) -> None:
-    """Several at once, some without a word; what they asked for ends with them."""
-    tabs = [Tab(own.url) for _ in range(4)]
-    for tab in tabs:
-        for name in ("optimum-go", "curve-go", "tuning-go", "export-report"):
-            tab.happen(tab.named(name), "click", {})
-    latest = time.monotonic() + 120.0
-    while len(own.jobs()) < 2:
-        assert time.monotonic() < latest
-        time.sleep(0.05)
-    for k, tab in enumerate(tabs):
-        if k % 2:
-            tab.line.socket.close()
-        tab.close()
-    quiet = time.monotonic()
-    while time.monotonic() - quiet < 3.0:
-        assert time.monotonic() < latest, own.processes()
-        time.sleep(0.1)
-        if len(own.jobs()) > 1:  # one process waits for the next job
-            quiet = time.monotonic()

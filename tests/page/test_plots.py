@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from tests.page.conftest import INSTRUMENT, at_rest, comes_to
+from tests.page.conftest import INSTRUMENT, at_rest, comes_to, drawn
 
 from softstart import Drive, simulate
 
@@ -83,9 +83,7 @@ def hold(page: Any, share: float) -> float:
         "(one, share) => { one.value = share * one.max; one.dispatchEvent(new Event('input')); }", share
     )
     page.wait_for_function("document.querySelector('.player .instant').textContent !== ''")
-    page.evaluate(
-        "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))"
-    )  # drawn with the next picture
+    drawn(page)
     return instant(page)
 
 

@@ -2,9 +2,8 @@
 
 An attack is a command line with the files it needs, drawn from a seed. Wrong is an exit code other than 0, 2,
 3 and 130, a traceback or a warning, a hang, a message of more than a screenful, control characters on the
-terminal, an option that no command has, files left behind, a number in the JSON that is not finite. Where the
-truth is known - the same numbers in another dialect - any other answer is a wrong number, and where only
-refusal is right, so is any answer. `--size 20`: twenty times as many.
+terminal, an option that no command has, files left behind, a number in the JSON that is not finite, and any
+answer where only refusal is right. `--size 20`: twenty times as many.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import math
 import os
 import random
 import re
@@ -23,7 +21,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import click
 import pytest
@@ -110,12 +107,11 @@ LITERALS = [
 
 @dataclass
 class Attack:
-    """One command line: its words, the files it needs, and what is known of the right answer."""
+    """One command line: its words, the files it needs, and whether only a refusal is right."""
 
     words: list[str]
     files: dict[str, bytes | Callable[[Path], None]] = field(default_factory=dict)
-    truth: list[str] = field(default_factory=list)  # a command whose JSON has the right numbers
-    refused: bool = False  # whether only a refusal is right
+    refused: bool = False
 
 
 @cache
@@ -210,34 +206,6 @@ def special_files(rng: random.Random) -> Attack:
     return Attack(line.split(), {kind + suffix: makers[kind]}, refused=True)
 
 
-def dialects(rng: random.Random) -> Attack:
-    """A torque profile or the law of a clutch as some program writes it: read as it is meant, or refused."""
-    if rng.random() < 0.5:
-        play, header = f"simulate {CRANE} --json --controller profile --param file=", ("t [s]", "u [N*m]")
-        rows = [(t, round(rng.uniform(15.0, 62.0), 2)) for t in (0.0, 0.05, 0.125, 0.3)[: rng.randint(2, 4)]]
-    else:
-        play, header = "clutch --json --law ", ("t [s]", "M [N*m]")
-        rows = [(0.0, 0.0), (0.25, 150.5), (0.5, 300.25), (1.0, 700.125)]
-    separator, mark = rng.choice((",", ";", "\t", ", ", " ", "|")), rng.choice(".,")
-    quote = rng.choice(("", "", "", '"'))
-    form = rng.choice(("{:g}", "{:.3f}", "{:.6e}", "{:+g}", "{:09.4f}"))
-    lines = [separator.join(quote + form.format(x).replace(".", mark) + quote for x in row) for row in rows]
-    if rng.random() < 0.5:
-        lines.insert(0, separator.join(header))
-    if rng.random() < 0.2:
-        lines = [line + separator for line in lines]
-    if rng.random() < 0.2:
-        lines = [f"# {rng.choice(('a comment', '1;2', '1,2'))}", "", *lines, ""]
-    if rng.random() < 0.15:
-        lines = [f"{line}{separator}{i}" for i, line in enumerate(lines)]
-    text = rng.choice(("", "", "\ufeff")) + rng.choice(("\n", "\n", "\r\n", "\r")).join(lines)
-    files: dict[str, Any] = {
-        "mine.csv": text.encode(rng.choice(("utf-8", "utf-8", "utf-8", "utf-16"))),
-        "true.csv": "".join(f"{t!r},{u!r}\n" for t, u in rows).encode(),
-    }
-    return Attack(f"{play}mine.csv".split(), files, truth=f"{play}true.csv".split())
-
-
 # ---- running and judging ---------------------------------------------------------------------------------
 
 
@@ -298,31 +266,9 @@ def judged(attack: Attack, folder: Path) -> list[str]:
     found = [name for name, so in wrong.items() if so]
     if code == 0 and "--json" in attack.words and "--help" not in attack.words:
         try:
-            numbers = _numbers(out)
-            if attack.truth and numbers != _numbers(ended(attack.truth)[1]):
-                found.append("wrong number")
+            json.loads(out, parse_constant=int)  # which refuses NaN and infinity
         except ValueError:
             found.append("no JSON")
-    return found
-
-
-def _numbers(text: str) -> list[float]:
-    """All numbers of a JSON text, in order, but for times of the clock; ValueError for NaN and infinity."""
-    found: list[float] = []
-
-    def take(one: Any, key: str = "") -> None:
-        if isinstance(one, dict):
-            for inner, value in one.items():
-                take(value, inner)
-        elif isinstance(one, list):
-            for value in one:
-                take(value, key)
-        elif isinstance(one, float | int) and not isinstance(one, bool) and "seconds" not in key:
-            if not math.isfinite(one):
-                raise ValueError
-            found.append(one)
-
-    take(json.loads(text))
     return found
 
 
@@ -330,7 +276,7 @@ def test_every_command_is_attacked() -> None:
     assert set(QUICK) == set(COMMANDS)
 
 
-@pytest.mark.parametrize("kind", [options, values, texts, special_files, dialects])
+@pytest.mark.parametrize("kind", [options, values, texts, special_files])
 def test_hostile_inputs_end_well(
     kind: Callable[[random.Random], Attack],
     tmp_path: Path,

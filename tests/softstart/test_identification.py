@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,22 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 from tests.softstart.optimal.drives import random_unknown
 
-from softstart import Drive, Identification, InputError, Log, compare, identify, plan_experiments, simulate
+from softstart import (
+    Drive,
+    Identification,
+    InputError,
+    Log,
+    Run,
+    compare,
+    identify,
+    plan_experiments,
+    simulate,
+)
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.identification.fitting import Fitter, Point, Sizes
+from softstart.identification.fitting import Fitter, Sizes
 from softstart.identification.model import FILTER, LogModel, filtered
-from softstart.identification.planning import Bench, Experiment, Plan, made_up_log, steps_of
+from softstart.identification.planning import Bench, made_up_log, steps_of
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
@@ -42,24 +53,24 @@ def log() -> Log:
     return made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
 
 
-@pytest.fixture(scope="module")
-def found(log: Log):  # type: ignore[no-untyped-def]
-    return identify(log, GUESS, searches=3)
+def played(profile: TorqueProfile, position: float, until: float) -> Run:
+    """A start of the true drive under this torque."""
+    drive = TRUTH.replace(start_position=position, minimum_torque=-100.0, maximum_torque=100.0)
+    return simulate(drive, make_controller("profile", {"profile": profile}), until=until)
 
 
-def played(log: Log, torque: Vector, values: dict[str, float]) -> dict[str, Vector]:
-    """States of the true drive under this demand."""
-    blank = Log(log.time, torque, angle=900.0 * log.time**2.1, torque_is="demand")
-    return LogModel.of(blank, TRUTH.replace(start_position="mid-gap")).motion(values).at(log.time)
+def demanded(log: Log, torque: Vector | None = None) -> Run:
+    """A start of the true drive under the demand of a log, or under another one at its instants."""
+    held = log.torque if torque is None else torque
+    profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(held, 2)[:-1])
+    return played(profile, -0.6 * 0.04, float(log.time[-1]))
 
 
 # ---- the model ------------------------------------------------------------------------------------------
 
 
 def test_the_model_is_the_plant_under_the_torque_of_the_log(log: Log) -> None:
-    profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])
-    drive = TRUTH.replace(start_position=-0.6 * 0.04, minimum_torque=-100.0, maximum_torque=100.0)
-    run = simulate(drive, make_controller("profile", {"profile": profile}), until=float(log.time[-1]))
+    run = demanded(log)
     angle = run.at(log.time)["phi1"] - run.at([0.0])["phi1"]
     signal = LogModel.of(log, TRUTH.replace(start_position="mid-gap")).signals([{"position": -0.6}])[0]
     assert np.max(np.abs(signal - angle)) < 1e-12
@@ -68,9 +79,8 @@ def test_the_model_is_the_plant_under_the_torque_of_the_log(log: Log) -> None:
 def test_a_measured_torque_is_joined_by_lines() -> None:
     time = np.linspace(0.0, 0.3, 61)
     torque = 30.0 * np.sin(8.0 * time) ** 2 + 8.0
-    log = Log(time, torque, speed=time**1.5)
     free = TRUTH.replace(gap=200.0, start_position="mid-gap")  # the motor alone
-    speed = LogModel.of(log, free).signals([{}])[0]
+    speed = LogModel.of(Log(time, torque, speed=time**1.5), free).signals([{}])[0]
     assert speed == pytest.approx(cumulative_trapezoid(torque, time, initial=0.0) / 0.035, rel=1e-12)
 
 
@@ -152,39 +162,8 @@ def test_a_filter_of_the_speed_is_exact_for_lines() -> None:
 
 
 @pytest.mark.slow
-def test_every_parameter_is_found_from_a_guess_off_by_factors(found) -> None:  # type: ignore[no-untyped-def]
-    assert found.agreed >= 2
-    for name in NAMES:
-        one = found[name]
-        assert one.known
-        off = abs(math.log(one.value / float(getattr(TRUTH, name))))
-        assert off < 2.0 * math.log(one.upper / one.lower) / 2.0, name  # twice the interval
-    assert found["gap"].half_width < 0.02
-    assert found["stiffness"].half_width < 0.02
-    assert found.ripple == pytest.approx(1.0, rel=0.35)
-    assert len(found.notes) == 1  # only that the scale of the torque cannot be found
-
-
-@pytest.mark.slow
-def test_values_do_not_depend_on_the_guess(found, log: Log) -> None:  # type: ignore[no-untyped-def]
-    other = identify(log, TRUTH.replace(gap=0.04, stiffness=700.0, load_inertia=0.1), searches=3)
-    for name in NAMES:
-        assert other[name].value == pytest.approx(found[name].value, rel=0.1 * found[name].half_width)
-
-
-@pytest.mark.slow
-def test_a_speed_of_encoder_differences_tells_what_the_angle_tells(found) -> None:  # type: ignore[no-untyped-def]
-    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
-    other = identify(speed, GUESS, searches=3)
-    assert any("summed to the angle" in note for note in other.notes)
-    for name in NAMES:
-        assert other[name].value == pytest.approx(found[name].value, rel=1e-5)
-        assert other[name].half_width == pytest.approx(found[name].half_width, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_other_units_of_torque_scale_what_they_must_and_nothing_else(found, log: Log) -> None:  # type: ignore[no-untyped-def]
-    off = 0.9
+def test_other_units_of_torque_scale_what_they_must_and_nothing_else(log: Log) -> None:
+    found, off = identify(log, GUESS, searches=3), 0.9
     low = identify(Log(log.time, off * log.torque, angle=log.values, torque_is="demand"), GUESS, searches=3)
     for name in NAMES:
         scale = 1.0 if name in ("gap", "torque_lag") else off
@@ -225,23 +204,14 @@ def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it() -> N
     assert len(found.notes) == 1  # nothing is left that the model has not
 
 
-@pytest.fixture(scope="module")
-def solved(log: Log) -> tuple[Fitter, Point]:
-    """The most likely parameters of the log."""
+def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(log: Log) -> None:
+    """Against fits at fixed values from the best x: at each end L is larger by that of Student's t."""
     fitter, x = fit_of(log, TRUTH, -0.6, -float(log.values[0]))
     best = fitter.refined(x)
-    return fitter, fitter.valued(best, best)
-
-
-@pytest.mark.parametrize("name", ["gap", "position"])
-def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(
-    solved: tuple[Fitter, Point], name: str
-) -> None:
-    """Against fits at fixed values from the best x: at each end L is larger by that of Student's t."""
-    fitter, best = solved
-    i = [one.name for one in fitter.unknowns].index(name)
-    half = float(fitter.halves(best)[i])
-    for sign in (-1.0, 1.0):
+    best = fitter.valued(best, best)
+    names = [one.name for one in fitter.unknowns]
+    for i, sign in itertools.product((names.index("gap"), names.index("position")), (-1.0, 1.0)):
+        half = float(fitter.halves(best)[i])
         x = best.x.copy()
         x[i] = fitter.end(i, sign, half, best, ())
         begin = fitter.settled(x, best.errors, best.sizes)
@@ -256,8 +226,8 @@ def coarse() -> Log:
 
 def test_where_another_machine_made_the_log_no_interval_is_stated(coarse: Log, tmp_path: Path) -> None:
     """One with a cogging torque."""
-    states = played(coarse, coarse.torque - 8.0 * np.sin(5.0 * coarse.values), {"position": -0.6})
-    angle = np.floor(states["phi"][:, 0] / coarse.count + 0.3) * coarse.count
+    states = demanded(coarse, coarse.torque - 8.0 * np.sin(5.0 * coarse.values)).at(coarse.time)
+    angle = np.floor((states["phi1"] - states["phi1"][0]) / coarse.count + 0.3) * coarse.count
     found = identify(Log(coarse.time, coarse.torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
     assert not found.stated
     assert any("Something else moves this drive" in note for note in found.notes)
@@ -281,18 +251,15 @@ def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None
 
 
 def test_a_wrong_unit_of_speed_is_noticed(log: Log) -> None:
-    turned = played(log, log.torque, {"position": -0.6})["w"][:, 0]
-    bad = Log(log.time, log.torque, speed=turned * 30.0 / math.pi, torque_is="demand")
+    rpm = demanded(log).at(log.time)["w1"] * 30.0 / math.pi
+    bad = Log(log.time, log.torque, speed=rpm, torque_is="demand")
     assert any("look at the units of the log" in note for note in identify(bad, TRUTH, searches=1).notes)
 
 
 @pytest.mark.slow
 def test_a_filtered_speed_is_named_or_found(log: Log) -> None:
     fine = np.linspace(0.0, float(log.time[-1]), 16 * (log.time.size - 1) + 1)
-    profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])
-    drive = TRUTH.replace(start_position=-0.024, minimum_torque=-100.0, maximum_torque=100.0)
-    run = simulate(drive, make_controller("profile", {"profile": profile}), until=float(log.time[-1]))
-    behind = filtered(fine, run.at(fine)["w1"], 0.01)[::16]
+    behind = filtered(fine, demanded(log).at(fine)["w1"], 0.01)[::16]
     slow = Log(log.time, log.torque, speed=behind, torque_is="demand")
     notes = identify(slow, TRUTH, searches=1).notes
     assert any("not independent" in note for note in notes)
@@ -314,19 +281,26 @@ def test_an_angle_may_wrap_and_lack_samples(log: Log) -> None:
     assert read.values[kept] - read.values[0] == pytest.approx(log.values[kept] - log.values[0], abs=1e-9)
 
 
+def test_a_speed_of_encoder_differences_is_summed_to_the_angle(log: Log) -> None:
+    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
+    read = speed.summed(float(TRUTH.encoder_lines))
+    assert (speed.kind, read.kind) == ("speed", "angle")
+    assert np.diff(read.values) == pytest.approx(np.diff(log.values), abs=1e-9)
+    assert "summed to the angle" in " ".join(read.notes)
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
         (lambda t, u, y: (t[::-1], u, y), "it must rise"),
         (lambda t, u, y: (t[:10], u[:10], y[:10]), "10 samples; a fit needs 30 or more"),
-        (lambda t, u, y: (t, -u, y), "has the wrong sign"),
         (lambda t, u, y: (t, u, 0.0 * y), "the angle never changes"),
         (lambda t, u, y: (t[100:], u[100:], y[100:]), "begin the log at standstill"),
         (lambda t, u, y: (np.where(t > 0.3, t + 1.0, t), u, y), "there is no sample from"),
         (lambda t, u, y: (t, np.where((t > 0.1) & (t < 0.11), math.nan, u), y), "cut the log there"),
     ],
 )
-def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -> None:  # type: ignore[no-untyped-def]
+def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -> None:
     time, torque, angle = change(log.time, log.torque, log.values)
     with pytest.raises(InputError, match=sentence):
         Log(time, torque, angle=angle, torque_is="demand")
@@ -351,26 +325,14 @@ def test_what_cannot_be_found_is_refused(log: Log) -> None:
 # ---- plans ----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def planned() -> Plan:
-    return plan_experiments(TRUTH.replace(permissible_torque=70.0), log_period="8 ms", ripple=1.0)
-
-
-def loads(one: Experiment, position: float) -> Any:
-    """The experiment on the exact plant."""
-    drive = TRUTH.replace(start_position=position, minimum_torque=-100.0, maximum_torque=100.0)
-    return simulate(drive, make_controller("profile", {"profile": one.profile}), until=one.end)
-
-
 @pytest.mark.slow
-def test_the_planned_torque_tells_no_less_and_keeps_its_limits(planned: Plan) -> None:
+def test_the_planned_torque_tells_no_less_and_keeps_its_limits() -> None:
+    planned = plan_experiments(TRUTH.replace(permissible_torque=70.0), log_period="8 ms", ripple=1.0)
     one = planned["planned"]
     allowed = [other for other in planned.experiments[:-1] if other.peak <= 70.0]
     assert one.score < min(other.score for other in allowed)
-    peaks = [loads(one, 0.04 * place).peak_torque for place in np.linspace(-1.0, 1.0, 257)]
+    peaks = [played(one.profile, 0.04 * place, one.end).peak_torque for place in np.linspace(-1.0, 1.0, 257)]
     assert 0.999 * one.peak <= max(peaks) <= one.peak <= 70.0
-    others = np.random.default_rng(3).uniform(-0.04, 0.04, 100)
-    assert max(loads(one, position).peak_torque for position in others) <= one.peak
     assert np.max(np.abs(one.profile.torque)) <= TRUTH.starting_torque
     assert any(one.end == pytest.approx(other.end, rel=1e-12) for other in planned.experiments[:-1])
 
@@ -391,29 +353,12 @@ def test_peak_and_travel_are_those_of_the_worst_position() -> None:
 
 
 def test_peak_and_travel_are_those_of_a_simulation() -> None:
-    drive = TRUTH.replace(start_position="mid-gap")
-    bench = Bench(drive, 1e-3, 1.0, NAMES)
     profile, end = steps_of(np.full(4, 0.1), np.array([30.0, -20.0, -40.0, 25.0]))
-    wide = drive.replace(minimum_torque=-100.0, maximum_torque=100.0)
-    run = simulate(wide, make_controller("profile", {"profile": profile}), until=end)
+    run = played(profile, 0.0, end)
     angles = run.at(np.linspace(0.0, end, 20001))["phi2"]
-    peak, travel, _ = bench.loads(profile, end, np.zeros(1))
+    peak, travel, _ = Bench(TRUTH, 1e-3, 1.0, NAMES).loads(profile, end, np.zeros(1))
     assert peak[0] == pytest.approx(run.peak_torque, rel=1e-12)
     assert travel[0] == pytest.approx(np.max(np.abs(angles - angles[0])), rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_load_that_is_to_rest_does_not_move_at_all() -> None:
-    most = 0.9 * float(TRUTH.load_torque)
-    plan = plan_experiments(TRUTH, log_period="8 ms", ripple=1.0, wanted=["gap"], max_torque=most)
-    one = plan["planned"]
-    for position in (-0.04, -0.013, 0.0, 0.04):
-        run = loads(one, position)
-        assert run.peak_torque < TRUTH.load_torque
-        assert np.all(run.at(np.linspace(0.0, one.end, 2000))["phi2"] == 0.0)
-    assert one.travel == 0.0
-    assert one.widths["gap"] < 0.2
-    made_up_log(TRUTH, one, log_period=8e-3, ripple=0.2)  # a log that `identify` would take
 
 
 @pytest.mark.parametrize(

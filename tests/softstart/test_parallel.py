@@ -15,13 +15,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from softstart.errors import InputError, SimulationError
-from softstart.parallel import (
-    DiedError,
-    Pool,
-    Progress,
-    Worker,
-    on_one_thread,
-)
+from softstart.parallel import DiedError, Pool, Progress, Worker, on_one_thread
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
@@ -51,11 +45,7 @@ def failing(kind: str) -> Any:
     if kind == "input":
         raise InputError(["gap = -1: a gap is 0 or more.", "c = 0: it must be above 0."])
     if kind == "local":
-
-        class LocalError(Exception):
-            pass
-
-        raise LocalError("of a class that nobody else knows")
+        raise type("LocalError", (Exception,), {})("of a class that nobody else knows")
     if kind == "unsendable":
         return lambda: None
     os.kill(os.getpid(), signal.SIGKILL)
@@ -86,6 +76,12 @@ def alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def started(file: Path) -> list[int]:
+    """The two processes of `sleeping`, once they run."""
+    until(lambda: file.exists() and " " in file.read_text())
+    return [int(word) for word in file.read_text().split()]
 
 
 def until(what: Callable[[], bool]) -> None:
@@ -140,8 +136,7 @@ def test_what_goes_wrong_reaches_the_caller(importable: Any, kind: str, error: A
 def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> None:
     worker, file = Worker(quiet=True), tmp_path / "started"
     worker.submit(importable.sleeping, str(file))
-    until(lambda: file.exists() and " " in file.read_text())
-    pids = [int(word) for word in file.read_text().split()]
+    pids = started(file)
     worker.kill()
     until(lambda: not any(map(alive, pids)))
 
@@ -161,11 +156,10 @@ def test_workers_end_with_a_parent_that_was_killed(tmp_path: Path) -> None:
     file = tmp_path / "started"
     parent = subprocess.Popen([sys.executable, "-c", PARENT, str(HERE), str(file)])
     try:
-        until(lambda: file.exists() and " " in file.read_text())
+        pids = started(file)
     finally:
         parent.kill()
         parent.wait()
-    pids = [int(word) for word in file.read_text().split()]
     until(lambda: not any(map(alive, pids)))
 
 
@@ -178,16 +172,17 @@ def test_a_pool_tries_the_task_of_a_dead_process_once_more(importable: Any, tmp_
 
 
 def test_a_pool_that_is_left_stops_what_runs(importable: Any, tmp_path: Path) -> None:
-    files = [tmp_path / name for name in "ab"]
+    files, pids = [tmp_path / name for name in "ab"], []
 
     def tasks() -> Any:
         yield from map(str, files)
-        until(lambda: all(file.exists() and " " in file.read_text() for file in files))
+        pids.extend(started(file)[0] for file in files)
         raise KeyboardInterrupt
 
     with Pool(2) as pool, pytest.raises(KeyboardInterrupt):
         list(pool.results(importable.sleeping, tasks()))
-    assert not any(alive(int(file.read_text().split()[0])) for file in files)
+    assert len(pids) == 2
+    assert not any(map(alive, pids))
 
 
 def test_libraries_of_linear_algebra_compute_on_one_thread_and_then_as_before() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from softstart.chain import reduce_chain
 from softstart.drive import UNKNOWN_POSITIONS
 
 CRANE = Drive.load("crane-4amtkf")
-STRATEGIES = ("direct", "s-curve", "shaped")
 
 
 def test_each_word_is_an_angle_of_this_gap() -> None:
@@ -34,7 +34,6 @@ def test_defaults() -> None:
     plain = Drive(**{k: v for k, v in HOIST.given().items() if k != "start_position"})
     assert plain.start_position == "mid-gap"
     assert plain.replace(brake="motor").start_position == "hanging"
-    assert plain.replace(brake="motor").replace(brake="none").start_position == "mid-gap"
     held = plain.replace(load_kind="reactive")  # by friction, wherever it came to rest
     assert held.start_position == held.replace(brake="motor").start_position == "unknown"
     for fields, where in (({"gap": [0.0, 0.1]}, "unknown"), ({"initial_motor_speed": [0.0, 1.0]}, "mid-gap")):
@@ -43,9 +42,8 @@ def test_defaults() -> None:
         assert held.replace(**no_doubt).start_position == "mid-gap"
     assert held.replace(initial_speed="reversal").start_position == "opposite-flank"
     assert held.replace(start_position="mid-gap").start_position == "mid-gap"
+    assert reduce_chain(chain_of(held)).to_drive().start_position == "unknown"
     assert "start_position" not in held.given()
-    assert Drive.from_toml(held.to_toml()) == held
-    assert held.with_gap(0.0).with_gap(0.2).start_position == "unknown"
     assert CRANE.start_position == CRANE.replace(load_kind="reactive").start_position == "mid-gap"
     assert "start_position" in CRANE.given()
 
@@ -68,82 +66,48 @@ def test_the_old_key_is_read_as_the_new_one() -> None:
     ],
 )
 def test_bad_input_is_told(given: dict[str, object], said: str) -> None:
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError, match=re.escape(said)):
         CRANE.replace(**given)
-    assert said in str(error.value)
 
 
 def test_a_wider_gap_changes_nothing_for_what_hangs_and_stays_in_contact() -> None:
-    """Neither peaks nor their order, for strategies that never open the gap."""
+    """For strategies that never open the gap."""
     rows = compare(HOIST, ["direct", "s-curve", "shaped", "ramp"]).rows
     closed = [row for row in rows if row.run.contacts == 1 and row.run.stages[-1].side == 1]
     assert len(closed) >= 2
     for row in closed:
         assert row.k_dyn_worn_gap == pytest.approx(row.run.k_dyn, rel=1e-10)
-    by_own = sorted(closed, key=lambda row: row.run.k_dyn)
-    assert by_own == sorted(closed, key=lambda row: row.k_dyn_worn_gap)
 
 
 def test_an_angle_keeps_its_place_in_a_wider_gap() -> None:
     inside, beyond = CRANE.replace(start_position=-0.1), CRANE.replace(start_position=-0.27)
     assert inside.with_gap(1.0).theta0 == pytest.approx(-0.2)
     assert beyond.with_gap(1.0).theta0 == pytest.approx(-0.52)
-    assert inside.with_gap(0.5) == inside
     assert inside.replace(gap=1.0).theta0 == -0.1
     assert inside.with_gap(1.0, start_position=0.3).theta0 == 0.3
-    hanging = HOIST.replace(start_position=HOIST.theta0)
-    row = compare(hanging, ["direct"]).rows[0]
-    assert row.k_dyn_worn_gap == pytest.approx(row.run.k_dyn, rel=1e-10)
 
 
-def random_drive(rng: np.random.Generator) -> Drive:
-    kind = str(rng.choice(["active", "reactive"]))
-    return CRANE.replace(
-        gap=float(rng.uniform(0.02, 2.0)), load_inertia=float(0.175 * rng.uniform(0.2, 4)), load_kind=kind,
-        load_torque=float(rng.uniform(0.0, 40.0)), damping=float(rng.choice([0.0, rng.uniform(0, 1)])),
-        torque_lag=float(rng.choice([0.0, 0.004])), start_position="unknown",
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ["direct", "acceleration-delay"])
+@pytest.mark.parametrize("name", ["reduced-first-stage", "acceleration-delay"])
 def test_unknown_is_the_worst_of_three(name: str) -> None:
     """Figure by figure the maximum of three single starts of a controller that is not told where."""
     rng = np.random.default_rng(14)
     for _ in range(6):
-        drive = random_drive(rng)
+        drive = CRANE.replace(
+            gap=rng.uniform(0.02, 2.0), load_inertia=0.175 * rng.uniform(0.2, 4),
+            load_kind=str(rng.choice(["active", "reactive"])), load_torque=rng.uniform(0.0, 40.0),
+            damping=rng.choice([0.0, 0.5]), torque_lag=rng.choice([0.0, 0.004]), start_position="unknown",
+        )  # fmt: skip
         run = simulate(drive, name)
         told = drive.replace(start_position="mid-gap")
         three = {
             one: simulate(drive.replace(start_position=one), name, fitted_to=told)
             for one in UNKNOWN_POSITIONS
         }
-        assert run.k_dyn == max(one.k_dyn for one in three.values())
+        for figure in ("k_dyn", "start_time", "settled_time", "impact_speed"):
+            worst = max(getattr(one, figure) for one in three.values())
+            assert np.array_equal(getattr(run, figure), worst, equal_nan=True), figure
         assert run.k_dyn == three[run.position].k_dyn
-        assert run.start_time == max(one.start_time for one in three.values())
-        assert run.impact_speed == max(one.impact_speed for one in three.values())
         assert run.summary()["positions"]["worst"] == run.position
-        many = simulate([drive], name)
-        assert float(many.k_dyn[0]) == run.k_dyn
-        assert float(many.start_time[0]) == run.start_time
-        assert str(many.position.values[0]) == run.position
-
-
-def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
-    """As if it had been named, in a start, a batch and a chain."""
-    given = CRANE.replace(load_kind="reactive", damping=0.3).given()
-    plain = Drive(**{key: value for key, value in given.items() if key != "start_position"})
-    named = plain.replace(start_position="unknown")
-    assert plain == named
-    run, same = simulate(plain, "ramp"), simulate(named, "ramp")
-    assert (run.k_dyn, run.start_time, run.position) == (same.k_dyn, same.start_time, same.position)
-    assert list(run.positions) == list(UNKNOWN_POSITIONS)
-    found = simulate(records(plain, gap=[0.0, 0.5]), "ramp")
-    assert float(found.k_dyn[1]) == run.k_dyn
-    alone = simulate(plain.replace(gap=0.0), "ramp")
-    assert float(found.k_dyn[0]) == alone.k_dyn
-    chain = chain_of(plain)
-    assert chain.position == "unknown"
-    assert reduce_chain(chain).to_drive().start_position == "unknown"
 
 
 def test_a_reversal_is_one_word() -> None:
@@ -157,8 +121,6 @@ def test_a_reversal_is_one_word() -> None:
     assert run.at(0.0)["w1"] == run.at(0.0)["w2"] == -target
     assert run.first_contact == pytest.approx(math.sqrt(2 * 0.5 / (62 / 0.035 + 7.16 / 0.175)), rel=1e-12)
     assert Drive.from_toml(drive.to_toml()) == drive
-    faster = drive.replace(target_speed=100.0)
-    assert faster.initial_load_speed == -100.0
 
 
 def test_one_speed_for_both_and_its_exceptions() -> None:

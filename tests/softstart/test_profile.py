@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,20 +25,14 @@ def profiles(draw: some.DrawFn) -> TorqueProfile:
     return TorqueProfile(np.cumsum([0.0, *lengths]), torques)
 
 
-def instants(profile: TorqueProfile) -> np.ndarray:
-    """An even grid, and the middle of every piece; not the knots themselves."""
-    between = 0.5 * (profile.time[1:] + profile.time[:-1])
-    return np.setdiff1d(
-        np.concatenate([np.linspace(0.0, 1.1 * profile.end + 0.01, 97), between]), profile.time
-    )
-
-
 @given(profiles(), some.floats(-120.0, 120.0), some.floats(0.0, 150.0))
 def test_clipped_is_the_clipped_value_at_every_instant(
     profile: TorqueProfile, lowest: float, width: float
 ) -> None:
     cut = profile.clipped(lowest, lowest + width)
-    t = instants(profile)
+    between = 0.5 * (profile.time[1:] + profile.time[:-1])  # no knots: there the value steps
+    even = np.linspace(0.0, 1.1 * profile.end + 0.01, 97)
+    t = np.setdiff1d(np.concatenate([even, between]), profile.time)
     steepest = np.max(
         np.abs(np.diff(profile.torque)) / np.maximum(np.diff(profile.time), 1e-300), initial=0.0
     )
@@ -45,13 +40,6 @@ def test_clipped_is_the_clipped_value_at_every_instant(
     np.testing.assert_allclose(cut.at(t), profile.at(t).clip(lowest, lowest + width), rtol=0.0, atol=off)
     assert cut.torque.min() >= lowest
     assert cut.torque.max() <= lowest + width
-
-
-@given(profiles())
-def test_within_its_limits_nothing_changes(profile: TorqueProfile) -> None:
-    same = profile.clipped(-np.inf, 100.0)
-    assert same.time.tobytes() == profile.time.tobytes()
-    assert np.array_equal(same.torque, profile.torque)
 
 
 @given(profiles(), some.floats(0.01, 0.5))
@@ -99,19 +87,15 @@ def any_profile(draw: some.DrawFn, sensed: bool = True) -> TorqueProfile:
     return TorqueProfile([0.0, *times], torques, after)
 
 
-def assert_same(one: TorqueProfile | None, other: TorqueProfile | None) -> None:
-    assert (one is None) == (other is None)
-    if one is not None and other is not None:
-        assert one.time.tobytes() == other.time.tobytes()
-        assert one.torque.tobytes() == other.torque.tobytes()
-        assert_same(one.after_contact, other.after_contact)
+def bits(profile: TorqueProfile | None) -> Any:
+    return profile and (profile.time.tobytes(), profile.torque.tobytes(), bits(profile.after_contact))
 
 
 @quick
 @given(any_profile(sensed=False))
 def test_csv_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile) -> None:
     profile.to_csv(tmp_path / "p.csv")
-    assert_same(TorqueProfile.load(tmp_path / "p.csv"), profile)
+    assert bits(TorqueProfile.load(tmp_path / "p.csv")) == bits(profile)
 
 
 @quick
@@ -119,7 +103,7 @@ def test_csv_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile) -> None
 def test_toml_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile, about: dict[str, object]) -> None:
     path = tmp_path / "p.toml"
     profile.to_toml(path, about)
-    assert_same(TorqueProfile.load(path), profile)
+    assert bits(TorqueProfile.load(path)) == bits(profile)
     document = tomllib.loads(path.read_text(encoding="utf-8"))
     assert document["controller"] == {"name": "profile"}
     assert document.get("about", {}) == {str(key): str(value) for key, value in about.items()}
@@ -132,15 +116,8 @@ GOOD = "[profile]\ntime = [0, 0.1]\ntorque = [1, 2.5]\n"
     "text",
     [
         GOOD,
-        '[profile]\ntime = ["0 s", "100 ms"]\ntorque = [1, 2.5]\n',
         '[profile]\ntime = [0, 100]\ntime_unit = "ms"\ntorque = [0.001, 0.0025]\ntorque_unit = "kN*m"\n',
-        "# measured\n\nZeit [ms];Moment [N*m]\n0;1\n100;2.5\n",
-        "torque [kN*m],time [s]\n0.001,0\n0.0025,0.1\n",
-        "t (s)\tu (N*m)\n0\t1\n0.1\t2.5\n",
         "t [s],phi1 [rad],u [N*m],T [N*m]\n0,0,1,7\n0.1,3,2.5,8\n",
-        "\ufefftime , torque\r\n 0 , 1 \r\n 1e-1 , 2.5 \r\n",
-        "Zeit;Moment;\n0,000;1,0;\n0,100;2,5;\n",
-        't,u\n"0","1"\n"0,1","2,5"\n',
         "t [ms];u [kN*m]\n0;0,001\n100;0,0025\n",
     ],
 )
@@ -159,19 +136,12 @@ CSV = [
     ("0,1\n0.2\n", 'line 2, "0.2", has 1 value instead of 2'),
     ("time,torque\n0,1\n0,5,62\n", "write decimal points"),
     ("time;torque\n0;1\n0.1;62,5\n", '"62,5" has a comma and "0.1" a point'),
-    ("0,0,10,5\n0,1,62,0\n", 'line 1, "0,0,10,5", has 4 values instead of 2'),
     ("0;1,500\n1;2,000\n", "may divide thousands"),
-    ("t,time\n0,1\n", "it names time twice"),
-    ("time,torque\n0,\N{ARABIC-INDIC DIGIT FIVE}\n", "this is not a number"),
-    ("time [furlong],torque\n0,1\n", "furlong"),
 ]
 TOML = [
-    ("[profile\n", "not valid TOML"),
     ("", "no table [profile]"),
     ('[controller]\nname = "ramp"\n' + GOOD, 'for the controller "ramp"'),
-    ("profile = 3\n", "[profile] = 3: write a table with the lists"),
     ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
-    ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "time[1] = True: true and false are not quantities"),
     (GOOD + 'unit = "s"\n', 'no key "unit"'),
     (GOOD + 'time_unit = "N*m"\n', "time_unit"),
     (GOOD + "[after_contact]\ntime = [0]\n", "[after_contact] torque"),
@@ -193,11 +163,7 @@ def test_a_bad_file_in_one_sentence_with_its_place(tmp_path: Path, name: str, te
 def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     pulse = TorqueProfile([0.0], [1.0], after_contact=TorqueProfile([0.0], [2.0]))
     (tmp_path / "latin.csv").write_bytes(b"\xe9\n0,1\n")
-    for name, words in (
-        ("latin.csv", "UTF-8"),
-        ("none.toml", "there is no such file"),
-        ("p.bin", "ends in .csv or .toml"),
-    ):
+    for name, words in (("latin.csv", "UTF-8"), ("p.bin", "ends in .csv or .toml")):
         with pytest.raises(InputError, match=words):
             TorqueProfile.load(tmp_path / name)
     with pytest.raises(InputError, match="write this profile as TOML"):

@@ -14,49 +14,23 @@ from hypothesis import strategies as st
 
 from softstart import quantities
 from softstart.errors import InputError
-from softstart.quantities import (
-    QUANTITIES,
-    TYPED,
-    shortest,
-    to_si,
-    values_in,
-    whole_number,
-)
+from softstart.quantities import QUANTITIES, TYPED, shortest, to_si, values_in
 
 READ = [
-    ("0.5", "rad", 0.5),
-    ("500mrad", "rad", 0.5),
-    ("90 deg", "rad", math.pi / 2),
     ("90°", "rad", math.pi / 2),
-    ("60 arcmin", "rad", math.pi / 180),
-    ("880 rpm", "rad/s", 880 * 2 * math.pi / 60),
     ("0.88 krpm", "rad/s", 880 * 2 * math.pi / 60),
     ("5 rad·s⁻¹", "rad/s", 5.0),
-    ("350 kg*cm^2", "kg*m^2", 0.035),
     ("0.035 kg·m²", "kg*m^2", 0.035),
     *((f"2 {one}", "kg*m^2", 2.0) for one in ("kgm2", "kg-m2", "Nms²")),
     *((f"2 {one}", "kg*m^2", 2e-4) for one in ("kgcm2", "kgcm²")),
     *((f"2 {one}", "kg*m^2", 2e-7) for one in ("g*cm2", "gcm2")),
     *((f"1460 {one}", "rad/s", 1460 * math.pi / 30) for one in ("1/min", "min⁻¹", "U/min")),
     ("0.1 kgf*m*s^2", "kg*m^2", 0.980665),
-    ("2 N*m*s^2/rad", "kg*m^2", 2.0),
-    ("62 N*m", "N*m", 62.0),
-    ("62 Nm", "N*m", 62.0),
-    ("0.062 kNm", "N*m", 62.0),
     ("1.5 Nms/rad", "N*m*s/rad", 1.5),  # not the plural of Nm/rad
-    ("95 %", "1", 0.95),
     ("1 lbf*ft", "N*m", 1.3558179483314004),
-    ("5 kgf*m/rad", "N*m/rad", 49.03325),
-    ("2.5 N*m/arcmin", "N*m/rad", 2.5 * 180 * 60 / math.pi),
     ("1 N*m/rpm", "N*m*s/rad", 60 / (2 * math.pi)),
-    ("9 ms", "s", 0.009),
-    ("2 min", "s", 120.0),
-    ("2.2 kW", "W", 2200.0),
     ("1 hp", "W", 745.6998715822702),
     ("\N{MINUS SIGN}5 N*m", "N*m", -5.0),
-    ("4096", "1", 4096.0),
-    ("82 mm", "m", 0.082),
-    ("10 bar", "Pa", 1e6),
     (3, "rad", 3.0),
     (np.float32(0.5), "rad", 0.5),
     (Decimal("0.5"), "rad", 0.5),
@@ -72,19 +46,10 @@ def test_is_read(value, unit, expected):
 
 
 REFUSED = [
-    (
-        "50 Hz",
-        "rad/s",
-        'Hz is a frequency, which may count turns or radians; write "50 turn/s" or "50 rad/s"',
-    ),
-    ("5 Nms", "N*m", "Nms is an angular momentum, not a torque"),
     ("5 N*m", "N*m/rad", 'N*m is a torque, but a stiffness is per angle; write "5 N*m/rad" or "5 N*m/deg"'),
     ("5 N*m/rad", "N*m", 'N*m/rad is a stiffness, not a torque; write "5 N*m"'),
-    ("5 J", "N*m", 'J is an energy, not a torque; write "5 N*m"'),
     ("5 kgf*m^2", "kg*m^2", "kgf*m^2 is a flywheel moment (GD^2); divide it by 4 g"),
-    ("0.5 m", "rad", 'm is a length, not an angle; write an angle as "0.5 rad"'),
     ("5 radd", "rad", 'unknown unit "radd" (did you mean "rad"?)'),
-    ("880 RPM", "rad/s", 'unknown unit "RPM" (did you mean "rpm"?)'),
     ("5 %", "rad", '"%" is no unit'),
     ("5 rad^99", "rad", '"rad^99" is no unit'),
     ("0,5 rad", "rad", "a comma may divide decimals or thousands"),
@@ -144,23 +109,6 @@ def test_quantities_of_a_users_own_pint_registry():
         to_si(registry.Quantity(1, "m"), "rad")
 
 
-@pytest.mark.parametrize(
-    ("unit", "forms"),
-    [
-        ("rad", ["rad", "mrad", "deg", "arcmin", "turn"]),
-        ("N*m/rad", ["N*m/rad", "kN*m/rad", "N*m/deg", "kgf*m/rad", "lbf*in/deg"]),
-    ],
-)
-@settings(deadline=None)  # the first example imports pint
-@given(data=st.data())
-def test_there_and_back(unit, forms, data):
-    x = data.draw(st.floats(1e-6, 1e6))
-    form = data.draw(st.sampled_from(forms))
-    one = to_si(f"1 {form}", unit)
-    assert to_si(f"{x / one!r} {form}", unit) == pytest.approx(x, rel=4e-16)
-    assert to_si(f"{x!r} {unit}", unit) == x
-
-
 @given(
     st.sampled_from(sorted(QUANTITIES)),
     st.floats(allow_nan=False, allow_infinity=False),
@@ -211,25 +159,8 @@ def test_ordinary_units_are_those_of_pint(monkeypatch):
         assert to_si(f"0.37 {unit}", unit) == to_si(f"0.37 ({unit})", unit) == 0.37
 
 
-# what a hand types into an option or a field, and the numbers that are meant
-LISTS = [
-    ("0.5,1,2", [0.5, 1, 2]),
-    ("0,5; 1; 2,25", [0.5, 1, 2.25]),
-    ("0,000; 1,500", [0, 1.5]),
-    ("-1.5,-2", [-1.5, -2]),
-    ("1,5,2.5", [1, 5, 2.5]),  # a decimal point: then the commas divide values
-    ("0.125,2", [0.125, 2]),
-]
-
-
-@pytest.mark.parametrize(("text", "numbers"), LISTS, ids=str)
-def test_a_list_is_read_as_it_is_meant(text, numbers):
-    assert to_si(values_in(text), "rad").tolist() == numbers
-
-
 # each can be read in two ways, or has a mark too many
 DOUBTFUL = {
-    "0,1,0,2": '"0, 1, 0, 2" for 4 values, or "0.1, 0.2" for 2',
     "1.5, 2,5": '"1.5, 2, 5" for 3 values, or "1.5, 2.5" for 2',
     "0,5 rad,1 rad": '"0.5 rad, 1 rad"',
     "1,500; 2,000": "may divide thousands",
@@ -248,10 +179,3 @@ def test_a_list_that_can_be_read_in_two_ways_is_refused(text):
     assert sentence.startswith("--gaps = ")
     assert DOUBTFUL[text] in sentence
     assert len(sentence) < 400
-
-
-@pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", ""], ids=str)
-def test_a_whole_number_is_one(text):
-    with pytest.raises(InputError, match="give a whole number of 1 or more"):
-        whole_number(text, "--workers")
-    assert whole_number(" 007 ", "--workers") == 7

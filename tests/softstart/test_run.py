@@ -5,9 +5,8 @@ from __future__ import annotations
 import csv
 import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from softstart.controller.compiled import Vector
 from softstart.start import engine
 
 CRANE = Drive.load("crane-4amtkf")
-WORN = records(CRANE, gap=[0.5, 2.0])
 DAMPED = CRANE.replace(damping=1.0, load_kind="reactive")
 
 
@@ -29,27 +27,10 @@ def run() -> Run:
     return simulate(CRANE, "reduced-first-stage")
 
 
-def test_traces_hang_together(run: Run) -> None:
-    np.testing.assert_allclose(run.theta, run.phi1 - run.phi2, atol=1e-12)
+def test_traces_are_states_within_the_run(run: Run) -> None:
     states = run.at(run.t)
-    for name in ("phi1", "phi2", "w1", "w2", "u", "T"):
+    for name in ("phi1", "phi2", "w1", "w2", "u", "T", "theta"):
         np.testing.assert_array_equal(states[name], getattr(run, name))
-    # angles are the integrals of the speeds, by a quadrature of the traces' own (trapezium, 1e-3 here)
-    turned = np.concatenate([[0.0], np.cumsum(np.diff(run.t) * 0.5 * (run.w2[1:] + run.w2[:-1]))])
-    np.testing.assert_allclose(run.phi2, turned, atol=1e-4 * run.phi2.max())
-
-
-def test_equation_of_motion_holds_along_the_traces(run: Run) -> None:
-    """J1 w1' = u - T and J2 w2' = T - Mc, by central differences inside the stages."""
-    h = 1e-6
-    inside = [stage.start + 0.37 * stage.duration for stage in run.stages]
-    before, now, after = (run.at(np.array(inside) + shift) for shift in (-h, 0.0, h))
-    np.testing.assert_allclose(0.035 * (after["w1"] - before["w1"]) / (2 * h), now["u"] - now["T"], atol=1e-3)
-    np.testing.assert_allclose(0.175 * (after["w2"] - before["w2"]) / (2 * h), now["T"] - 7.16, atol=1e-3)
-
-
-def test_shape_of_the_answer_is_that_of_the_question(run: Run) -> None:
-    assert run.at(0.1)["T"].shape == ()
     assert run.at([[0.1, 0.2], [0.3, 0.35]])["w2"].shape == (2, 2)
     for beyond in (run.end_time + 1.0, [0.1, -0.1], math.nan):
         with pytest.raises(ValueError, match="within the run"):
@@ -85,7 +66,6 @@ def test_settling_of_a_damped_drive() -> None:
     after = run.at(np.linspace(settled, 2.0, 20_000))["T"]
     assert np.abs(after - mean).max() <= 0.1 * mean * (1 + 1e-6)
     assert abs(float(run.at(settled - 1e-6)["T"]) - mean) > 0.1 * mean * (1 - 1e-3)
-    # a wider band is entered earlier, and an undamped drive never settles
     assert run.settling_time(0.5) < settled < run.settling_time(0.01)
     assert math.isnan(simulate(CRANE, "direct", until=1.0).settling_time())
     with pytest.raises(InputError, match="band = 0"):
@@ -102,8 +82,6 @@ def test_csv_reads_back(run: Run, tmp_path: Path) -> None:
     np.testing.assert_array_equal(table[:, 6], run.T)
     with pytest.raises(InputError, match="cannot be written there"):
         run.to_csv(tmp_path / "nowhere" / "start.csv")
-    run.to_csv(tmp_path / "few.csv", times=[0.0, 0.1])
-    assert len((tmp_path / "few.csv").read_text(encoding="utf-8").splitlines()) == 3
 
 
 def test_a_start_that_never_arrives_says_so() -> None:
@@ -112,18 +90,13 @@ def test_a_start_that_never_arrives_says_so() -> None:
     assert math.isnan(run.start_time)
     assert run.end_time == 3.0
     assert 0.0 < run.k_dyn < 1.0  # the motor alone swings against the resting load
-    early = simulate(CRANE, "direct", until=0.1)
-    assert early.status is Status.STOPPED_EARLY
-    assert early.k_dyn == pytest.approx(3.11785, rel=1e-5)
+    assert simulate(CRANE, "direct", until=0.1).status is Status.STOPPED_EARLY
 
 
 def test_the_figure_shows_the_run(run: Run) -> None:
-    figure = run.plot()
-    torque, speed, twist = figure.axes
-    assert {line.get_label() for line in torque.lines} >= {"motor torque u", "shaft torque T"}
+    torque, speed, twist = run.plot().axes
     drawn = next(line for line in torque.lines if line.get_label() == "shaft torque T")
     np.testing.assert_array_equal(drawn.get_ydata(), run.T)
-    assert max(drawn.get_ydata()) == pytest.approx(run.peak_torque, rel=1e-12)  # the peak is on the grid
     open_stages = [stage for stage in run.stages if stage.side == 0]
     shaded = [path.get_extents() for shade in twist.collections for path in shade.get_paths()]
     np.testing.assert_allclose([one.intervalx for one in shaded], [(s.start, s.end) for s in open_stages])
@@ -131,43 +104,29 @@ def test_the_figure_shows_the_run(run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "key"),
+    ("drives", "options", "said"),
     [
-        ({"until": 0.0}, "until = 0.0"),
-        ({"until": "1 s"}, "until = 1 s"),
-        ({"time_limit": -1.0}, "time_limit = -1"),
-        ({"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
-        ({"fitted_to": WORN}, "fitted_to: records of shape (2,)"),
-        ({"max_events": 0}, "max_events = 0"),
-        ({"parameters": {"torqe": 1.0}}, "torqe"),
-        ({"parameters": {"torque": "lots"}}, "torque"),
+        (CRANE, {"until": 0.0}, "until = 0.0"),
+        (CRANE, {"until": "1 s"}, "until = 1 s"),
+        (CRANE, {"time_limit": -1.0}, "time_limit = -1"),
+        (CRANE, {"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
+        (CRANE, {"fitted_to": records(CRANE, gap=[0.5, 2.0])}, "fitted_to: records of shape (2,)"),
+        (CRANE, {"max_events": 0}, "max_events = 0"),
+        ([], {}, "drive"),
+        ([CRANE, 1], {}, "drive"),
+        (3.0, {}, "drive"),
     ],
 )
-def test_bad_arguments(options: dict[str, object], key: str) -> None:
+def test_bad_arguments(drives: Any, options: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError) as caught:
-        simulate(CRANE, "direct", **options)  # type: ignore[call-overload]
-    assert len(caught.value.sentences) == 1
-    assert key in caught.value.sentences[0]
-
-
-@pytest.mark.parametrize("drives", [[], [CRANE, 1], 3.0, "crane-4amtfk"])
-def test_bad_drives(drives: object) -> None:
-    with pytest.raises(InputError, match="drive"):
-        simulate(drives, "direct")  # type: ignore[call-overload]
+        simulate(drives, "direct", **options)
+    (sentence,) = caught.value.sentences
+    assert said in sentence
 
 
 def test_torque_at_contact_of_a_start_in_contact() -> None:
     assert simulate(CRANE.replace(start_position=0.3), "direct").torque_at_contact == 62.0
     assert simulate(CRANE.replace(start_position=0.3, torque_lag=0.01), "direct").torque_at_contact == 0.0
-
-
-@pytest.mark.parametrize(("damping", "law"), [(33.0, "dead-zone"), (100.0, "modelica"), (1e3, "no-pull")])
-def test_an_overdamped_drive_can_be_started(damping: float, law: str) -> None:
-    for lag in (0.0, 0.002):
-        drive = CRANE.replace(damping=damping, contact_law=law, torque_lag=lag, load_kind="reactive")
-        run = simulate(drive, "direct")
-        assert run.status is Status.REACHED
-        assert abs(run.energy.residual) < 1e-9 * run.energy.motor
 
 
 HEAVY = CRANE.replace(load_inertia=35_000.0)  # 960,000 elastic periods to its target speed
@@ -189,7 +148,7 @@ def test_a_start_that_is_too_long_names_the_remedy() -> None:
 @pytest.mark.slow
 def test_the_longest_start_keeps_its_energy() -> None:
     run = simulate(CRANE.replace(load_inertia=3500.0), "ramp")
-    assert run.end_time > 96_000 * CRANE.replace(load_inertia=3500.0).elastic_period
+    assert run.end_time > 96_000 * run.drive.elastic_period
     assert abs(run.energy.residual) < 1e-9 * run.energy.motor
 
 
@@ -199,11 +158,10 @@ def test_a_start_that_does_not_reach_its_target_is_not_too_long() -> None:
     assert simulate([drive], make_controller("direct", {"torque": 6.0})).status.item() == "NOT_REACHED"
 
 
-@dataclass(frozen=True)
 class Sleeper(PlainController):
     """Does not return for a while."""
 
-    name: ClassVar[str] = "sleeper"
+    name = "sleeper"
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         if measured.time == 0.0:
@@ -221,12 +179,11 @@ def spin(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     command[1] = math.inf
 
 
-@dataclass(frozen=True)
 class Spinner(CompiledController):
     """Works for a while, compiled."""
 
-    name: ClassVar[str] = "spinner"
-    kernel: ClassVar[Any] = spin
+    name = "spinner"
+    kernel = spin
 
     def vector(self, drive: Drive) -> Vector:
         return np.zeros(1)
@@ -237,10 +194,7 @@ class Spinner(CompiledController):
     [(Sleeper(), False), (Sleeper(), True), pytest.param(Spinner(), False, marks=pytest.mark.slow)],
 )
 def test_a_controller_that_does_not_return_is_named_once(
-    controller: PlainController | CompiledController,
-    batch: bool,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    controller: Any, batch: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(engine, "SILENCE", 0.2)
     simulate([CRANE] if batch else CRANE, controller)

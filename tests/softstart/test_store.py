@@ -49,15 +49,9 @@ def refused(path, sentence, **inputs):
     assert (path.read_bytes() if path.is_file() else b"") == before
 
 
-def test_parts_are_found_again(path):
-    assert found_in(path) == [*PARTS, None]
-    assert [one.name for one in path.parent.iterdir()] == ["parts.sqlite"]
-
-
 def test_other_inputs_are_named_and_their_file_left_alone(path):
-    refused(
-        path, "holds a tuning with another drive, seed and more; name another file", drive="x", seed=1, more=1
-    )
+    others = {"drive": "x", "seed": 1, "more": 1}
+    refused(path, "holds a tuning with another drive, seed and more; name another file", **others)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\n", b"letter" * 999, "database"])

@@ -45,14 +45,8 @@ cycles = st.builds(
 @pytest.mark.parametrize(("m", "start", "duration", "opening"), [(0.5, 0.1, 0.8, 2.0), (4.0, 0.6, 1.6, 3.0)])
 def test_burning_obeys_the_first_law(m, start, duration, opening):
     # dp = [(n - 1) Q dx - n p dV]/V, integrated with nothing of the module but Q and the first pressure
-    cycle = SimpleCycle(
-        10.0,
-        9e5,
-        vibe_exponent=m,
-        combustion_start=start,
-        combustion_duration=duration,
-        exhaust_opening=opening,
-    )
+    times = {"combustion_start": start, "combustion_duration": duration, "exhaust_opening": opening}
+    cycle = SimpleCycle(10.0, 9e5, vibe_exponent=m, **times)
     n, Q, log = cycle.expansion_exponent, cycle.heat(ONE, W), math.log(1000.0)
 
     def rate(psi, p):

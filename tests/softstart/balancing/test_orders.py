@@ -143,14 +143,6 @@ def test_two_and_four_cylinders() -> None:
         assert couple == pytest.approx(couples, abs=1e-12)
 
 
-def test_six_cylinders_cancel_up_to_the_fifth_order():
-    made = engine((1, 5, 3, 6, 2, 4))
-    force, couple = made.crank_shaking
-    assert np.all(largest(force)[:6] == 0.0)
-    assert np.all(largest(couple)[:6] == 0.0)
-    assert largest(force)[6] > 0.0
-
-
 # units -------------------------------------------------------------------------------------------------
 
 

@@ -47,31 +47,23 @@ def random_chain(rng: np.random.Generator, count: int, rigid: bool = False) -> d
     t_end = 2 * math.pi / rate * float(rng.uniform(2, 6))
     tones = []
     if rng.random() < 0.5:
-        tones = [
-            (int(rng.integers(count)), float(rate * rng.uniform(0.05, 0.6)), 0.3 * torque, -0.2 * torque)
-        ]
+        place, omega = int(rng.integers(count)), float(rate * rng.uniform(0.05, 0.6))
+        tones = [(place, omega, 0.3 * torque, -0.2 * torque)]
+    sprung = damped & np.isnan(restitution)
     return {
-        "J": J,
-        "c": c,
-        "d": np.where(
-            damped & np.isnan(restitution), 2 * rng.uniform(0, 0.6, count - 1) * np.sqrt(c * J.min()), 0.0
-        ),
-        "gap": gap,
-        "law": law,
-        "restitution": restitution,
+        "J": J, "c": c, "gap": gap, "law": law, "restitution": restitution, "tones": tones, "t_end": t_end,
+        "d": np.where(sprung, 2 * rng.uniform(0, 0.6, count - 1) * np.sqrt(c * J.min()), 0.0),
         "theta0": gap * rng.uniform(-0.45, 0.45, count - 1),
         "w0": np.where(rng.random(count) < 0.5, 0.0, rng.normal(size=count)),
         "Mc": torque * rng.uniform(0, 0.5, count) * (rng.random(count) < 0.6),
         "reactive": rng.random(count) < 0.5,
         "ground": np.where(rng.random(count) < 0.3, rng.uniform(0, 1.0, count), 0.0),
-        "tones": tones,
         "pieces": [(0.0, torque), (0.4 * t_end, torque * float(rng.uniform(-0.5, 1.0)))],
         "lag": 0.0 if rng.random() < 0.5 else 0.05 * t_end,
         "rate": math.inf if rng.random() < 0.5 else 8 * torque / t_end,
         "motor": int(rng.integers(count)),
-        "t_end": t_end,
         "target": float(rng.uniform(0.1, 1.0)),
-    }
+    }  # fmt: skip
 
 
 def with_losses(rng: np.random.Generator, drawn: dict[str, Any]) -> dict[str, Any]:

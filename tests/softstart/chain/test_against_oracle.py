@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import both, differences, random_chain, with_losses
 
@@ -75,17 +75,12 @@ def test_four_masses_with_three_gaps():
 
 
 @given(seed=SEEDS, count=st.integers(2, 5))
+@example(141, 5)  # flanks that overlap meet again with T = 0 but for rounding, whose sign means nothing
 @examples(4)
 def test_gears_with_losses(seed, count):
     """Gears on either side of their shafts, gaps, all contact laws, friction, masses held by gears."""
     rng = np.random.default_rng(seed)
     agree(with_losses(rng, random_chain(rng, count)))
-
-
-def test_a_torque_that_comes_back_presses_its_flank():
-    """Flanks that overlap without torque meet again with T = 0 but for rounding, whose sign means nothing."""
-    rng = np.random.default_rng(141)
-    agree(with_losses(rng, random_chain(rng, 5)))
 
 
 @given(seed=SEEDS, count=st.integers(2, 8), rigid=st.booleans())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.twin import chain_of
 
 from softstart import Drive, InputError
-from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.views.drives import drive_lines
 
 BASE = """
@@ -61,13 +61,6 @@ def chains(draw: st.DrawFn) -> Chain:
 
 
 @given(chains(), st.data())
-@settings(max_examples=40, deadline=None)
-def test_frequencies_do_not_depend_on_the_reference_shaft(chain: Chain, data: st.DataObject) -> None:
-    there = chain.brought_to(data.draw(st.integers(0, len(chain.masses) - 1)))
-    np.testing.assert_allclose(natural_vibration(there).Omega, natural_vibration(chain).Omega, rtol=1e-12)
-
-
-@given(chains(), st.data())
 @settings(max_examples=60, deadline=None)
 def test_energy_and_power_do_not_depend_on_the_reference_shaft(chain: Chain, data: st.DataObject) -> None:
     """Kinetic energy, power of the loads, elastic energy at the same angles: formed on own shafts."""
@@ -82,13 +75,11 @@ def test_energy_and_power_do_not_depend_on_the_reference_shaft(chain: Chain, dat
     for j, shaft in enumerate(chain.shafts):
         before, after = angles[j], angles[j + 1]
         twist = before - after * shaft.ratio if shaft.side == "before" else before / shaft.ratio - after
-        brought = angles[j] / i[j] - angles[j + 1] / i[j + 1]
-        assert there.shafts[j].stiffness * brought**2 == pytest.approx(
-            shaft.stiffness * twist**2, rel=1e-9, abs=1e-12
-        )
-        assert there.shafts[j].gap * np.sqrt(there.shafts[j].stiffness) == pytest.approx(
-            shaft.gap * np.sqrt(shaft.stiffness), rel=1e-11
-        )
+        brought, moved = angles[j] / i[j] - angles[j + 1] / i[j + 1], there.shafts[j]
+        elastic = shaft.stiffness * twist**2
+        assert moved.stiffness * brought**2 == pytest.approx(elastic, rel=1e-9, abs=1e-12)
+        across = shaft.gap * np.sqrt(shaft.stiffness)
+        assert moved.gap * np.sqrt(moved.stiffness) == pytest.approx(across, rel=1e-11)
 
 
 @given(chains())
@@ -226,10 +217,3 @@ def test_names_and_places() -> None:
         chain.index(2)
     with pytest.raises(InputError, match="at least 2 masses"):
         Chain([Mass(1)], [])
-
-
-def test_there_is_no_such_chain(tmp_path: object) -> None:
-    with pytest.raises(InputError, match="did you mean tractor-like"):
-        Chain.load("tractor-liek")
-    with pytest.raises(InputError, match="directory"):
-        Chain.load(str(tmp_path))

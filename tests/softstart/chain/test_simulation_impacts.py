@@ -68,7 +68,7 @@ def test_three_masses_collapse_below_the_known_restitution():
         run = bounced(restitution)
         assert "impacts over, flanks press" in [e.kind for e in run.events]
         w = run.at(run.end_time)["w"]
-        assert w == pytest.approx(float(np.mean([1.0, 0.0, -1.0])), abs=1e-7)
+        assert w == pytest.approx(0.0, abs=1e-7)
         assert float(w.sum()) == pytest.approx(0.0, abs=1e-14)
         assert run.energy.impacts == pytest.approx(1.0, rel=1e-12)
     for restitution in (1.01 * limit, 1.1 * limit, 0.5, 1.0):
@@ -77,12 +77,11 @@ def test_three_masses_collapse_below_the_known_restitution():
         assert len(run.events) < 100
 
 
-def pressed(restitution: float, until: float, torque: float = 3.0):
+def pressed(restitution: float, until: float):
     """A mass of 1 driven through half a gap of 0.2 rad against one of 2: it bounces to rest on it."""
-    chain = Chain(
-        [Mass(1.0), Mass(2.0)], [Shaft(gap=0.2, restitution=restitution)], Motor(torque), target_speed=1e3
-    )
-    return simulate(chain, Pieces(pieces=((0.0, torque),)), until, fitted_to=CRANE)
+    shaft = Shaft(gap=0.2, restitution=restitution)
+    chain = Chain([Mass(1.0), Mass(2.0)], [shaft], Motor(3.0), target_speed=1e3)
+    return simulate(chain, Pieces(pieces=((0.0, 3.0),)), until, fitted_to=CRANE)
 
 
 @given(restitution=st.floats(0.0, 0.97))
@@ -117,12 +116,8 @@ def test_elastic_impacts_never_end():
 
 def test_pressed_flanks_part_when_they_would_have_to_pull():
     """A torque that sinks along a line: the flanks part at its zero, where their torque is zero."""
-    chain = Chain(
-        [Mass(1.0), Mass(2.0)],
-        [Shaft(gap=0.2, restitution=0.3)],
-        Motor(3.0, minimum_torque=-3.0, torque_rate=2.0),
-        target_speed=1e3,
-    )
+    motor = Motor(3.0, minimum_torque=-3.0, torque_rate=2.0)
+    chain = Chain([Mass(1.0), Mass(2.0)], [Shaft(gap=0.2, restitution=0.3)], motor, target_speed=1e3)
     run = simulate(chain, Pieces(pieces=((0.0, 3.0), (4.0, -3.0))), 7.0, fitted_to=CRANE)
     opened = [e for e in run.events if e.kind == "gap opened"]
     assert [e.time for e in opened] == pytest.approx([5.5], rel=1e-13)
@@ -209,9 +204,8 @@ def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
     assert run.events[-1].time == 0.0
     found = run.at(np.linspace(0.0, 0.5, 101))
     assert not found["w"][:, :2].any()
-    assert (
-        np.abs(found["torques"][:, 0] - 3.0 - found["torques"][:, 1]).max() < 0.1
-    )  # but for what the gear holds
+    left = found["torques"][:, 0] - 3.0 - found["torques"][:, 1]
+    assert np.abs(left).max() < 0.1  # but for what the gear holds
 
 
 def rattling(seed: int) -> tuple[Chain, Pieces]:
@@ -239,12 +233,8 @@ def rattling(seed: int) -> tuple[Chain, Pieces]:
         )
         for speed in speeds
     ]
-    motor = Motor(
-        20.0,
-        mass=f"mass {rng.integers(count) + 1}",
-        minimum_torque=-20.0,
-        torque_rate=float(rng.choice([math.inf, 200.0])),
-    )
+    place, rate = f"mass {rng.integers(count) + 1}", float(rng.choice([math.inf, 200.0]))
+    motor = Motor(20.0, mass=place, minimum_torque=-20.0, torque_rate=rate)
     pieces = tuple((t, float(rng.uniform(-10, 20))) for t in (0.0, 0.3, 0.7, 1.2))
     return Chain(masses, shafts, motor, target_speed=1e3), Pieces(pieces=pieces)
 

@@ -87,14 +87,6 @@ def test_without_gaps_it_is_the_linear_response() -> None:
     assert one.amplitude[0] == pytest.approx([abs(twist) * 2 / 3, abs(twist) / 3], rel=1e-9)
 
 
-@pytest.mark.parametrize("locking", [9.0, -9.0])
-def test_a_constant_torque_above_the_alternating_one_locks_all_gaps(locking: float) -> None:
-    found = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0}, locking=locking)
-    np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
-    loose = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0})
-    assert (np.abs(loose.amplitude / loose.without_gaps - 1.0).max(axis=1) > 0.2).all()
-
-
 def test_an_open_gap_against_scipy() -> None:
     """A twist that passes through the gap and back twice a period; scipy starts elsewhere."""
     w, size, locking = 12.0, 1.0, 0.3

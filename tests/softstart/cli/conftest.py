@@ -46,22 +46,6 @@ class Raises(PlainController):
 class Leaves(PlainController):
     def step(self, measured, state):
         raise SystemExit(7)
-
-class Nan(PlainController):
-    def step(self, measured, state):
-        return Command(float("nan"))
-
-class Past(PlainController):
-    def step(self, measured, state):
-        return Command(62.0, measured.time - 1.0)
-
-class Text(PlainController):
-    def step(self, measured, state):
-        return "full torque"
-
-class Hollow(PlainController): pass
-
-class NoController: pass
 """
 
 DRIVE = """
@@ -90,17 +74,9 @@ def place(tmp_path, monkeypatch):
     """An empty folder that is the current one, with some files to use."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(CONTROLLERS)
-    (tmp_path / "only.py").write_text("from own_missing_module import x\n")
-    (tmp_path / "syntax.py").write_text("x = (\n")
-    (tmp_path / "nothing.py").write_text("x = 1\n")
     (tmp_path / "quits.py").write_text("raise SystemExit(5)\n")
     (tmp_path / "good.toml").write_text(DRIVE)
-    (tmp_path / "deep.toml").write_text(f"[{'a.' * 60_000}a]\nb = 1\n")  # took memory by its square
     (tmp_path / "broken.toml").write_text("name = \n")
-    (tmp_path / "latin.toml").write_bytes(b'name = "caf\xe9"\n')
-    (tmp_path / "list.toml").write_text(DRIVE.replace("gap = 0.5", "gap = [0.5, 1.0]"))
-    (tmp_path / "weak.toml").write_text(DRIVE.replace('"62 N*m"', "5"))
-    (tmp_path / "misspelt.toml").write_text(DRIVE.replace("stiffness", "stifness"))
     (tmp_path / "wrong.toml").write_text(
         DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan")
     )

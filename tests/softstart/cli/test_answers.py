@@ -7,7 +7,6 @@ import math
 import re
 import shlex
 
-import numpy as np
 import pytest
 from tests.softstart.test_identification import TRUTH
 
@@ -42,6 +41,8 @@ QUICK_TUNE = (
     "--restarts 1 --workers 1 --no-optimum --free time"
 )
 LIVES = "fatigue crane-4amtkf --controllers direct,s-curve --set shaft.damping=1"
+LIMITED_TO = ["direct", "s-curve"]
+LIMITED = "compare hoist-15kw --set limits.shaft_torque=170 --worst-case none --controllers direct,s-curve"
 LOOP = "linear --controller current-limit-feedback"
 THREE = ("direct", "reduced-first-stage", "reduced-two-stage")
 
@@ -53,6 +54,9 @@ def as_python() -> dict:
         "compare --controllers " + ",".join(THREE): lambda: compare("crane-4amtkf", THREE).summary(),
         "compare crane-4-mass --controllers direct,ramp": lambda: compare(
             "crane-4-mass", ["direct", "ramp"]
+        ).summary(),
+        LIMITED: lambda: compare(
+            Drive.load("hoist-15kw").replace(permissible_torque=170.0), LIMITED_TO, worst_case=()
         ).summary(),
         LIVES: lambda: fatigue([simulate(DAMPED, name) for name in ("direct", "s-curve")]).summary(),
         LOOP: lambda: linear_view(CRANE, "current-limit-feedback").summary(),
@@ -110,24 +114,16 @@ def test_settings_parameters_and_end_reach_the_start(as_json):
     assert rows[2]["parameters"] == {"share": 0.25}
 
 
-def test_a_profile_from_a_file_is_simulated_and_compared_where_it_is_given(place, as_json):
+def test_a_profile_is_compared_where_its_file_is_given(place, as_json):
     TorqueProfile([0.0], [62.0]).to_csv(place / "full.csv")
-    told = as_json("simulate", "crane-4amtkf", "--controller", "profile", "--param", "file=full.csv")
-    assert told["parameters"] == {"file": "full.csv", "period": 0.0}
-    assert told["k_dyn"] == simulate(CRANE, "direct").k_dyn
     names = [one["controller"] for one in as_json("compare")["strategies"]]
-    told = as_json("compare", "--param", "profile.file=full.csv")
-    assert sorted([*names, "profile"]) == sorted(one["controller"] for one in told["strategies"])
+    rows = as_json("compare", "--param", "profile.file=full.csv")["strategies"]
+    assert sorted([*names, "profile"]) == sorted(one["controller"] for one in rows)
+    (profile,) = [one for one in rows if one["controller"] == "profile"]
+    assert (profile["k_dyn"], profile["parameters"]["file"]) == (simulate(CRANE, "direct").k_dyn, "full.csv")
 
 
-def test_limits_margins_and_the_recommendation_are_told_and_time_lost_is_that_of_direct(as_json):
-    told = as_json("compare", "hoist-15kw", "--set", "limits.shaft_torque=170", "--controllers",
-                   "direct,shaped,s-curve", "--worst-case", "none")  # fmt: skip
-    assert told["recommendation"]["recommended"] == "s-curve"
-    direct = next(one for one in told["strategies"] if one["controller"] == "direct")
-    (margin,) = direct["limits"]
-    assert (margin["permitted"], margin["kept"]) == (170.0, False)
-    assert margin["margin"] == pytest.approx(1.0 - direct["peak_torque"] / 170.0)
+def test_time_lost_is_a_share_of_that_of_direct():
     direct, other = compare("crane-4amtkf", ["direct", "s-curve"]).rows
     assert share_lost(direct) == 0.0
     lost = 100 * (other.run.settled_time / direct.run.settled_time - 1)
@@ -152,24 +148,12 @@ def test_start_times_are_times_or_multiples_of_direct(as_json):
 
 
 @pytest.mark.slow
-def test_other_aims_and_bounds_of_an_optimum(as_json, done):
-    told = as_json("optimize", *SIXTY, "--minimise", "start_time", "--max-k-dyn", "1.2")
-    assert told["k_dyn"] <= 1.2
-    assert as_json("optimize", *SIXTY, "--start-time", repr(0.99 * told["start_time"]))["k_dyn"] > 1.2
-    out = done("optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x")
-    assert "K_dyn if known to start at opposite-flank" in out
-
-
-@pytest.mark.slow
 def test_too_short_a_start_time_is_told_with_the_shortest(run, nothing_left):
     code, out, err = run("optimize", *SIXTY, "--start-time", "0.2", "--json", "--out", "best")
-    assert (code, err.count("\n")) == (3, 1)
     told = json.loads(out)
-    assert told["status"] == "INFEASIBLE"
-    shortest = told["shortest_start_time"]
-    assert 0.2 < shortest < 0.26
+    assert (code, err.count("\n"), told["status"]) == (3, 1, "INFEASIBLE")
+    assert 0.2 < told["shortest_start_time"] < 0.26
     nothing_left()
-    assert run("optimize", *SIXTY, "--start-time", repr(1.001 * shortest), "--json").code == 0
 
 
 def test_no_gains_in_time_is_no_solution(run):
@@ -193,22 +177,14 @@ def test_each_start_of_a_grid_is_that_of_simulate(as_json):
         there = CRANE.replace(load_inertia=0.1, gap=cell["gap"])
         one = simulate(there, "ramp", parameters={"time": cell["controller_time"]})
         assert (cell["k_dyn"], cell["start_time"]) == (one.k_dyn, one.start_time)
-    assert told["figures"]["k_dyn"]["max"] == max(cell["k_dyn"] for cell in told["cells"])
-    assert (told["share_reached"], told["status"]) == (1.0, {"REACHED": 8})
 
 
-def test_controllers_and_words_are_axes_and_what_went_wrong_stands_out(as_json, done):
-    told = as_json("sweep", "--axis", "controller=direct,ramp", "--axis", "load.kind=active,reactive",
-                   "--axis", "shaft.gap=0.1:4:5:log", "--workers", "1")  # fmt: skip
-    assert told["starts"] == 20
-    assert told["axes"]["controller"]["values"] == ["direct", "ramp"]
-    assert told["worst"]["at"]["controller"] == "direct"
+def test_what_went_wrong_in_a_grid_stands_out(as_json, done):
     few = ("sweep", "--controller", "direct", "--workers", "1", "--until", "0.36", "--axis")
     out = done(*few, "shaft.gap=0.5,1.5")
-    lines = [line.split() for line in out.splitlines()]
     (late,) = [line for line in out.splitlines() if "stopped early" in line]
     assert late.split()[0] == "0.5"
-    assert ["1.5", "4.3847", "reached"] in [line[:3] for line in lines]
+    assert ["1.5", "4.3847", "reached"] in [line.split()[:3] for line in out.splitlines()]
     assert as_json(*few, "shaft.gap=0.5:1.5:41")["cells"] is None  # too large to list
 
 
@@ -297,8 +273,6 @@ def test_natural_frequencies_come_first_whatever_cannot_be_reduced(run, place, n
     assert (code, err.count("\n")) == (2, 1)
     found = [line.split()[-1] for line in out.splitlines() if re.match(r"[\d., -]+$", line)]
     assert found == ["0.00", "81.21", "141.21", "378.95", "536.36"]
-    code, out, _ = run("reduce", "good.toml", "--json")
-    assert [f"{mode['frequency']:.2f}" for mode in json.loads(out)["vibration"]["modes"]] == found
     asked = ("reduce", "tractor-like", "--factor", "20")
     code, out, err = run(*asked, "--out", "found")
     assert code == 2
@@ -307,30 +281,20 @@ def test_natural_frequencies_come_first_whatever_cannot_be_reduced(run, place, n
     assert run(*asked, "--force", "--json", "--no-starts").code == 0
 
 
-def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
-    code, out, _ = run("reduce", "--verify", "direct,ramp", "--param", "ramp.time=0.3 s", "--json")
-    assert code == 0
-    told = json.loads(out)["verified"]
+def test_starts_designed_on_the_drive_are_verified_on_the_chain(run, place):
+    done = run("reduce", "--verify", "pulse-coast-hold,ramp", "--param", "ramp.time=0.1 s", "--json",
+               "--out", "found")  # fmt: skip
+    told = json.loads(done.out)
     drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
-    for one, parameters in zip(told, ({}, {"time": 0.3}), strict=True):
+    for one, parameters in zip(told["verified"], ({}, {"time": 0.1}), strict=True):
         name = one["controller"]
         assert one["k_dyn"] == simulate(drive, name, parameters=parameters).k_dyn
         whole = simulate("crane-4-mass", name, parameters=parameters, fitted_to=drive, base=drive)
-        assert (one["chain_k_dyn"], one["chain_start_time"]) == (whole.k_dyn, whole.start_time)
-        assert one["worst_shaft"] == "rotor - pinion"
-        assert one["k_dyn_error"] == pytest.approx(one["chain_k_dyn"] / one["k_dyn"] - 1.0)
-
-
-def test_another_order_on_the_chain_is_told(run, place):
-    done = run("reduce", "--verify", "pulse-coast-hold,ramp", "--json", "--out", "found")
-    told = json.loads(done.out)
-    pulse, ramp = told["verified"]
-    assert pulse["k_dyn"] < ramp["k_dyn"] < ramp["chain_k_dyn"] < pulse["chain_k_dyn"]
+        assert (one["chain_k_dyn"], one["worst_shaft"]) == (whole.k_dyn, "rotor - pinion")
     verdict = told["verdict"]
     assert verdict["order_on_chain"] == ["ramp", "pulse-coast-hold"] == verdict["order_on_drive"][::-1]
-    assert verdict["of_strategies"]["pulse-coast-hold"] == pulse["chain_k_dyn"] / pulse["k_dyn"] - 1.0
     assert not verdict["enough"]
-    assert "On the chain ramp is gentler than pulse-coast-hold (K_dyn 3.27 and 4.05)" in verdict["said"]
+    assert "On the chain ramp is gentler than pulse-coast-hold (K_dyn 3" in verdict["said"]
     assert verdict["said"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
 
 
@@ -344,7 +308,7 @@ def test_commands_go_on_with_the_chain_itself(run, as_json):
     found = as_json("tune", *asked, *few, "--out", "tuned")["robust"]
     assert found["worst"] <= found["worst_default"]
     told = as_json("simulate", "tuned/chain.toml", "--controller", "tuned/robust.toml")
-    assert told["controller"] == "s-curve (robust)"
+    assert told["k_dyn"] == pytest.approx(found["worst"], rel=1e-9)
 
 
 # ---- identification ----------------------------------------------------------------------------------
@@ -353,9 +317,7 @@ def test_commands_go_on_with_the_chain_itself(run, as_json):
 @pytest.mark.slow
 def test_a_log_becomes_a_drive_file(run, tmp_path):
     log = made_up_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
-    table = np.column_stack([log.time, log.torque, log.values])
-    head = "time [s],torque [N*m],angle [rad]"
-    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="")
+    log.to_csv(tmp_path / "a.csv")
     guess = TRUTH.replace(gap=0.2, stiffness=200, load_inertia=0.4, damping=0.9)
     (tmp_path / "guess.toml").write_text(guess.to_toml(), encoding="utf-8")
     result = run("identify", "a.csv", "--drive", "guess.toml", "--torque-is", "demand", "--restarts", "3",

@@ -40,22 +40,8 @@ def test_what_a_line_may_become(line, place):
     assert all(one.value.startswith(last) for one in found)
 
 
-def test_every_key_that_is_offered_can_be_set():
-    keys = keys_of(Drive.TABLES)
-    drive = Drive.load("crane-4amtkf")
-    needs = {
-        "required_life": ("starts_per_hour",),
-        "fatigue_torque": ("fatigue_slope", "fatigue_cycles"),
-        "fatigue_cycles": ("fatigue_slope", "fatigue_torque"),
-    }
-    for parameter in PARAMETERS.values():
-        assert parameter.path in keys
-        value = parameter.example.strip('"')
-        also = [
-            f"{PARAMETERS[name].path}={PARAMETERS[name].example}" for name in needs.get(parameter.name, ())
-        ]
-        changed = drive.with_settings([f"{parameter.path}={value}", *also])
-        assert changed.name == (value if parameter.name == "name" else drive.name)
+def test_every_parameter_is_offered():
+    assert {one.path for one in PARAMETERS.values()} <= set(keys_of(Drive.TABLES))
 
 
 def test_tab_in_bash(place, run, monkeypatch, refused):

@@ -22,21 +22,6 @@ SLEWING = {
     "gear.backlash": "8", "load.inertia": "290", "load.torque": "900",
 }  # fmt: skip
 UNITS = {"motor.rated_power": "15 kW", "motor.rated_speed": "1460 1/min", "gear.backlash": "8 arcmin"}
-BY_HAND = """
-[motor]
-inertia = "0.09 kgm2"
-starting_torque = "240 Nm"
-[shaft]
-stiffness = 761.77
-damping = 0.27523
-gap = 0.08843
-[load]
-inertia = 0.20083
-torque = 23.684
-kind = "reactive"
-[start]
-target_speed = "1460 rpm"
-"""
 
 
 @pytest.fixture
@@ -90,40 +75,35 @@ def test_an_end_of_the_answers_names_the_one_that_is_missing(run, typed, nothing
     assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in said
     assert "--set motor.inertia=" in said
     nothing_left()
-
-
-def test_a_sheet_in_a_file(run, place, as_json):
-    code, out, _ = run("init", "--template")
-    assert code == 0
-    filled = "".join(
-        line.removeprefix("# ") + "\n" for line in out.splitlines() if "only for hoist;" not in f"{line};"
-    ).replace("[rope]", "")
-    (place / "sheet.toml").write_text(filled)
-    found = as_json("init", "sheet.toml")
-    assert found["data_sheet"]["machine"] == "travel"
-    sheet = DataSheet.load("sheet.toml")
-    assert found["drive"]["load_inertia"] == sheet.drive.J2
-    code, out, _ = run("init", "sheet.toml", "--set", "load.mass=6000 kg", "--set", "load.torque=0")
-    assert Drive.from_toml(out).Mc < 0.51 * sheet.drive.Mc
-
-
-def test_without_a_terminal_it_asks_for_nothing(run, typed):
-    typed()
+    typed()  # without a terminal it asks for nothing
     code, out, err = run("init")
     assert (code, out) == (2, "")
     for missing in ("[load] machine", "[motor] rated_power", "[motor] rated_speed", "[motor] inertia"):
         assert f"{missing} is missing" in err
 
 
+def test_the_template_is_a_sheet_that_can_be_filled_in(run, place, as_json):
+    filled = "".join(
+        line.removeprefix("# ") + "\n"
+        for line in run("init", "--template").out.splitlines()
+        if "only for hoist;" not in f"{line};"
+    ).replace("[rope]", "")
+    (place / "sheet.toml").write_text(filled)
+    found, sheet = as_json("init", "sheet.toml"), DataSheet.load("sheet.toml")
+    assert found["data_sheet"]["machine"] == "travel"
+    assert found["drive"]["load_inertia"] == sheet.drive.J2
+    half = run("init", "sheet.toml", "--set", "load.mass=6000 kg", "--set", "load.torque=0").out
+    assert Drive.from_toml(half).Mc < 0.51 * sheet.drive.Mc
+
+
 def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
-    """Prompt, --set, data sheet given to compare, form and a drive file by hand: one K_dyn."""
+    """Prompt, --set, data sheet given to a command, and form: one K_dyn."""
     typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
           "", "290", "900", "", "")  # fmt: skip
     assert run("init", "--ask", "--out", "asked.toml").code == 0
     settings = [word for path, text in (SLEWING | UNITS).items() for word in ("--set", f"{path}={text}")]
     assert run("init", *settings, "--out", "set.toml").code == 0
     (place / "sheet.toml").write_text(DataSheet.from_settings(SLEWING | UNITS).to_toml())
-    (place / "hand.toml").write_text(BY_HAND)
     pytest.importorskip("nicegui")
     from nicegui import Client
     from nicegui.page import page
@@ -138,10 +118,10 @@ def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
         (place / "form.toml").write_text(panel.sheet().drive_toml())
         client.delete()
     found = []
-    for name in ("asked", "set", "sheet", "form", "hand"):
+    for name in ("asked", "set", "sheet", "form"):
         drive = Drive.load(f"{name}.toml")
         assert (drive.J2, drive.c, drive.gap, drive.Mc) == (0.20083, 761.77, 0.08843, 23.684)
-        assert drive.assumed == ("" if name == "hand" else "damping ratio 0.02")
+        assert drive.assumed == "damping ratio 0.02"
         code, out, err = run("simulate", f"{name}.toml", "--controller", "direct", "--json")
         assert (code, "is a data sheet" in err) == (0, name == "sheet")
         found.append(json.loads(out)["k_dyn"])

@@ -109,41 +109,23 @@ def test_where_an_integrator_needs_short_steps(given, seen):
     assert run.slip_time == pytest.approx(other.slip_time, rel=1e-10, nan_ok=True)
 
 
-BASE = {
-    "clutch_inertia": 0.2, "load_inertia": 1.0, "clutch_torque": 100.0, "load_torque": 30.0,
-    "stiffness": 80.0, "drive_speed": 60.0, "engagement_time": 0.4,
-}  # fmt: skip
-
-
-def dipping(low, load_torque, **more):
-    """Engaged, then let go for a while, then engaged again: the locked clutch slips again."""
-    base = Clutch(**{**BASE, "load_torque": load_torque, **more})
-    start = engage(base).slip_time
-    times = [0.0, 0.4, start + 0.1, start + 0.3, start + 0.9, start + 1.1]
-    return base.with_table(times, [0.0, 100.0, 100.0, low, low, 100.0]), start
-
-
 @pytest.mark.parametrize("kind", ["active", "reactive"])
 @pytest.mark.parametrize("gap", [0.0, 0.5])
 def test_a_clutch_let_go_slips_again_and_locks_again(kind, gap):
-    clutch, start = dipping(10.0, 30.0, load_kind=kind, gap=gap, damping=0.5)
-    run = engage(clutch, until=start + 4.0)
+    clutch = Clutch(
+        clutch_inertia=0.2, load_inertia=1.0, clutch_torque=100.0, load_torque=30.0, stiffness=80.0,
+        drive_speed=60.0, engagement_time=0.4, load_kind=kind, gap=gap, damping=0.5,
+    )  # fmt: skip
+    start = engage(clutch).slip_time
+    times = [0.0, 0.4, start + 0.1, start + 0.3, start + 0.9, start + 1.1]
+    run = engage(clutch.with_table(times, [0.0, 100.0, 100.0, 10.0, 10.0, 100.0]), until=start + 4.0)
     assert [phase.kind for phase in run.phases][:3] == ["slip", "locked", "slip"]
-    other = integrate(clutch, start + 4.0)
+    assert all(phase.friction_work >= 0.0 for phase in run.phases)
+    other = integrate(run.clutch, start + 4.0)
     assert other.reslips >= 1
     assert run.friction_work == pytest.approx(other.work, rel=1e-8)
     assert run.peak_torque == pytest.approx(other.peak, rel=1e-8)
     assert run.energy.residual < 1e-12
-
-
-def test_a_swinging_load_drives_the_clutch_side_past_the_driving_side():
-    clutch, start = dipping(3.0, 0.0)
-    run = engage(clutch, until=start + 3.0)
-    faster = run.at(run.t)["wM"].max()
-    assert faster > 60.0 * (1.0 + 1e-3)  # slip in the other direction
-    other = integrate(clutch, start + 3.0)
-    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
-    assert all(phase.friction_work >= 0.0 for phase in run.phases)
 
 
 def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():

@@ -32,13 +32,11 @@ def sentences(attempt):
 
 # a line of the good file, what stands there instead, what the sentence begins with, what it says
 TOML = [
-    ("gap = 0.5", 'gap = "5 m"', '[shaft] gap = "5 m": ', "m is a length"),
     ("gap = 0.5", "gap = 2024-01-01", "[shaft] gap = 2024-01-01: ", "a date is not a quantity"),
     ("gap = 0.5", "", "[shaft] gap is missing: ", 'write for example gap = "0.5 rad"'),
     ("gap = 0.5", "gapp = 0.5", "[shaft] gapp = 0.5: ", "[shaft] has no key gapp; did you mean gap?"),
     ("gap = 0.5", "gap = 0.5\ninertia = 1", "[shaft] inertia = 1: ", "[motor] inertia or [load] inertia?"),
     ("gap = 0.5", "gap = 0.5\nJ1 = 2", "[shaft] J1 = 2: ", "did you mean [motor] inertia?"),
-    ("gap = 0.5", "gap = 0.5\nqqq = 2", "[shaft] qqq = 2: ", "it has stiffness, damping, gap, contact_law"),
     ("gap = 0.5", "gap = 0.5\ngap = 2", "line ", "not valid TOML (cannot overwrite a value)"),
     ("gap = 0.5", "gap = 0.5 rad", "line 7, column 11, 'gap = 0.5 rad': ", 'in quotes: gap = "0.5 rad"'),
     ("gap = 0.5", "gap = 0,5 rad # flanks", "line ", 'use a decimal point: "0.5 rad")'),
@@ -175,7 +173,6 @@ def test_limits_that_are_refused(text, said):
 
 # parameter, value, what the sentence begins with, what it says
 PYTHON = [
-    ("gap", "5 m", 'gap = "5 m": ', "m is a length, not an angle"),
     ("gap", "-30 deg", 'gap = "-30 deg": ', "the total angular gap must be 0 or more"),
     ("motor_inertia", 0, "motor_inertia = 0: ", "must be above 0"),
     ("starting_torque", 7.16, "starting_torque = 7.16 N*m: ", "cannot move the load against load_torque"),
@@ -187,12 +184,10 @@ PYTHON = [
     ("initial_motor_speed", math.inf, "initial_motor_speed = inf: ", "must be finite"),
     ("load_torque", -400.0, "load_torque = -400 N*m: ", "drives so hard"),
     ("load_kind", "reactiv", 'load_kind = "reactiv": ', 'did you mean "reactive"?'),
-    ("load_kind", ["active"], "load_kind = ['active']: ", 'is "active" or "reactive"'),
     ("contact_law", None, "contact_law = None: ", '"no-pull", "dead-zone" or "modelica"'),
     ("name", "two\nlines", 'name = "two\\nlines": ', "one line of text"),
     ("name", "x" * 121, "name = ", "121 characters, and at most 120"),
     ("source", "\ud800", "source = ", "incomplete character"),
-    ("inertia", 1, "inertia = 1: ", "did you mean motor_inertia or load_inertia?"),
     ("stiffness", 5e-324, "stiffness = 5e-324: ", "must be between 1e-30 and 1e+30"),
 ]  # fmt: skip
 
@@ -215,24 +210,18 @@ def test_everything_missing_and_a_misspelt_key_not_twice():
 
 SETTINGS = [
     ("load.inertia", '"load.inertia": ', "a key, an equals sign and a value"),
-    ("load.inertia=", 'load.inertia = "": ', "not a number with a unit"),
     ("load.inertai=1", "load.inertai=1: ", "did you mean load.inertia?"),
     ("inertia=1", "inertia=1: ", "did you mean motor.inertia or load.inertia?"),
+    ("gap=2", "gap=2: ", "it was set before (shaft.gap=1); keep one of the two."),
     ("load=1", "load=1: ", "load is a table, name one of its keys, such as load.inertia"),
-    ("motor.starting_torque=1", "motor.starting_torque = 1 N*m: ", "load.torque = 7.16 N*m"),
 ]
 
 
 @pytest.mark.parametrize(("setting", "subject", "reason"), SETTINGS, ids=lambda v: str(v)[:24])
 def test_one_sentence_from_a_setting(setting, subject, reason):
-    (sentence,) = sentences(lambda: Drive(**GOOD).with_settings([setting]))
+    (sentence,) = sentences(lambda: Drive(**GOOD).with_settings(["shaft.gap=1", setting]))
     assert sentence.startswith(subject)
     assert reason in sentence
-
-
-def test_a_setting_twice():
-    (sentence,) = sentences(lambda: Drive(**GOOD).with_settings(["shaft.gap=1", "gap=2"]))
-    assert sentence == "gap=2: it was set before (shaft.gap=1); keep one of the two."
 
 
 def test_rated_torque_power_and_speed_agree_within_what_a_data_sheet_rounds():

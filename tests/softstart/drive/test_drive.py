@@ -3,8 +3,6 @@
 import math
 import pickle
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -28,12 +26,6 @@ def test_defaults():
     assert (plain.load_kind, plain.contact_law, plain.encoder_lines) == ("active", "no-pull", 4096.0)
     assert not plain.limits
     assert type(plain.gap) is type(plain.load_inertia) is type(plain.Omega) is float
-
-
-def test_the_elastic_frequency():
-    expected = math.sqrt(368.465 * 0.21 / (0.035 * 0.175))  # [G](8)
-    assert pytest.approx(expected, rel=1e-15) == CRANE.Omega
-    assert CRANE.elastic_period == pytest.approx(2 * math.pi / expected, rel=1e-15)
 
 
 def test_changes_follow_and_are_checked():
@@ -73,15 +65,6 @@ def test_the_example_of_each_parameter_is_valid(parameter):
     crane = CRANE.replace(rated_power=None)
     changed = crane.with_settings([f"{p.path}={p.example}" for p in table or [parameter]])
     assert Drive.from_toml(changed.to_toml()) == changed
-
-
-def test_the_import_stays_light():
-    code = (
-        "import sys; from softstart.drive import Drive;"
-        "heavy = {'numba', 'control', 'matplotlib', 'scipy', 'pint', 'casadi'} & set(sys.modules);"
-        "assert not heavy, heavy"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 # ---- files and back -------------------------------------------------------------------------------------
@@ -192,6 +175,8 @@ def test_the_crane_of_g(name, J2, gap):
     drive = Drive.load(name)
     assert (drive.J1, drive.J2, drive.gap, drive.c, drive.d) == (0.035, J2, gap, 368.465, 0.0)
     assert (drive.Ms, drive.maximum_torque, drive.Mc, drive.load_kind) == (62.0, 64.0, 7.16, "active")
+    assert pytest.approx(math.sqrt(368.465 * (0.035 + J2) / (0.035 * J2)), rel=1e-15) == drive.Omega  # [G](8)
+    assert drive.elastic_period == pytest.approx(2 * math.pi / drive.Omega, rel=1e-15)
     assert drive.target_speed == pytest.approx(880 * 2 * math.pi / 60, rel=1e-15)
     # 0.3 of the rated torque, as [G] says
     assert drive.Mc == pytest.approx(0.3 * 2200.0 / drive.rated_speed, rel=1e-3)

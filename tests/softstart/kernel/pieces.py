@@ -1,17 +1,12 @@
-"""A controller that plays torque pieces, plain and compiled: for tests."""
+"""A controller that plays torque pieces: for tests."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
-
-from softstart import Command, CompiledController, Drive, Measured, PlainController
-from softstart.arrays import Vector
-from softstart.controller import compiled_step, stack
-from softstart.controller.compiled import ASK_AGAIN, TIME, TORQUE
+from softstart import Command, Measured, PlainController
 
 
 @dataclass(frozen=True)
@@ -29,26 +24,3 @@ class Pieces(PlainController):
         """The piece of the moment, and when the next one begins."""
         torque, *slope = next((rest for t, *rest in reversed(self.pieces) if t <= measured.time), [0.0])
         return Command(torque, next((t for t, *_ in self.pieces if t > measured.time), self.end), (), *slope)
-
-
-@compiled_step
-def two_steps(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """parameters = (first torque, switch instant, second torque)."""
-    early = measured[TIME] < parameters[1]
-    command[TORQUE] = parameters[0] if early else parameters[2]
-    command[ASK_AGAIN] = parameters[1] if early else np.inf
-
-
-@dataclass(frozen=True)
-class TwoSteps(CompiledController):
-    """One torque until an instant, then another."""
-
-    name: ClassVar[str] = "two-steps"
-    kernel: ClassVar[Any] = two_steps
-    first: float = 0.0
-    switch: float = 0.0
-    second: float = 0.0
-
-    def vector(self, drive: Drive) -> Vector:
-        """(first, switch, second)."""
-        return stack(self.first, self.switch, self.second)

@@ -66,18 +66,6 @@ def run_of(drawn: dict[str, Any]) -> Run:
     return simulate(drive_of(drawn), played, until=drawn["t_end"])
 
 
-def in_other_units(drawn: dict[str, Any], mass: float, time: float) -> dict[str, Any]:
-    """The same start with inertias times `mass` and times times `time`."""
-    torque = mass / time**2
-    units = dict.fromkeys(("J1", "J2"), mass) | dict.fromkeys(("c", "Mc", "friction"), torque)
-    units |= dict.fromkeys(("d", "b1", "b2"), torque * time)
-    units |= dict.fromkeys(("w1_0", "w2_0", "target"), 1.0 / time)
-    units |= {"lag": time, "rate": torque / time, "t_end": time}
-    scaled = drawn | {name: drawn[name] * unit for name, unit in units.items() if name in drawn}
-    scaled["torque_pieces"] = [(t * time, u * torque) for t, u in drawn["torque_pieces"]]
-    return scaled
-
-
 @pytest.mark.hypothesis
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_peaks_events_and_final_state(block: int) -> None:
@@ -110,15 +98,6 @@ def test_friction_of_motor_and_load(block: int) -> None:
         compare_with_oracle(case_with_friction(seed), seed)
 
 
-def test_overdamped_shafts() -> None:
-    """Damping from 1 to 30 times the critical one, whose two rates lie far apart."""
-    for seed in range(10_000, 10_016):
-        drawn = case(seed)
-        critical = 2.0 * np.sqrt(drawn["c"] * drawn["J1"] * drawn["J2"] / (drawn["J1"] + drawn["J2"]))
-        drawn["d"] = float(critical * 10 ** np.random.default_rng(seed).uniform(0.0, 1.5))
-        compare_with_oracle(drawn, seed)
-
-
 SHAFTS_WITH_RATES_APART: list[dict[str, Any]] = [
     {  # the swing dies out within 10 ms, the torque goes on rising behind a lag of a second
         "J1": 0.0032780038938991225, "J2": 0.34673134104500997, "c": 2759.831424123467,
@@ -137,8 +116,7 @@ SHAFTS_WITH_RATES_APART: list[dict[str, Any]] = [
 @pytest.mark.parametrize("drive", SHAFTS_WITH_RATES_APART, ids=["lag", "damper"])
 def test_rates_decades_apart(drive: dict[str, Any], law: str) -> None:
     """Bounds by energy hold the fast rate against the slow motion; the search must end all the same."""
-    start = {"law": law, "w1_0": 0.0, "w2_0": 0.0, "rate": math.inf, "u0": 0.0, "target": 92.15}
-    drawn = drive | start
+    drawn = drive | {"law": law, "w1_0": 0.0, "w2_0": 0.0, "rate": math.inf, "u0": 0.0, "target": 92.15}
     if drawn["lag"] < 1e-40:  # none, for an integrator
         run_of(drawn)
         drawn["lag"] = 0.0
@@ -171,22 +149,24 @@ def test_a_torque_that_rises_again_is_no_fall_of_rounding() -> None:
     assert abs(run.energy.residual) < 1e-9 * abs(run.energy.motor)
 
 
-def compare_with_oracle(drawn: dict[str, Any], seed: int | str) -> None:
-    """Same peak, events in the same order, same final state."""
+def compare_with_oracle(drawn: dict[str, Any], seed: int | str, within: float = 1e-7) -> None:
+    """Same peak, events in the same order and at the same instants (of the length of the run), same end."""
     joined = drawn["gap"] == 0.0
     if joined:  # a spring that pulls too, which has no flanks
         drawn = drawn | {"law": "dead-zone"}
     run, other = run_of(drawn), integrate(**drawn)
     events = [one for one in other.events if not (joined and one[1] in ("closed", "opened"))]
+    first = sum(event.time == 0.0 for event in run.events) if "release" in drawn else 0  # which have no order
+    names, kinds = [KINDS[event.kind] for event in run.events], [kind for _, kind in events]
     # within 1e-8; the floor is the torque of 1e-12 rad
     assert run.peak_torque == pytest.approx(abs(other.peak), rel=1e-8, abs=1e-12 * drawn["c"]), seed
-    assert [KINDS[event.kind] for event in run.events] == [kind for _, kind in events], seed
-    mine = np.array([event.time for event in run.events])
-    theirs = np.array([time for time, _ in events])
+    assert (sorted(names[:first]), names[first:]) == (sorted(kinds[:first]), kinds[first:]), seed
+    mine, theirs = [event.time for event in run.events], [time for time, _ in events]
     # a shallow crossing amplifies the oracle's own 1e-11: the last events of long starts move most
-    np.testing.assert_allclose(mine, theirs, rtol=1e-6, atol=1e-7 * drawn["t_end"], err_msg=str(seed))
+    np.testing.assert_allclose(
+        mine, theirs, rtol=10.0 * within, atol=within * drawn["t_end"], err_msg=str(seed)
+    )
     end = run.at(drawn["t_end"])
     scale = np.abs(run.w1).max() + np.abs(run.w2).max() + 1e-12
-    assert float(end["w1"]) == pytest.approx(other.w1, abs=1e-7 * scale), seed
-    assert float(end["w2"]) == pytest.approx(other.w2, abs=1e-7 * scale), seed
+    assert [end["w1"], end["w2"]] == pytest.approx([other.w1, other.w2], abs=1e-7 * scale), seed
     assert float(end["u"]) == pytest.approx(other.u, rel=1e-9, abs=1e-9 * max(run.drive.Ms, 1e-12)), seed

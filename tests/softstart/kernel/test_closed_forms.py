@@ -38,19 +38,13 @@ def test_k_dyn_of_the_first_contact_is_18(
     # stage 2 must exist: with a torque below the load's, the gap still closes (active load)
     second = r if strategy == "reduced-two-stage" else 1.0
     start = formulas.two_stages(r * Ms, second * Ms, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc)
-    drive = Drive(
-        motor_inertia=J1,
-        load_inertia=J2,
-        stiffness=c,
-        gap=gap,
-        starting_torque=Ms,
-        load_torque=Mc,
-        target_speed=1e9,
-    )
+    fields = {"motor_inertia": J1, "load_inertia": J2, "stiffness": c, "gap": gap}
+    drive = Drive(**fields, starting_torque=Ms, load_torque=Mc, target_speed=1e9)
     until = start.open_duration + drive.elastic_period * (1 + 1e-9)  # stage 2 is shorter than this
-    given_torque = {} if strategy == "direct" else {"torque": r * Ms}
-    given_torque |= {"raise_at": "end"} if strategy == "reduced-two-stage" else {}  # as [G] does
-    run = simulate(drive, strategy, until, parameters=given_torque)
+    more = {"raise_at": "end"} if strategy == "reduced-two-stage" else {}  # as [G] does
+    run = simulate(
+        drive, strategy, until, parameters=more if strategy == "direct" else {"torque": r * Ms, **more}
+    )
     assert run.first_contact == pytest.approx(start.open_duration, rel=1e-10)
     assert run.k_dyn_first_contact == pytest.approx(start.k_dyn, rel=1e-10)
     assert run.stage_durations[1] == pytest.approx(start.contact_duration, rel=1e-9)
@@ -84,9 +78,7 @@ def root_of(f: Callable[[Decimal], Decimal], low: float, high: float) -> float:
 @pytest.mark.parametrize("rise", [1e-9, 1e-6, 1e-3, 0.05])
 def test_first_contact_behind_any_lag_and_limit(lag: float, rise: float) -> None:
     """From mid-gap: the torque of the ramp behind the lag, twice integrated, less that of the ramp's end."""
-    drive = CRANE.replace(
-        torque_lag=lag, torque_rate=float(CRANE.Ms) / rise, start_position="mid-gap", load_torque=1e-9
-    )
+    drive = CRANE.replace(torque_lag=lag, torque_rate=float(CRANE.Ms) / rise, load_torque=1e-9)
     run = simulate(drive, "direct", until=200.0)
     with localcontext() as context:
         context.prec = 80

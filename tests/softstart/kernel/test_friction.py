@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Drive, InputError, Run, simulate
 
 CRANE = Drive.load("crane-4amtkf")
-SEEDS = st.integers(1_000, 100_000)
 
 
 def steady(drive: Drive, torque: float, until: float) -> Run:
@@ -29,13 +27,11 @@ def test_a_motor_that_coasts_to_rest() -> None:
     J1 = float(drive.J1)
     run = steady(drive, 0.0, 1.0)
     stop = J1 / b * math.log1p(b * w0 / F)
-    assert [(event.time, event.kind) for event in run.events] == [
-        (pytest.approx(stop, rel=1e-13), "motor stops")
-    ]
+    (event,) = run.events
+    assert (event.kind, event.time) == ("motor stops", pytest.approx(stop, rel=1e-13))
     t = np.linspace(0.0, stop, 9)
-    np.testing.assert_allclose(
-        run.at(t)["w1"], (w0 + F / b) * np.exp(-b * t / J1) - F / b, rtol=1e-12, atol=1e-12
-    )
+    w1 = (w0 + F / b) * np.exp(-b * t / J1) - F / b
+    np.testing.assert_allclose(run.at(t)["w1"], w1, rtol=1e-12, atol=1e-12)
     turned = J1 / b * (w0 - F / b * math.log1p(b * w0 / F))
     assert run.at(1.0)["phi1"] == pytest.approx(turned, rel=1e-12)
     assert run.at(1.0)["w1"] == 0.0
@@ -47,9 +43,8 @@ def test_a_motor_breaks_away_behind_a_ramp() -> None:
     F, k = 4.0, 50.0
     drive = CRANE.replace(gap=200.0, motor_friction=F, torque_rate=k, load_torque=0.0)
     run = steady(drive, 62.0, 0.2)
-    assert [(event.time, event.kind) for event in run.events] == [
-        (pytest.approx(F / k, rel=1e-13), "motor starts")
-    ]
+    (event,) = run.events
+    assert (event.kind, event.time) == ("motor starts", pytest.approx(F / k, rel=1e-13))
     assert run.at(0.2)["w1"] == pytest.approx(k * (0.2 - F / k) ** 2 / (2.0 * drive.J1), rel=1e-12)
 
 
@@ -71,13 +66,8 @@ def test_friction_of_a_motor_that_runs_forward_is_a_lower_torque(damping: float)
 
 def test_the_speed_at_which_viscous_friction_takes_all() -> None:
     """Behind it w1 = w2 = (u - F - Mc)/(b1 + b2) and T = Mc + b2 w2; that is settled, too."""
-    drive = CRANE.replace(
-        damping=1.5,
-        motor_friction=2.0,
-        motor_viscous_friction=0.3,
-        load_viscous_friction=0.2,
-        target_speed=60.0,
-    )
+    frictions = {"motor_friction": 2.0, "motor_viscous_friction": 0.3, "load_viscous_friction": 0.2}
+    drive = CRANE.replace(damping=1.5, target_speed=60.0, **frictions)
     run = steady(drive, 40.0, 8.0)
     speed = (40.0 - 2.0 - float(drive.Mc)) / 0.5
     end = run.at(8.0)
@@ -86,22 +76,11 @@ def test_the_speed_at_which_viscous_friction_takes_all() -> None:
     assert 0.0 < run.settling_time(0.02) < 2.0
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        (
-            {"motor_friction": 55.0},
-            "motor_friction = 55 N*m: with this friction starting_torque = 62 N*m cannot",
-        ),
-        (
-            {"load_viscous_friction": 0.8},
-            "at target_speed = 92.1534 rad/s this takes more torque than the motor",
-        ),
-    ],
-)
-def test_friction_that_no_start_can_have(changes: dict[str, object], sentence: str) -> None:
-    with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
-        CRANE.replace(**changes)
+def test_friction_that_no_start_can_have() -> None:
+    with pytest.raises(InputError, match="with this friction starting_torque = 62 N"):
+        CRANE.replace(motor_friction=55.0)
+    with pytest.raises(InputError, match=r"92[.]1534 rad/s this takes more torque than the motor"):
+        CRANE.replace(load_viscous_friction=0.8)
 
 
 @pytest.mark.parametrize("friction", [1e-12, 7.5e-7])

@@ -53,13 +53,6 @@ def test_ramps_against_the_oracle(block: int) -> None:
         compare_with_oracle(ramped(seed), seed)
 
 
-def test_a_ramp_without_lag_or_limit_is_the_line_itself() -> None:
-    run = simulate(CRANE, Pieces(pieces=((0.0, 5.0, 400.0), (0.1, 45.0, -100.0)), end=0.3), until=0.3)
-    t = np.linspace(0.0, 0.3, 700)[:-1]
-    line = np.where(t < 0.1, 5.0 + 400.0 * t, 45.0 - 100.0 * (t - 0.1))
-    np.testing.assert_allclose(run.at(t)["u"], line, rtol=0.0, atol=1e-13 * 62.0)
-
-
 def test_a_ramp_through_a_lag_is_the_closed_form() -> None:
     """lag u' = k t - u from u = 0: u = k (t - lag) + k lag exp(-t/lag)."""
     lag, k = 0.01, 150.0

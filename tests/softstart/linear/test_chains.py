@@ -9,7 +9,7 @@ from tests.softstart.linear.speed_loops import SpeedPI
 from tests.twin import chain_of
 
 from softstart import Drive, InputError, linear_view
-from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.linear.law import SampledStart, operating_points, run_until_steady
 from softstart.linear.plant import in_contact
 
@@ -56,16 +56,12 @@ def random_chain(seed):
         if not beside and rng.random() < 0.2:
             shafts.append(Shaft(math.inf))
             continue
-        shafts.append(
-            Shaft(
-                float(10.0 ** rng.uniform(2.3, 3.5)), damping_ratio=float(rng.uniform(0.01, 0.06)),
-                gap=float(rng.choice([0.0, 0.05])), efficiency=float(rng.choice([1.0, 0.93])),
-                side=str(rng.choice(["before", "after"])), ratio=float(rng.choice([1.0, 2.0])),
-            )
-        )  # fmt: skip
-    torque = 1.0 if load == f"m{count - 1}" else 0.0
-    at = int(load[1:])
-    masses[at] = masses[at].replace(torque=torque)
+        c, zeta = float(10.0 ** rng.uniform(2.3, 3.5)), float(rng.uniform(0.01, 0.06))
+        more = {"gap": float(rng.choice([0.0, 0.05])), "efficiency": float(rng.choice([1.0, 0.93]))}
+        more |= {"side": str(rng.choice(["before", "after"])), "ratio": float(rng.choice([1.0, 2.0]))}
+        shafts.append(Shaft(c, damping_ratio=zeta, **more))
+    if load == f"m{count - 1}":
+        masses[-1] = masses[-1].replace(torque=1.0)
     lag = float(rng.choice([0.0, 0.002]))
     return Chain(
         masses, shafts, Motor(30.0, maximum_torque=90.0, minimum_torque=-90.0, mass=motor, torque_lag=lag),
@@ -79,19 +75,6 @@ def test_small_motions_of_the_whole_chain_are_those_of_the_loop(seed):
     start = SampledStart.of(random_chain(seed), SpeedPI(0.1, 0.5, 10.0), CRANE)
     points = operating_points(start, run_until_steady(start))
     assert points[0].mismatch < 1e-7
-
-
-@pytest.mark.parametrize("seed", range(12, 15))
-def test_the_plant_in_contact_swings_at_its_natural_frequencies(seed):
-    chain = random_chain(seed)
-    undamped = Chain(
-        [mass.replace(damping=0.0) for mass in chain.masses],
-        [s.replace(damping_ratio=None, efficiency=1.0) for s in chain.shafts],
-        chain.motor.replace(torque_lag=0.0), load_mass=chain.load_mass, target_speed=60.0,
-    )  # fmt: skip
-    found = np.sort(np.abs(np.linalg.eigvals(in_contact(undamped).A).imag))[::-2]
-    expected = np.sort(natural_vibration(undamped).Omega)[::-1]
-    assert found[: expected.size - 1] == pytest.approx(expected[:-1], rel=1e-6)
 
 
 def test_with_all_gaps_open_the_motor_turns_alone_or_with_what_is_joined_to_it():
@@ -115,15 +98,6 @@ def test_what_has_no_loop_is_refused():
         linear_view(Chain(CHAIN.masses, CHAIN.shafts), "take-up")
 
 
-def loaded(seed, **curve):
-    """A random chain whose mass before the last one has a load curve."""
-    chain = random_chain(seed)
-    masses = list(chain.masses)
-    masses[-2] = masses[-2].replace(**curve)
-    return replace(chain, masses=tuple(masses))
-
-
-@pytest.mark.parametrize("seed", [4])
 @pytest.mark.parametrize(
     "curve",
     [
@@ -131,23 +105,10 @@ def loaded(seed, **curve):
         {"curve_angle": [0.0, 0.1, 1.0, 2.0, 500.0], "curve_torque": [0.0, 0.5, 1.0, 3.0, 900.0]},
     ],
 )
-def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(seed, curve):
-    start = SampledStart.of(loaded(seed, **curve), SpeedPI(0.1, 0.5, 10.0), CRANE)
+def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(curve):
+    chain = random_chain(4)
+    masses = (*chain.masses[:-2], chain.masses[-2].replace(**curve), chain.masses[-1])
+    start = SampledStart.of(replace(chain, masses=masses), SpeedPI(0.1, 0.5, 10.0), CRANE)
     points = operating_points(start, run_until_steady(start))
     on_the_curve = [point for point in points if point.sample.plant["incline"].any()]
     assert on_the_curve[0].mismatch < 1e-7
-
-
-@pytest.mark.slow
-def test_a_straight_curve_has_the_loop_of_a_damped_mass():
-    curved = loaded(6, curve_speed=[-1e4, 1e4], curve_torque=[-20.0, 20.0])
-    masses = list(curved.masses)
-    own = masses[-2].damping
-    masses[-2] = masses[-2].replace(curve_speed=None, curve_torque=None, damping=own + 0.002)
-    by_curve = linear_view(curved, SpeedPI(0.1, 0.5, 10.0), fitted_to=CRANE)
-    damped = linear_view(replace(curved, masses=tuple(masses)), SpeedPI(0.1, 0.5, 10.0), fitted_to=CRANE)
-    assert by_curve.loop.margins.phase_margin == pytest.approx(damped.loop.margins.phase_margin, rel=1e-6)
-    assert by_curve.loop.margins.delay_margin == pytest.approx(damped.loop.margins.delay_margin, rel=1e-6)
-    assert by_curve.variations[-1].margins.phase_margin == pytest.approx(
-        damped.variations[-1].margins.phase_margin, rel=1e-6
-    )

@@ -23,19 +23,18 @@ def unbiased():
     return linear_view(SLOW, SpeedPI(4.0, 20.0))
 
 
-def vibration(drive, controller, cycle, factor=1.0):
+def vibration(drive, controller, cycle):
     """Frequency and amplitude of the twist on the exact plant, 5 s after a start in the middle of the gap.
 
-    It starts at the speed that is controlled, with a multiple of the cycle's largest rate of the twist.
+    It starts at the speed that is controlled, with the cycle's largest rate of the twist.
     """
-    rate, share_2 = factor * cycle.amplitude * cycle.frequency, drive.J2 / (drive.J1 + drive.J2)
+    rate, share_2 = cycle.amplitude * cycle.frequency, drive.J2 / (drive.J1 + drive.J2)
     w1, w2 = controller.reference + rate * share_2, controller.reference - rate * (1.0 - share_2)
     begun = drive.replace(initial_motor_speed=w1, initial_load_speed=w2, target_speed=1e6)
     late = np.linspace(5.0, 6.0, 4001)
     twist = simulate(begun, controller, 6.0, time_limit=10.0).at(late)["theta"]
     up = np.flatnonzero(np.diff(np.signbit(twist - 0.5 * (twist.min() + twist.max())).astype(int)) < 0)
-    frequency = 2.0 * np.pi / np.diff(late[up]).mean() if up.size > 1 else 0.0
-    return frequency, 0.5 * np.ptp(twist)
+    return 2.0 * np.pi / np.diff(late[up]).mean(), 0.5 * np.ptp(twist)
 
 
 @pytest.mark.parametrize(("load_torque", "frequency", "amplitude"), [(0.0, 0.04, 0.08), (7.16, 0.1, 0.1)])
@@ -92,14 +91,3 @@ def test_with_a_load_torque_the_cycle_is_biased_and_torque_limits_are_told():
         assert one.mean_torque == pytest.approx(7.16)
         assert one.bias > 0.0
         on_the_circle(view, n_at(one.amplitude, 0.25, SLOW.c, 7.16), one, 1e-7)
-
-
-@pytest.mark.slow
-def test_a_boundary_between_rest_and_vibration():
-    """Started in the gap with less, and with more, than the twist rate of the unstable cycle."""
-    drive, controller = SLOW.replace(damping=0.5), SpeedPI(1.0, 20.0)
-    low, high = linear_view(drive, controller).cycles
-    assert (low.stable, high.stable) == (False, True)
-    ends = [vibration(drive, controller, low, factor)[1] for factor in (0.7, 1.4)]
-    assert ends[0] < 0.7 * low.amplitude
-    assert ends[1] > low.amplitude

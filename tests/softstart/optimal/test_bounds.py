@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -24,12 +23,10 @@ from tests.softstart.optimal.drives import (
 from softstart import Drive, TorqueProfile, optimize, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import SimulationError
-from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.bounds import earliest_pull, least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.check import heat_of
 from softstart.optimal.problem import Problem
-from softstart.optimal.starts import Player
 
 
 def slack(machine: Any, k_dyn: float, start_time: float, terminal: Any = "reached") -> float:
@@ -94,42 +91,16 @@ def test_no_gentle_torque_gets_below() -> None:
     assert near > 20
 
 
-def test_no_random_torque_of_a_chain_gets_below() -> None:
-    rng = np.random.default_rng(3)
-    nearest, starts = math.inf, 0
-    for i in range(60):
-        chain = damped_crane(float(rng.choice([0.0, 0.05])))
-        gaps, inertia = float(10.0 ** rng.uniform(-2, 0.3)), float(rng.uniform(0.1, 2))
-        chain = chain.changed(gaps=gaps, load_inertia=inertia)
-        if i % 3 == 0:
-            masses = [*chain.masses[:-1], chain.masses[-1].replace(kind="reactive")]
-            chain = dataclasses.replace(chain, masses=tuple(masses))
-        time = np.sort(np.append(0.0, rng.uniform(0.0, 0.5, 5)))
-        torque = rng.uniform(0.0, 62.0, 6) if i % 2 else np.full(6, rng.uniform(40.0, 62.0))
-        try:
-            start = Player(chain).play(TorqueProfile(time, torque), 1.5)
-        except SimulationError:
-            continue
-        start_time = float(start.recorded.notes["start_time"])
-        if math.isnan(start_time):
-            continue
-        starts += 1
-        nearest = min(nearest, slack(chain, start.peak / chain.mean_torque, start_time))
-        events = start.recorded.events
-        closed = events["time"][(events["kind"] == at.CLOSED) & (events["place"] == len(chain.shafts) - 1)]
-        if closed.size:  # no bound for a time at which the load cannot have been pulled yet
-            assert momentum_shortest_time(Problem(chain, start_time, "reached")) <= closed[0]
-    assert nearest >= 0.0
-    assert starts > 20
-
-
-@pytest.mark.parametrize("name", ["middle load", "motor in the middle", "friction", "no gaps", "ground"])
-def test_no_torque_of_other_chains_gets_below(name: str) -> None:
-    """A load between two shafts, a motor between two loads, friction, and a mass of inf."""
+@pytest.mark.parametrize(
+    "name", ["crane", "middle load", "motor in the middle", "friction", "no gaps", "ground"]
+)
+def test_no_torque_of_a_chain_gets_below(name: str) -> None:
+    """Any gaps and loads, a load between two shafts, a motor between two loads, friction, a mass of inf."""
     rng = np.random.default_rng(4)
     shafts, motor = [Shaft(3e3, damping_ratio=0.02, gap=0.05), Shaft(2e3, gap=0.03)], Motor(100.0)
     light = [Mass(0.1, name="a"), Mass(0.05, name="b", torque=5.0), Mass(0.4, name="c", torque=10.0)]
     chains = {
+        "crane": damped_crane(0.05),
         "middle load": Chain(light, shafts, motor, load_mass="b", target_speed=12.0),
         "motor in the middle": Chain(light, shafts, Motor(100.0, mass="b"), target_speed=12.0),
         "friction": three_masses(motor={"torque_lag": 0.004}, kind="reactive"),
@@ -137,15 +108,23 @@ def test_no_torque_of_other_chains_gets_below(name: str) -> None:
         "ground": Chain([*light[:2], Mass(0.4, name="c"), Mass("inf", name="d")], [*shafts, Shaft(5.0)],
                         motor, load_mass="c", target_speed=5.0),
     }  # fmt: skip
-    chain, starts = chains[name], 0
-    for _ in range(20):
+    chain, high, starts = chains[name], float(chains[name].motor.starting_torque), 0
+    for _ in range(60 if name == "crane" else 20):
+        if name == "crane":
+            gaps, inertia = float(10.0 ** rng.uniform(-2, 0.3)), float(rng.uniform(0.1, 2))
+            chain = damped_crane(float(rng.choice([0.0, 0.05]))).changed(gaps=gaps, load_inertia=inertia)
         time = np.sort(np.append(0.0, rng.uniform(0.0, 0.4, 5)))
-        profile = {"profile": TorqueProfile(time, rng.uniform(10.0, 100.0, 6))}
+        profile = {"profile": TorqueProfile(time, high * rng.uniform(0.1, 1.0, 6))}
         run = simulate(chain, "profile", 1.0, parameters=profile, fitted_to=CRANE)
-        if not math.isnan(run.start_time):
-            starts += 1
-            assert slack(chain, run.k_dyn, run.start_time) >= -1e-9
-    assert starts > 5
+        if math.isnan(run.start_time):
+            continue
+        starts += 1
+        assert slack(chain, run.k_dyn, run.start_time) >= -1e-9
+        last = len(chain.shafts) - 1
+        closed = [one.time for one in run.events if one.kind == "gap closed" and one.place == last]
+        if name == "crane" and closed:  # no start is bounded before the load can have been pulled
+            assert momentum_shortest_time(Problem(chain, run.start_time, "reached")) <= closed[0]
+    assert starts > (20 if name == "crane" else 5)
 
 
 def test_a_load_that_follows_a_curve_and_losses_have_no_bound() -> None:
@@ -169,11 +148,11 @@ def test_several_machines_have_the_largest_bound() -> None:
 
 
 @pytest.mark.parametrize("start_time", [LONG, 0.35, 0.6])
-def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(start_time: float) -> None:
-    problem = Problem(CRANE, start_time)
+@pytest.mark.parametrize("where", ["mid-gap", "driving-flank", "opposite-flank", "hanging"])
+def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(where: str, start_time: float) -> None:
+    problem = Problem(CRANE.replace(start_position=where), start_time, "reached")
     _, _, k_dyn = pulse_coast_hold.solve(problem)
-    assert momentum_bound(problem).k_dyn == pytest.approx(k_dyn, rel=1e-8)
-    assert momentum_bound(problem).k_dyn < k_dyn
+    assert k_dyn * (1.0 - 1e-8) < momentum_bound(problem).k_dyn < k_dyn
 
 
 def test_the_plain_form() -> None:

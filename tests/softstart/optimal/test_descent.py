@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.softstart.optimal.drives import CRANE, CURVE, HELD, SHORT, played, three_masses
+from tests.softstart.optimal.drives import CRANE, CURVE, HELD, played, three_masses
 
-from softstart import TorqueProfile, optimize
+from softstart import TorqueProfile
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.descent import Descent, Found, Model
 from softstart.optimal.problem import Problem
@@ -76,19 +75,6 @@ def test_finished_meets_the_end_by_the_smallest_changes(terminal: Any) -> None:
         np.testing.assert_allclose(state["T"][0], carried(run.recorded.rows), rtol=1e-6)
 
 
-def test_finer_grids_are_no_worse_and_near_the_optimum() -> None:
-    problem = Problem(CRANE, SHORT)
-    search = Descent(problem)
-    found = search.down(seeds.pulse_coast_level(search)[0], search.latest)
-    assert found is not None
-    merits = [found.merit]
-    for _ in range(3):
-        found = search.refined(found, 1)
-        merits.append(found.merit)
-    assert all(after <= before * (1.0 + 1e-9) for before, after in pairwise(merits))
-    assert found.peak / search.base == pytest.approx(1.4564, rel=3e-3)
-
-
 @pytest.mark.parametrize("where", [0.0, -0.25])
 def test_the_closed_form_comes_out_of_pulses(where: float) -> None:
     """Not by the closed form, which is left out of the first demands."""
@@ -113,16 +99,3 @@ def test_limits_of_torque_and_rate_are_kept() -> None:
     assert first.torques.min() >= -10.0
     assert first.torques.max() <= 62.0
     assert np.abs(np.diff(first.torques) / np.diff(search.time)).max() <= 2000.0 * (1.0 + 1e-9)
-
-
-@pytest.mark.slow
-def test_k_dyn_of_three_gaps_never_rises_with_the_time() -> None:
-    """From short to long, each with the answer before as one more first demand."""
-    wide = [CRANE.replace(gap=gap) for gap in (1.0, 2.0)]
-    near, k_dyn = None, []
-    for time in (0.31, 0.3243, 0.34):
-        near = optimize(CRANE, time, scenarios=wide, near=near)
-        k_dyn.append(near.k_dyn)
-        assert max(near.start_times) <= time
-    assert all(after <= before * (1.0 + 1e-6) for before, after in pairwise(k_dyn)), k_dyn
-    assert k_dyn[1] <= 1.64  # 1.63 is known

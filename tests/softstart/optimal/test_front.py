@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.kept import parts_in
-from tests.softstart.optimal.drives import CRANE, QUICK, without_gaps
+from tests.softstart.optimal.drives import CRANE, QUICK
 
 from softstart import InputError, optimize, simulate
 from softstart.controller import ready_controller_names
@@ -184,26 +183,9 @@ def test_bad_input(options: dict[str, Any], says: str) -> None:
         pareto(**{"drive": CRANE, "start_times": [0.3], "controllers": []} | options)
 
 
-def test_table(tmp_path: Path, front: Front) -> None:
-    front.to_csv(tmp_path / "front.csv")
-    with (tmp_path / "front.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert [row["what"] for row in rows] == ["optimum"] * 3 + [one.name for one in front.controllers]
-    assert [float(row["k_dyn"]) for row in rows[:3]] == [point.k_dyn for point in front.points]
-
-
 def test_default_start_times() -> None:
     """From hardly more than the shortest start, which is under constant torque where there is no gap."""
     times, direct = default_start_times(QUICK), simulate(QUICK, "direct").start_time
     assert times[0] == pytest.approx(1.02 * direct, rel=1e-3)
     assert times[-1] == pytest.approx(1.6 * direct)
     assert times == sorted(times)
-
-
-@pytest.mark.slow
-def test_the_front_of_a_chain_falls() -> None:
-    front = pareto(without_gaps(), [0.25, 0.3, 0.4], controllers=["direct"])
-    values = [point.k_dyn or math.nan for point in front.points]
-    assert values == sorted(values, reverse=True)
-    assert all((point.k_dyn or 0.0) >= (point.k_dyn_lower_bound or math.inf) for point in front.points)
-    assert front.controllers[0].ratio is None or front.controllers[0].ratio >= 1.0 - 1e-3

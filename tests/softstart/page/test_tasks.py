@@ -155,22 +155,17 @@ def test_the_limit_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None
         assert re.search(rf"{name}\s+{run.k_dyn:.4f}.*?{ratio:.3f}", text, re.S)
 
 
-@pytest.mark.parametrize(
-    "machine",
-    [CRANE, pytest.param(Chain.load("crane-4-mass"), marks=pytest.mark.slow)],
-    ids=["drive", "chain"],
-)
-def test_tuned_gains_come_as_files_and_as_controllers(machine: Drive | Chain, tmp_path: Path) -> None:
-    name, grid = "reduced-first-stage", grid_of(machine, "1x", "1x")
-    found, _, _ = done(tasks.tuning, machine, name, *grid, certified=False, restarts=1)
-    same = tune(machine, name, *grid, certified=False, restarts=1, workers=1)
+def test_tuned_gains_come_as_files_and_as_controllers(tmp_path: Path) -> None:
+    name, grid = "reduced-first-stage", grid_of(CRANE, "1x", "1x")
+    found, _, _ = done(tasks.tuning, CRANE, name, *grid, certified=False, restarts=1)
+    same = tune(CRANE, name, *grid, certified=False, restarts=1, workers=1)
     assert same.robust is not None
     for what, controller in (("robust", same.robust.controller), ("schedule", same.scheduled)):
-        expected = simulate(machine, controller).k_dyn
-        assert simulate(machine, found.controllers[f"{name} ({what})"]).k_dyn == expected
+        expected = simulate(CRANE, controller).k_dyn
+        assert simulate(CRANE, found.controllers[f"{name} ({what})"]).k_dyn == expected
         path = tmp_path / f"{name}-{what}.toml"
         path.write_text(found.files[path.name], encoding="utf-8")
-        assert simulate(machine, make_controller(str(path))).k_dyn == expected
+        assert simulate(CRANE, make_controller(str(path))).k_dyn == expected
     assert name in tunable()
 
 

@@ -106,22 +106,16 @@ def test_packed_traces_come_back_to_single_precision():
             assert np.array_equal(row, units.shown(traces[name], si).astype("f4"))
 
 
-@pytest.mark.parametrize("controller", ["direct", "shaped", "current-limit-feedback"])
-def test_the_map_is_made_of_simulated_starts(controller):
+@pytest.mark.parametrize("kept", [None, CRANE], ids=["fitted to each", "kept"])
+@pytest.mark.parametrize("controller", ["reduced-first-stage", "shaped", "current-limit-feedback"])
+def test_the_map_is_made_of_simulated_starts(controller, kept):
     axes = axes_about(CRANE, 4, 3)
     made = make_controller(controller)
     for inertia in axes.inertias:
-        row = k_dyn_row(CRANE, made, axes.gaps, inertia)
+        row = k_dyn_row(CRANE, made, axes.gaps, inertia, kept)
         for gap, k in zip(axes.gaps, row, strict=True):
-            assert k == simulate(CRANE.replace(gap=gap, load_inertia=inertia), made).k_dyn
-
-
-def test_with_the_controller_kept_the_map_refers_to_the_drive_of_the_moment():
-    made = make_controller("reduced-first-stage")
-    row = k_dyn_row(CRANE, made, (0.5, 2.0), 0.07, CRANE)
-    for gap, k in zip((0.5, 2.0), row, strict=True):
-        other = CRANE.replace(gap=gap, load_inertia=0.07)
-        assert k == simulate(other, made, fitted_to=CRANE, base=CRANE).k_dyn
+            other = CRANE.replace(gap=gap, load_inertia=inertia)
+            assert k == simulate(other, made, fitted_to=kept, base=kept).k_dyn
 
 
 @given(st.sampled_from(sorted(SCALES)), st.integers(0, STEPS))
@@ -239,7 +233,7 @@ def test_gaps_that_were_closed_on_the_map_open_again_as_they_were():
     assert [shaft.gap for shaft in session.machine.shafts] == pytest.approx([0.1, 0.2, 0.01])
 
 
-def test_a_map_is_not_computed_again_for_another_place_of_it():
+def test_a_map_is_computed_again_for_another_stiffness_and_not_for_another_place_of_it():
     session, screen, controls = screen_of(DAMPED, "direct")
     screen.axes = axes_about(DAMPED, 3, 3)
     assert [frame for frame in screen.at_rest() if frame and "map_row" in frame]
@@ -247,11 +241,8 @@ def test_a_map_is_not_computed_again_for_another_place_of_it():
     assert not screen.first()["map_is_old"]
     session.set("shaft[1].stiffness", 5000.0)
     assert screen.first()["map_is_old"]
-
-
-def test_a_chain_without_gaps_has_no_map():
     closed = changed(CHAIN, {f"shaft[{i}].gap": "0" for i in (1, 2, 3)})
-    _, screen, _ = screen_of(closed, "direct")
+    _, screen, _ = screen_of(closed, "direct")  # no gap, no map
     assert not screen.first()["mapped"]
     assert not [frame for frame in screen.at_rest() if frame and "map_row" in frame]
 

@@ -51,17 +51,6 @@ def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made)
     assert sheet.variants == 2 * len(sheet.varied) + 2
 
 
-@pytest.mark.slow
-def test_the_optimum_lies_between_bound_and_strategy(monkeypatch):
-    monkeypatch.setattr("softstart.reporting.limit.SHARES", ())  # the start time of take-up alone
-    damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.05" for k in (1, 2, 3)})
-    best = report(damped, controllers=["take-up"], budget=200.0)
-    run = best.choice.chosen.run
-    optimum = best.limit.optimum_at(run.start_time)
-    assert bound_at(damped, run.start_time) < optimum.k_dyn < run.k_dyn
-    assert "optima are the best starts found" in Page(best.to_html()).text
-
-
 def test_lives_of_shafts_are_those_of_fatigue(made):
     page = Page(made.to_html()).text
     assert "Lives cannot be given: damping is missing in rotor - pinion" in page
@@ -75,11 +64,7 @@ def test_lives_of_shafts_are_those_of_fatigue(made):
     assert "Longest life: take-up" in page
 
 
-def test_sources_of_a_drive_and_text_from_outside_stay_out():
+def test_a_source_of_a_parameter_of_a_drive_is_refused():
     about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
     with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
         report(CHAIN, controllers=["ramp"], project=about)
-    hostile = Chain.load("crane-4-mass", also={"name": "<script>alert(1)</script>"})
-    page = report(hostile, controllers=["direct"], budget=0.0).to_html()
-    assert "<script" not in page
-    assert "default-src 'none'" in page or "default-src &#x27;none&#x27;" in page

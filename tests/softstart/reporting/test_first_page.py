@@ -4,6 +4,7 @@ import base64
 import html
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,7 +53,7 @@ def page(made):
 
 
 def test_verdicts_are_the_margins_of_the_rule(made):
-    point = Page(document.document(replaced(made, decimal="point")))
+    point = Page(document.document(replace(made, project=replace(made.project, decimal="point"))))
     (table,) = [rows for rows in point.tables if rows[0][-1] == "verdict" and "margin" in rows[0]]
     wanted = [
         ["fail" if margin.share < 0.0 else "pass", row.name, f"{100.0 * margin.share:.1f} %"]
@@ -61,12 +62,6 @@ def test_verdicts_are_the_margins_of_the_rule(made):
     ]
     assert [[row[-1], row[0], row[4].replace("\N{MINUS SIGN}", "-")] for row in table[1:]] == wanted
     assert {verdict for verdict, *_ in wanted} == {"pass", "fail"}
-
-
-def replaced(made, **changes):
-    from dataclasses import replace
-
-    return replace(made, project=replace(made.project, **changes))
 
 
 GEARED = HOIST.replace(

@@ -53,9 +53,6 @@ def test_text_from_outside_stays_text(read, page):
     assert set(header) <= set('"\\ 0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ')
     decoded = re.sub(r"\\([0-9a-f]+) ", lambda m: chr(int(m[1], 16)), header[1:-1])
     assert HOSTILE.startswith(decoded[:-1])
-
-
-def test_css_strings_end_where_they_end():
     for text in ('"', "\\", "\n", "</style>", "}", "\u00e9\U0001f600", "\\a "):
         written = css_string(text)
         assert re.sub(r"\\([0-9a-f]+) ", lambda m: chr(int(m[1], 16)), written[1:-1]) == text

@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, parallel, pareto, sweep, tune
+from softstart import Drive, InputError, parallel, sweep
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -86,44 +86,6 @@ def test_two_workers_of_which_one_is_killed_find_the_same(cluster, sweeping, uni
     assert killed
     assert found.drop_attrs().identical(uninterrupted.drop_attrs())
     assert len(sweeping.finished(tmp_path / "a")) == sweeping.chunks
-
-
-@pytest.mark.slow
-def test_tunings_and_limit_curves_are_the_same_on_a_cluster(cluster, tmp_path):
-    address = cluster.with_workers(1)
-    crane = CRANE.replace(target_speed=60.0)
-
-    def told(result):
-        found = {key: value for key, value in result.summary().items() if key != "seconds"}
-        price = found.pop(
-            "price"
-        )  # whose lower bounds differ in the tenth digit with what was computed before
-        return found, {key: np.array(value, dtype=object) for key, value in price.items()}
-
-    def same(one, other):
-        (found, price), (expected, prices) = told(one), told(other)
-        assert {**found, "starts": 0} == {**expected, "starts": 0}
-        for key, values in prices.items():
-            assert price[key].ravel().tolist() == pytest.approx(values.ravel().tolist(), rel=1e-8)
-
-    options = {"generations": 3, "population": 8, "restarts": 2, "start_time": "1.4x"}
-    asked = (crane, "ramp", [0.5, 2.0], ["2 J1", "5 J1"])
-    alone = tune(*asked, **options, workers=1)
-    kept = tmp_path / "tuning.sqlite"
-    same(tune(*asked, **options, scheduler=address, save_to=kept), alone)
-    again = tune(*asked, **options, workers=1, save_to=kept)
-    assert again.starts == 0
-    same(again, alone)
-
-    def points(front):
-        return [{**point.summary(), "seconds": 0.0} for point in front.points], [
-            one.summary() for one in front.controllers
-        ]
-
-    asked = (crane, [0.2, 0.2523, 0.3, 0.33])
-    front = pareto(*asked, controllers=["ramp"])
-    assert {point.method for point in front.points if point.found} == {"closed-form", "descent"}
-    assert points(pareto(*asked, controllers=["ramp"], scheduler=address)) == points(front)
 
 
 @pytest.mark.slow

@@ -3,39 +3,16 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 import tracemalloc
 
 import numpy as np
 import pytest
 
 from softstart import Command, Drive, InputError, PlainController, SimulationError, sweep
-from softstart.sweeping import entry
 
 from .conftest import alive, children
 
 CRANE = Drive.load("crane-4amtkf")
-
-
-@pytest.mark.slow
-def test_a_killed_process_costs_nothing(sweeping, uninterrupted, tmp_path, monkeypatch):
-    monkeypatch.setattr(entry, "first_start", lambda *asked: False)  # as if not compiled: no threads
-    others, killed = set(children(os.getpid())), []  # those of earlier tests in this process
-
-    def kill(now):
-        if now.done and len(killed) < 2:
-            killed.append(next(pid for pid in children(os.getpid()) if pid not in others))
-            os.kill(killed[-1], signal.SIGKILL)
-
-    found = sweep(
-        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=tmp_path / "a", workers=2,
-        chunk=sweeping.chunk, progress=kill,
-    )  # fmt: skip
-    assert len(killed) == 2
-    assert not [pid for pid in children(os.getpid()) if alive(pid) and pid not in others]
-    assert found.drop_attrs().identical(uninterrupted.drop_attrs())
 
 
 DEADLY = """
@@ -77,32 +54,6 @@ def test_objects_that_no_other_process_can_load_are_refused():
     with pytest.raises(InputError, match=r"the controller cannot be handed .*Local.*workers=1"):
         sweep(CRANE, Local(), {"gap": [0.5, 1.0]}, workers=2, chunk=1)
     assert sweep(CRANE, Local(), {"gap": [0.5, 1.0]}, workers=1).status.values.tolist() == [0, 0]
-
-
-SIZES = """
-import sys
-import numpy as np
-from pathlib import Path
-from softstart import sweep
-grid = {"gap": np.linspace(0.1, 4, int(sys.argv[1])), "load_inertia": np.linspace(0.05, 0.4, 1000)}
-sweep("crane-4amtkf", "direct", grid, to=sys.argv[2], workers=1, chunk=4000)
-lines = Path("/proc/self/status").read_text().splitlines()
-print(next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="memory is told by Linux")
-def test_memory_does_not_grow_with_the_grid(tmp_path):
-    peaks = []
-    for gaps in (20, 400):  # 400,000 starts: 13 MB of figures, 3 MB for each axis spread over the grid
-        told = subprocess.run(
-            [sys.executable, "-c", SIZES, str(gaps), str(tmp_path / str(gaps))],
-            capture_output=True,
-            check=True,
-        )
-        peaks.append(float(told.stdout))
-    assert peaks[1] - peaks[0] < 5.0
 
 
 def test_a_grid_of_a_million_million_starts_begins_at_once(tmp_path):

@@ -54,13 +54,6 @@ def test_a_corner_and_one_parameter():
     )
 
 
-def test_a_search_goes_on_from_its_populations_to_the_same_bits():
-    whole, half = (searched(PROBLEMS, [[0.5, 0.5]], count) for count in (12, 5))
-    again = searched(PROBLEMS, [[0.5, 0.5]], 12, half)
-    for one, other in zip(whole, again, strict=True):
-        assert np.array_equal(one, other)
-
-
 # the rule -------------------------------------------------------------------------------------------------
 
 

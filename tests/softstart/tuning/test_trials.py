@@ -6,12 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
+from softstart.chain import Chain
 from softstart.controller import make_controller
 from softstart.tuning.question import Question, recipe_of, scenarios_of
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+CHAIN = Chain.load("crane-4-mass").with_values({"start_position": "mid-gap"})
 
 
 def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
@@ -25,22 +27,34 @@ def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
     return Trials(Question(**(asked | change)), robust)
 
 
-@pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback"])
-def test_each_candidate_is_the_start_that_simulate_makes(name):
-    tried = trials(name, tolerances={"load_torque": "20 %"})
-    assert tried.compiled
+UNKNOWN = CHAIN.with_values({"start_position": "unknown"})
+OFF = {"shaft[2].gap": "20 %", "load_torque": "10 %"}
+OF_CHAINS = {"gaps": (0.5, 1.0), "load_inertias": (40.0, 69.2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "machine", "tolerances", "cells"),
+    [
+        ("acceleration-delay", CRANE, {"load_torque": "20 %"}, {}),
+        ("current-limit-feedback", CRANE, {"load_torque": "20 %"}, {}),
+        ("s-curve", UNKNOWN, OFF, OF_CHAINS),
+        ("take-up", CHAIN, OFF, OF_CHAINS),
+    ],
+)
+def test_each_candidate_is_the_start_that_simulate_makes(name, machine, tolerances, cells):
+    tried = trials(name, machine, tolerances, **cells)
     places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
     cells = np.array([0, 3, 1])
     values = tried.values(cells, places)
-    judged = tried.judged(cells, values)
+    judged = tried.judged(cells, values, to_the_end=True)
     for k, cell in enumerate(cells):
-        drive = tried.question.drive_of(int(cell))
+        one = tried.question.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
-        for s, share in enumerate((1.0, 0.8, 1.2)):
-            off = drive.replace(load_torque=share * drive.load_torque)
-            run = simulate(off, controller, fitted_to=drive, base=drive)
-            assert judged.start_time[k, s] == run.start_time
+        for s, scenario in enumerate(tried.question.scenarios):
+            off = one.with_values({key: level.of(one.knob(key).value) for key, level in scenario.items()})
+            run = simulate(off, controller, fitted_to=one, base=one)
             assert judged.metric[k, s] == run.k_dyn
+            assert judged.start_time[k, s] == run.start_time or np.isnan(run.start_time)
 
 
 def test_one_set_is_set_up_for_the_nominal_drive():
