@@ -25,11 +25,11 @@ program would be wrong beside each contact, and descents stall.
 CasADi hands the program to HiGHS. Of the rows of peaks and of the curve only those that matter are in it: it
 begins with the instants near the peak, thinned, and takes in local maxima that its answer would let through.
 The step is then run exactly; what counts is the merit of that start, its objective with its located peak plus
-penalty times what it misses. A step that would be refused and misses the terminal condition is corrected first,
-by the smallest changes that lead to it: the condition is curved, and long steps along its tangent would all be
-refused (Maratos effect; second-order correction, R. Fletcher, Practical Methods of Optimization, 2nd ed. (1987)
-14.4). The trust region follows how far the program was right. Where the terminal
-condition stays missed, missing it costs ten times as much, and so on.
+penalty times what it misses. The terminal condition is curved, and long steps along its tangent would all be
+refused (Maratos effect): one that would be refused and misses it is corrected first, by the smallest changes
+that lead to it (second-order correction; R. Fletcher, Practical Methods of Optimization, 1987, 14.4). The
+trust region follows how far the program was right. Where the terminal condition stays missed, that costs
+ten times as much, and so on.
 
 Knots: even ones and those of the first demand; then intervals beside bends of the torque are halved, a few
 times. Last, the smallest changes that meet the terminal condition to rounding (Newton).

@@ -38,11 +38,7 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
 RUNGS = (0.8, 0.9)  # of the start time: asked first where one torque serves several machines
-FIRST, BESIDE, FINISHED = (
-    4,
-    2,
-    2,
-)  # first demands that are followed a few steps, beside a known one, to the end
+FIRST, BESIDE, FINISHED = 4, 2, 2  # first demands followed a few steps, beside a known one, to the end
 DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
 TRIES = 1500  # knots in all starts around one, where one torque serves several machines
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start

@@ -17,7 +17,7 @@ from softstart.start.status import Status
 from softstart.sweeping.grid import PREFIX, Grid, sizes_of, values_of
 
 if TYPE_CHECKING:
-    from xarray import Variable
+    pass
 
 Block = dict[str, Any]  # figure -> one value a start
 CODES = {status.name: code for code, status in enumerate(Status)}
@@ -84,9 +84,9 @@ def _ends(grid: Grid, dim: str) -> list[dict[str, Any]]:
     """The places along an axis that stand for all others; samples are taken together, as a batch."""
     if dim not in grid:
         return [{name: one.values for name, one in grid.items() if one.dims == (dim,)}]
-    values = grid[dim].values
-    return [{dim: end} for end in (dict.fromkeys(values.tolist()) if values.dtype.kind == "U" else
-                                   dict.fromkeys([float(values.min()), float(values.max())]))]  # fmt: skip
+    values = grid[dim].values.tolist()
+    names = isinstance(values[0], str)
+    return [{dim: end} for end in dict.fromkeys(values if names else [min(values), max(values)])]
 
 
 def first_start(question: Question, grid: Grid) -> bool:
@@ -96,8 +96,7 @@ def first_start(question: Question, grid: Grid) -> bool:
     """
     compiled = True
     first = {name: one[:1] for name, one in grid.items()}
-    names: Variable | list[str] = grid[PREFIX].values.tolist() if PREFIX in grid else [""]
-    for name in names:
+    for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:
         compute(Task((), question, 1, values_of(first) | ({PREFIX: name} if name else {})))
         design = (question.fitted_to or question.drive).design_drive
         compiled &= isinstance(question.recipe.make(name=name).set_up(design)[0], CompiledController)

@@ -303,6 +303,14 @@ def test_a_k_dyn_that_no_start_has_is_refused() -> None:
 # heat ------------------------------------------------------------------------------------------------------
 
 
+@SLOW
+@pytest.mark.parametrize("time", [0.27, 0.2883, 0.32])
+def test_the_least_heat_is_that_of_a_constant_torque(time: float) -> None:
+    """Which brings the momentum in that time; to end in step takes a ripple of some tenths of a percent."""
+    best = kept(optimize(CRANE, time, minimise="heat"))
+    assert best.heat_at_least < best.heat < 1.001 * best.heat_at_least
+
+
 # brakes and positions --------------------------------------------------------------------------------------
 
 
