@@ -12,7 +12,6 @@ and what is missed, m >= 0:
     limits      lowest <= u_q + v_q <= highest,  |u_(q+1) + v_(q+1) - u_q - v_q| <= rate * (t_(q+1) - t_q)
     curve       r(t) + dr/du v <= a + b (w + dw/du v) + m         r the realised torque, w the motor speed
     heat        H + dH/du v + r(t_f)^2 h <= bound + m
-    closed      T_k(t) + ... v >= 0 where a flank presses: in a second program, if the first one fails
     trust       |v_q| <= trust, |h| <= share of t_f,  t_f + h <= start_time
 
     objective   P (k_dyn), or H + dH/du v + v' G'G v (heat: a square, as the realised torque is linear in the
@@ -64,6 +63,7 @@ NEAR, THIN = 0.85, 3  # share of the peak from which rows are in a program; one 
 ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of the decrease
 STEPS, INTO = 60, 16
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
+REFUSED = 0.3  # by what a step that is refused narrows the trust region
 MISSED = 1e-5
 CORRECTED = 2  # Newton steps towards the terminal condition, before a step that misses it is refused
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
@@ -344,30 +344,27 @@ class Descent:
             model = Model.of(self, found)
             better = None
             while better is None:
-                for closed in (False,) if model.squares else (False, True):
-                    step = model.step(trust, closed)
-                    if step is None:
-                        continue
-                    change, later, promised = step
-                    tried = self.play(
-                        self.allowed(found.torques + change), min(found.end + later, self.latest)
-                    )
-                    gained = -math.inf if tried is None else found.merit - tried.merit
-                    if tried is not None and gained <= ACCEPTED * promised and tried.missed > MISSED:
-                        nearer = self.finished(tried, rounds=CORRECTED)
-                        if nearer is not None and nearer.merit < tried.merit:
-                            tried, gained = nearer, found.merit - nearer.merit
-                    if promised < least * found.merit and not (model.squares and trust > NARROW):
-                        return tried if tried is not None and gained > 0.0 else found
-                    if gained > ACCEPTED * promised:
-                        better, came = tried, gained / promised
-                        break
+                if trust < LEAST_TRUST:
+                    return found
+                step = model.step(trust)
+                if step is None:
+                    trust *= REFUSED
+                    continue
+                change, later, promised = step
+                tried = self.play(self.allowed(found.torques + change), min(found.end + later, self.latest))
+                gained = -math.inf if tried is None else found.merit - tried.merit
+                if tried is not None and gained <= ACCEPTED * promised and tried.missed > MISSED:
+                    nearer = self.finished(tried, rounds=CORRECTED)
+                    if nearer is not None and nearer.merit < tried.merit:
+                        tried, gained = nearer, found.merit - nearer.merit
+                if promised < least * found.merit and not (model.squares and trust > NARROW):
+                    return tried if tried is not None and gained > 0.0 else found
+                if gained > ACCEPTED * promised:
+                    better, share = tried, gained / promised
+                    trust *= 2.0 if share > GOOD else 0.5 if share < POOR else 1.0
                 else:
-                    trust *= 0.3
-                    if trust < LEAST_TRUST:
-                        return found
-            found = better
-            trust = min((2.0 if came > GOOD else 0.5 if came < POOR else 1.0) * trust, MOST_TRUST)
+                    trust *= REFUSED
+            found, trust = better, min(trust, MOST_TRUST)
         return found
 
     def finished(self, found: Found, reserve: float = 1e-8, rounds: int = 8) -> Found | None:
@@ -500,14 +497,6 @@ class Watched:
         maxima = high[self.peaks(self.values)[high]]
         return np.union1d(maxima, high[:: max(THIN, high.size // self.rows.shape[1])])
 
-    def lowest(self, values: Vector, least: float) -> NDArray[np.intp]:
-        """Which rows are minima over time below `least`, inside of what belongs together."""
-        inside = ~(self.edges[:-1] | self.edges[1:])
-        inner = np.concatenate(
-            [[False], (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]), [False]]
-        )
-        return np.flatnonzero(inside & inner[: values.size] & (values < least))
-
     def over(self, change: Vector, limit: float, known: NDArray[np.intp]) -> NDArray[np.intp]:
         """Maxima above a limit after a change of the torques, beside those that are known."""
         after = self.values + self.rows @ change
@@ -591,10 +580,8 @@ class Model:
             rates * found.end, tuple(squares), [np.zeros(count)],
         )  # fmt: skip
 
-    def step(self, trust: float, closed: bool = False) -> tuple[Vector, float, float] | None:
+    def step(self, trust: float) -> tuple[Vector, float, float] | None:
         """The change of the torques and of t_f in the trust region, and the decrease that it promises.
-
-        With `closed` no shaft that presses may let go.
 
         The columns of the program: torques as shares of the highest, largest torque P as share of the base,
         h as share of t_f, what is missed (terminal, curve, k_dyn, heat), and the steps of the torque.
@@ -634,14 +621,14 @@ class Model:
         cost[P] = float(problem.minimise == "k_dyn")
         if problem.k_dyn is not None:
             program.add({P: one, k_dyn: -problem.k_dyn * one}, problem.k_dyn)
-        x = self._solved(program, cost, lower, upper, curve, closed)
+        x = self._solved(program, cost, lower, upper, curve)
         if x is None:
             return None
         promised = self._value(self._now(cost.size), cost) - self._value(x, cost)
         return x[:count] * search.high, float(x[h]) * found.end, promised
 
     def _solved(
-        self, program: Program, cost: Vector, lower: Vector, upper: Vector, curve: int, closed: bool
+        self, program: Program, cost: Vector, lower: Vector, upper: Vector, curve: int
     ) -> Vector | None:
         """The answer, with the rows of peaks and of the curve that matter taken in as they show."""
         count, kept = self.found.torques.size, len(program.values)
@@ -649,7 +636,6 @@ class Model:
         limited = self.search.problem.minimise == "k_dyn" or self.search.problem.k_dyn is not None
         shafts = self.shafts.first(NEAR * peak if limited else math.inf)
         over = self.curve.first(-0.2 * CLOSE)
-        loose = self.shafts.lowest(self.shafts.values, NEAR if closed else -math.inf)
         x = self._now(cost.size)
         for _ in range(CUTS if self.squares else ROUNDS):
             program.drop(kept)
@@ -662,8 +648,6 @@ class Model:
                 program.add(
                     {0: self.curve.rows[over], curve: -np.ones((over.size, 1))}, -self.curve.values[over]
                 )
-            if loose.size:
-                program.add({0: self.shafts.rows[loose]}, math.inf, -self.shafts.values[loose])
             for at, square in enumerate(self.squares, start=cost.size - len(self.squares)):
                 for change in self.cuts:
                     square.cut(program, change, count, at)
@@ -674,14 +658,10 @@ class Model:
             most = float(x[count]) + max(LET_THROUGH * (peak - float(x[count])), self.search.fine * peak)
             new = self.shafts.over(x[:count], most if limited else math.inf, shafts)
             beyond = self.curve.over(x[:count], float(x[curve]) + 1e-7, over)
-            after = self.shafts.values + self.shafts.rows @ x[:count]
-            parting = np.setdiff1d(self.shafts.lowest(after, -1e-7), loose) if closed else loose[:0]
-            if new.size + beyond.size + parting.size == 0 and not self._cut_short(x, cost):
+            if new.size + beyond.size == 0 and not self._cut_short(x, cost):
                 break
             self.cuts.append(x[:count])
-            shafts, over, loose = (
-                np.append(*one) for one in ((shafts, new), (over, beyond), (loose, parting))
-            )
+            shafts, over = np.append(shafts, new), np.append(over, beyond)
         return x
 
     def _cut_short(self, x: Vector, cost: Vector) -> bool:
