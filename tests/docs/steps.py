@@ -1,18 +1,9 @@
 """What a page of the documentation tells its reader to do: files to write, commands to type, Python to run.
 
 A line of a fenced `sh` block, or of an indented block, that begins with `softstart ` or `make ` is a command.
-Comments on the lines before a block speak to this runner and are not shown:
-
-    <!-- file: mine.toml -->     the block is written to that file
-    <!-- exit 3 -->              its last command ends with this exit code
-    <!-- long: 4 min -->         its commands are started, seen at work, and interrupted, not before what
-                                 the page shows is printed (but one that writes a folder, --out, which the
-                                 page then uses is run to its end)
-    <!-- continued -->           this Python goes on from the Python blocks before it
-    <!-- not run: reason -->     nothing of it is run
-
+Comments on the lines before a block, as `<!-- exit 3 -->`, speak to this runner: CONTRIBUTING.md lists them.
 A command whose own comment names a time of half a minute or more (`# all numbers, about 50 s`) is long, too.
-A `text` block right after commands or Python is all that the last of them prints, but for lines `...`.
+A long one that writes a folder, --out, which the page then uses is run to its end.
 """
 
 from __future__ import annotations
