@@ -74,9 +74,7 @@ def place(tmp_path, monkeypatch):
     """An empty folder that is the current one, with some files to use."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(CONTROLLERS)
-    (tmp_path / "quits.py").write_text("raise SystemExit(5)\n")
     (tmp_path / "good.toml").write_text(DRIVE)
-    (tmp_path / "broken.toml").write_text("name = \n")
     (tmp_path / "wrong.toml").write_text(
         DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan")
     )
