@@ -138,9 +138,7 @@ def _run(words: list[str], folder: Path, step: Step | None = None) -> subprocess
             while process.is_alive():
                 seconds = time.monotonic() - began
                 if seconds > PATIENCE:
-                    raise AssertionError(
-                        f"{words}: not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
-                    )
+                    raise AssertionError(f"{words}: not done after {PATIENCE:g} s: mark it as long")
                 if long and _seen(seconds, out.name, shown) and seconds > press:
                     press = seconds + 15.0  # then again, as a person would
                     os.killpg(process.pid, signal.SIGINT)

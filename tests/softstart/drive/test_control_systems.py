@@ -6,7 +6,7 @@ import pytest
 from tests.oracle import integrate
 
 from softstart.drive import Drive
-from softstart.drive.control_systems import initial_state
+from softstart.drive.control_systems import initial_state, shaft_torque
 
 CRANE = Drive.load("crane-4amtkf")
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "max_step": 1e-3}
@@ -79,3 +79,9 @@ def test_limits_and_rate_of_the_torque_and_another_gap():
     np.testing.assert_allclose(out["u"], np.minimum(2000.0 * t, 64.0), atol=0.2)
     assert np.all(start(CRANE, 0.01, -5.0)[1]["u"] == 0.0)  # minimum_torque
     assert np.all(start(CRANE, 0.03, 62.0, params={"gap": 2.0})[1]["T"] == 0.0)
+
+
+def test_the_opposite_flank_is_the_mirror_image():
+    for law in ("no-pull", "dead-zone", "modelica"):
+        forward, back = (shaft_torque(z, 8.0 * z, 4.0, 1.0, 0.5, law=law) for z in (1.0, -1.0))
+        assert forward == -back > 0.0
