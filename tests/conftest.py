@@ -26,7 +26,7 @@ def without_local_constants() -> None:
     """In the suite hypothesis tries no constants of the modules that happen to be loaded as examples.
 
     Derandomised as it may be, it takes them out of all local modules loaded so far, and so a test would get
-    other examples alone than after others (`tests/test_examples.py`). Older versions take none.
+    other examples alone than after others. Older versions take none.
     """
     try:
         providers = import_module("hypothesis.internal.conjecture.providers")

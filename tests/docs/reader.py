@@ -1,15 +1,14 @@
 """A reader of a page, who does what it says, in an empty folder.
 
 The first command of a page, and all that need a shell, are typed into one and run the installed `softstart`.
-The others run in forks of a process that has imported everything, which saves each about a second.
+The others run in forks of a process that has imported everything (`warm.py`): a second less for each.
 """
 
 from __future__ import annotations
 
-import json
+import multiprocessing
 import os
 import re
-import select
 import shlex
 import signal
 import subprocess
@@ -17,11 +16,12 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 from tests.docs.shown import among, difference, named
 from tests.docs.steps import Step
+
+from softstart.cli import main
 
 ROOT = Path(__file__).parents[2]
 WATCHED = 5.0  # s for which a long command of which the page shows nothing must go on
@@ -29,75 +29,27 @@ PRINTED = 60.0  # s after which it must have printed what the page shows of it
 PATIENCE = 300.0  # s for a command that is not called long, on a machine that may be busy
 INTERRUPTED = 130
 SHELL = re.compile(r"[|&;<>$`*?~{}()\\]")  # what only a shell understands
-WARM = """
-import contextlib, io, json, os, signal, sys, threading
-sys.path.remove("")
-import casadi, control, matplotlib.backends.backend_agg, matplotlib.figure, xarray, zarr
-from softstart.cli import main
-with contextlib.redirect_stdout(io.StringIO()):
-    for line in ("compare", "optimize --start-time 1.2x"):
-        assert main(line.split()) == 0
-for thread in threading.enumerate()[1:]:  # a process with threads is not to be forked
-    thread.join()
-print("ready", flush=True)
-for line in sys.stdin:
-    asked = json.loads(line)
-    ready, begun = os.pipe()
-    child = os.fork()
-    if not child:
-        os.setsid()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        os.chdir(asked["folder"])
-        for number, name in enumerate(["/dev/null", asked["out"], asked["err"]]):
-            os.dup2(os.open(name, os.O_RDWR | os.O_APPEND), number)
-        os.close(ready)
-        os.close(begun)
-        sys.argv = ["softstart", *asked["words"]]
-        sys.exit(main())
-    os.close(begun)
-    os.read(ready, 1)
-    os.close(ready)
-    print(child, flush=True)
-    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
-"""
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload(["tests.docs.warm"])
 
 
-@cache
-def _warm() -> subprocess.Popen[bytes]:
-    """The process that forks; it ends with this one, which holds the other end of its pipe."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", WARM], cwd=ROOT, env=_environment(), bufsize=0,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-    )  # fmt: skip
-    assert process.stdout
-    assert process.stdout.readline() == b"ready\n"
-    return process
-
-
-def end_warm() -> None:
-    """End the warm process, if there is one."""
-    if _warm.cache_info().currsize:
-        _warm().communicate()
-        _warm.cache_clear()
-
-
-class Forked:
-    """A command that runs in a fork of the warm process, like a Popen."""
-
-    def __init__(self, words: list[str], folder: Path, out: str, err: str) -> None:
-        self.returncode: int | None = None
-        warm = _warm()
-        assert warm.stdin
-        assert warm.stdout
-        self.answers = warm.stdout
-        asked = {"words": words, "folder": str(folder), "out": out, "err": err}
-        warm.stdin.write(json.dumps(asked).encode() + b"\n")
-        self.pid = int(self.answers.readline())
-
-    def poll(self) -> int | None:
-        if self.returncode is None and select.select([self.answers], [], [], 0.0)[0]:
-            self.returncode = int(self.answers.readline())
-        return self.returncode
+def _typed(words: list[str], folder: Path, out: str, err: str) -> None:
+    """In a process of its own: run the command there, as from a terminal."""
+    os.setsid()
+    os.chdir(folder)
+    for number, name in enumerate([os.devnull, out, err]):
+        os.dup2(os.open(name, os.O_RDWR | os.O_APPEND), number)
+    # what is started in the background by a shell is deaf to Ctrl-C
+    if words[0] != "softstart":
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.execvpe(words[0], words, _environment())
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    wanted = _environment()
+    os.environ.clear()
+    os.environ.update(wanted)
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    sys.argv = words
+    sys.exit(main())
 
 
 @dataclass
@@ -179,37 +131,22 @@ def _run(words: list[str], folder: Path, step: Step | None = None) -> subprocess
     """
     long, shown = (step.long, step.output) if step else (False, None)
     with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
-        if words[0] == "softstart":
-            process: Forked | subprocess.Popen[bytes] = Forked(words[1:], folder, out.name, err.name)
-        else:
-            with open(out.name, "w") as to_out, open(err.name, "w") as to_err:
-                process = subprocess.Popen(
-                    words, cwd=folder, env=_environment(), stdin=subprocess.DEVNULL, stdout=to_out,
-                    stderr=to_err, start_new_session=True,
-                    preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
-                )  # fmt: skip
+        process = FORKS.Process(target=_typed, args=(words, folder, out.name, err.name))
+        process.start()
         began, press = time.monotonic(), 0.0
         try:
-            while process.poll() is None:
+            while process.is_alive():
                 seconds = time.monotonic() - began
                 if seconds > PATIENCE:
-                    raise AssertionError(
-                        f"{words}: not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
-                    )
+                    raise AssertionError(f"{words}: not done after {PATIENCE:g} s: mark it as long")
                 if long and _seen(seconds, out.name, shown) and seconds > press:
                     press = seconds + 15.0  # then again, as a person would
                     os.killpg(process.pid, signal.SIGINT)
                 time.sleep(0.02)
         finally:
-            if process.poll() is None:
+            if process.is_alive():
                 os.killpg(process.pid, signal.SIGKILL)
-        assert process.returncode is not None
-        return subprocess.CompletedProcess(words, process.returncode, out.read(), err.read())
-
-
-def _hears_ctrl_c() -> None:
-    """As from a terminal: what is started in the background by a shell is deaf to it."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+        return subprocess.CompletedProcess(words, process.exitcode or 0, out.read(), err.read())
 
 
 def _seen(seconds: float, out: str, shown: str | None) -> bool:

@@ -1,18 +1,8 @@
 """What a page of the documentation tells its reader to do: files to write, commands to type, Python to run.
 
 A line of a fenced `sh` block, or of an indented block, that begins with `softstart ` or `make ` is a command.
-Comments on the lines before a block speak to this runner and are not shown:
-
-    <!-- file: mine.toml -->     the block is written to that file
-    <!-- exit 3 -->              its last command ends with this exit code
-    <!-- long: 4 min -->         its commands are started, seen at work, and interrupted, not before what
-                                 the page shows is printed (but one that writes a folder, --out, which the
-                                 page then uses is run to its end)
-    <!-- continued -->           this Python goes on from the Python blocks before it
-    <!-- not run: reason -->     nothing of it is run
-
+Comments on the lines before a block, as `<!-- exit 3 -->`, speak to this runner: CONTRIBUTING.md lists them.
 A command whose own comment names a time of half a minute or more (`# all numbers, about 50 s`) is long, too.
-A `text` block right after commands or Python is all that the last of them prints, but for lines `...`.
 """
 
 from __future__ import annotations
@@ -30,7 +20,6 @@ COMMENT = re.compile(r"^\s*<!--\s*(.+?)\s*-->\s*$")
 COMMAND = re.compile(r"^(softstart|make)( |$)")
 TIME = re.compile(r"#.*?\b(\d+(?:\.\d+)?) (s|min|h)\b")
 LONG = 30.0  # s
-OUT = re.compile(r"--out[ =]([\w./-]+)")
 MARKS = ("file:", "exit ", "long:", "continued", "not run:")
 
 
@@ -80,9 +69,7 @@ def blocks(text: str) -> Iterator[Block]:
             directives.pop()
             comments, after, i = [], False, i + 1
         elif fence and fence["marks"][0] != ":":
-            end = next(
-                (j for j in range(i + 1, len(lines)) if lines[j].strip() == fence["marks"]), len(lines)
-            )
+            end = i + 1 + [*map(str.strip, lines[i + 1 :]), fence["marks"]].index(fence["marks"])
             yield Block(fence["language"], tuple(lines[i + 1 : end]), i + 2, tuple(comments), after)
             comments, after, i = [], True, end + 1
         elif line.startswith("    ") and (i == 0 or not lines[i - 1].strip() or COMMENT.match(lines[i - 1])):
@@ -111,26 +98,11 @@ def steps(text: str) -> list[Step]:
         elif block.language in ("sh", "bash", "console", "indented", ""):
             found += _commands(block, marks)
         elif block.language in ("python", "py", "pycon"):
-            code = "\n".join(block.lines) + "\n"
-            found.append(
-                Step("python", code, block.line, long="long:" in marks, continued="continued" in marks)
-            )
+            code, long = "\n".join(block.lines) + "\n", "long:" in marks
+            found.append(Step("python", code, block.line, long=long, continued="continued" in marks))
         elif block.language == "text" and block.after and found and found[-1].kind != "file":
             found[-1] = replace(found[-1], output="\n".join(block.lines))
-    return [
-        replace(s, long=False) if s.long and _needed(s, found[i + 1 :]) else s for i, s in enumerate(found)
-    ]
-
-
-def _needed(step: Step, later: list[Step]) -> bool:
-    """Whether a later step uses what this one writes."""
-    folder = OUT.search(step.text)
-    for one in later if folder else ():
-        if f"{folder[1].rstrip('/')}/" in one.text:
-            return True
-        if (other := OUT.search(one.text)) and other[1].rstrip("/") == folder[1].rstrip("/"):
-            return False  # that one writes it anew
-    return False
+    return found
 
 
 def _commands(block: Block, marks: dict[str, str]) -> list[Step]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.docs.reader import ROOT, Reader, end_warm
+from tests.docs.reader import ROOT, Reader
 from tests.docs.steps import Step, pages, steps
 
 PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages(ROOT)}
@@ -24,13 +23,6 @@ SLOW = (  # those that take longest: `make docs-commands ONLY='-m slow'`
     "docs/tuning.md",
 )
 PARTS = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in TO_DO]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _ends() -> Iterator[None]:
-    """Leave no process behind."""
-    yield
-    end_warm()
 
 
 @pytest.mark.parametrize("name", PARTS)

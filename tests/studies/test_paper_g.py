@@ -7,11 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from softstart import simulate
 from softstart.study import Verdict
 from softstart_studies.crane import CRANE
-from softstart_studies.paper_g import PaperG, curves, from_flank, set_up_once, whole_start
-from softstart_studies.paper_g.crane import RATIOS, crane, ways
+from softstart_studies.paper_g import PaperG, curves, from_flank, set_up_once
+from softstart_studies.paper_g.crane import RATIOS
 
 # figures 2, 3, 4 ---------------------------------------------------------------------------------------
 
@@ -69,24 +68,6 @@ def test_each_conclusion_has_its_verdict_and_its_number():
     for claim, (beginning, (verdict, number)) in zip(study.claims, VERDICTS.items(), strict=True):
         assert claim.statement.startswith(beginning)
         assert (claim.verdict, number in claim.evidence) == (Verdict(verdict), True), claim
-
-
-@pytest.mark.parametrize("gap", [0.5, 2.0])
-def test_method_2_is_as_hard_as_method_1_over_the_whole_start(gap):
-    found = whole_start.whole_start(gap)
-    assert found.whole == pytest.approx(found.method_1, rel=1e-12)
-    assert np.all(found.first_contact[:-1] < found.whole[:-1])
-    # (18) survives the whole start if the torque is raised at the turning point of the shaft torque
-    assert found.at_peak == pytest.approx(np.maximum(found.first_contact, 2 - found.first_contact), rel=1e-12)
-
-
-def test_time_switched_torque_fails_at_first_contact_of_the_worn_gap():
-    worn = set_up_once.worn()
-    first, whole = worn.first["instant"], worn.whole["instant"]
-    assert first[0] == pytest.approx(worn.promised[0], rel=1e-12)
-    assert 1.35 < first[-1] / worn.promised[-1] < 1.45
-    assert 1.70 < whole.min() < 1.80
-    assert simulate(crane(gap=2.0), ways()["instant"]).k_dyn == pytest.approx(whole[-1], rel=1e-12)
 
 
 def test_the_delay_fits_within_10_percent_and_breaks_before_20():

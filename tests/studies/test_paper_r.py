@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.twin import chain_of
 
 from softstart import Drive
 from softstart.chain import Chain, natural_vibration
@@ -17,23 +16,11 @@ from softstart.vibration import elastic_frequencies
 from softstart_studies.paper_r import findings, four_to_two, tables
 from softstart_studies.paper_r.findings import free, scale_gaps, tractor
 from softstart_studies.paper_r.lever import error_bound, lever
-from softstart_studies.paper_r.vibration_with_gaps import backbone, let_go, twists
 
 CRANE = Drive.load("crane-4amtkf")
 
 
 # motions ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("amplitude", [0.02, 0.5])
-def test_free_vibration_of_two_masses_is_the_backbone(amplitude):
-    arrays = chain_of(CRANE).at_motor_shaft()
-    w = float(backbone(0.035, 0.175, 368.465, 0.5, amplitude))
-    period = 2.0 * math.pi / w
-    t = np.arange(41) * period / 8
-    motion = let_go(arrays, twists(arrays, np.array([368.465 * amplitude])), t)
-    np.testing.assert_allclose(motion.twist[::8, 0], 0.25 + amplitude, rtol=1e-10)
-    assert np.abs(motion.torque).max() == pytest.approx(368.465 * amplitude, rel=1e-12)
 
 
 def test_energy_and_momentum_are_kept_through_hundreds_of_contacts():

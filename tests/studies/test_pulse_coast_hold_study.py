@@ -44,9 +44,6 @@ def test_cells_are_single_starts_over_the_optimum_of_an_ideal_torque():
     latest = max(start.start_time for start in runs)
     best = optimize(ideal("active", 1.0, 5.0), latest, terminal="reached")
     assert found.over[1, 0].max() == pytest.approx(max(start.k_dyn for start in runs) / best.k_dyn, rel=1e-12)
-    for start in runs:  # what is said is no smaller than the ratio at the own start time
-        own = optimize(ideal("active", 1.0, 5.0), start.start_time, terminal="reached").k_dyn
-        assert start.k_dyn / own <= start.k_dyn / best.k_dyn * (1.0 + 1e-9)
 
 
 def test_tolerances_named_are_tolerances_run():

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -74,9 +71,7 @@ def place(tmp_path, monkeypatch):
     """An empty folder that is the current one, with some files to use."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(CONTROLLERS)
-    (tmp_path / "quits.py").write_text("raise SystemExit(5)\n")
     (tmp_path / "good.toml").write_text(DRIVE)
-    (tmp_path / "broken.toml").write_text("name = \n")
     (tmp_path / "wrong.toml").write_text(
         DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan")
     )
@@ -120,20 +115,6 @@ def as_json(done):
 
 
 @pytest.fixture
-def table(done, monkeypatch):
-    """The tables of softstart ARGUMENTS on a terminal, where they fit; as one line."""
-
-    def go(*arguments: str, columns: int = 80) -> str:
-        monkeypatch.setenv("COLUMNS", str(columns))
-        lines = done(*arguments).splitlines()
-        assert max(map(len, lines)) <= columns
-        assert not any(line != line.rstrip() or "\x1b" in line for line in lines)
-        return " ".join(" ".join(lines).split())
-
-    return go
-
-
-@pytest.fixture
 def refused(run, place):
     """What softstart ARGUMENTS says of bad input: no output, one sentence, no file left.
 
@@ -162,31 +143,9 @@ def refused(run, place):
 
 
 @pytest.fixture
-def interrupted(command):
-    """softstart ARGUMENTS stopped from the keyboard once `begun`: what it says, and exit 130."""
-
-    def go(*arguments: str, begun: Callable[[], bool]) -> str:
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        process = subprocess.Popen([*command, *arguments], start_new_session=True, **pipes)
-        deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and not begun():
-            time.sleep(0.005)
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does it: to the workers too
-        out, err = process.communicate(timeout=60)
-        assert (process.returncode, out) == (130, ""), err
-        assert "Traceback" not in err
-        return err
-
-    return go
-
-
-@pytest.fixture
 def command():
     """What starts softstart in a process of its own."""
-    return COMMAND
-
-
-COMMAND = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
+    return sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())"
 
 
 def snapshot(folder: Path) -> set[str]:

@@ -137,25 +137,6 @@ def test_a_controller_may_print(run):
     assert "this belongs to standard error" in err
 
 
-def test_start_times_are_times_or_multiples_of_direct(as_json):
-    direct = simulate(CRANE_60, "direct").start_time
-    told = as_json("optimize", *SIXTY)
-    assert told["start_time_bound"] == 1.2 * direct
-    assert told["why"].endswith("no start time given: 1.2x that of direct")
-    told = as_json("pareto", *SIXTY, "--start-times", "1.2x:1.4x:2", "--controllers", "ramp")
-    bounds = [point["start_time_bound"] for point in told["points"]]
-    assert bounds == pytest.approx([1.2 * direct, 1.4 * direct])
-
-
-@pytest.mark.slow
-def test_too_short_a_start_time_is_told_with_the_shortest(run, nothing_left):
-    code, out, err = run("optimize", *SIXTY, "--start-time", "0.2", "--json", "--out", "best")
-    told = json.loads(out)
-    assert (code, err.count("\n"), told["status"]) == (3, 1, "INFEASIBLE")
-    assert 0.2 < told["shortest_start_time"] < 0.26
-    nothing_left()
-
-
 def test_no_gains_in_time_is_no_solution(run):
     code, out, err = run(*QUICK_TUNE.split(), "--start-time", "0.05", "--json")
     assert code == 3
@@ -213,8 +194,13 @@ SHOWN = {
 
 
 @pytest.mark.parametrize("line", SHOWN)
-def test_tables_are_shown_and_fit(line, table):
-    flat = table(*shlex.split(line), columns=120 if "fatigue" in line else 80)
+def test_tables_are_shown_and_fit(line, done, monkeypatch):
+    columns = 120 if "fatigue" in line else 80
+    monkeypatch.setenv("COLUMNS", str(columns))
+    lines = done(*shlex.split(line)).splitlines()
+    assert max(map(len, lines)) <= columns
+    assert not any(line != line.rstrip() or "\x1b" in line for line in lines)
+    flat = " ".join(" ".join(lines).split())
     for words in SHOWN[line]:
         assert words in flat
 
@@ -273,27 +259,16 @@ def test_natural_frequencies_come_first_whatever_cannot_be_reduced(run, place, n
     assert (code, err.count("\n")) == (2, 1)
     found = [line.split()[-1] for line in out.splitlines() if re.match(r"[\d., -]+$", line)]
     assert found == ["0.00", "81.21", "141.21", "378.95", "536.36"]
-    asked = ("reduce", "tractor-like", "--factor", "20")
-    code, out, err = run(*asked, "--out", "found")
-    assert code == 2
-    assert "(256.071/69.1286)^2 = 13.7 is below the 20" in err
+    refused = ("reduce", "tractor-like", "--factor", "20")
+    assert run(*refused, "--out", "found").code == 2
     nothing_left()
-    assert run(*asked, "--force", "--json", "--no-starts").code == 0
+    assert run(*refused, "--force", "--json", "--no-starts").code == 0
 
 
-def test_starts_designed_on_the_drive_are_verified_on_the_chain(run, place):
-    done = run("reduce", "--verify", "pulse-coast-hold,ramp", "--param", "ramp.time=0.1 s", "--json",
-               "--out", "found")  # fmt: skip
-    told = json.loads(done.out)
-    drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
-    for one, parameters in zip(told["verified"], ({}, {"time": 0.1}), strict=True):
-        name = one["controller"]
-        assert one["k_dyn"] == simulate(drive, name, parameters=parameters).k_dyn
-        whole = simulate("crane-4-mass", name, parameters=parameters, fitted_to=drive, base=drive)
-        assert (one["chain_k_dyn"], one["worst_shaft"]) == (whole.k_dyn, "rotor - pinion")
-    verdict = told["verdict"]
+def test_a_verification_says_where_the_order_is_another_one(run, place):
+    line = ("reduce", "--verify", "pulse-coast-hold,ramp", "--param", "ramp.time=0.1 s", "--out", "found")
+    verdict = json.loads(run(*line, "--json").out)["verdict"]
     assert verdict["order_on_chain"] == ["ramp", "pulse-coast-hold"] == verdict["order_on_drive"][::-1]
-    assert not verdict["enough"]
     assert "On the chain ramp is gentler than pulse-coast-hold (K_dyn 3" in verdict["said"]
     assert verdict["said"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
 

@@ -8,8 +8,6 @@ import pytest
 from click.shell_completion import ShellComplete
 
 from softstart.cli.commands import cli
-from softstart.cli.options import keys_of
-from softstart.drive import PARAMETERS, Drive
 
 FILE, FOLDER = "a file", "a folder"
 # the line up to the cursor: what must be offered, and what must not
@@ -18,12 +16,10 @@ LINES = {
     "softstart compare ": (["crane-4amtkf"], ["direct"]),
     "softstart compare g": ([FILE], ["crane-4amtkf"]),
     "softstart compare --controllers direct,ra": (["direct,ramp"], ["direct,shaped", "ramp"]),
-    "softstart compare --set shaft.g": (["shaft.gap="], ["load.inertia="]),
     "softstart sweep --axis load.k": (["load.kind="], ["controller="]),
     "softstart optimize --terminal s": (["synchronous", "steady"], ["reached"]),
     "softstart reduce --set mass[1].": (["mass[1].inertia="], ["shaft[1].gap="]),
     "softstart clutch --law ": (["linear", "exponential"], [FILE]),
-    "softstart study paper-": (["paper-g", "paper-r"], ["wear"]),
     "softstart simulate good.toml --con": (["--controller"], ["--set"]),
     "softstart compare --out ": ([FOLDER], [FILE]),
 }
@@ -38,10 +34,6 @@ def test_what_a_line_may_become(line, place):
     assert [word for word in wanted if word not in words] == []
     assert [word for word in unwanted if word in words] == []
     assert all(one.value.startswith(last) for one in found)
-
-
-def test_every_parameter_is_offered():
-    assert {one.path for one in PARAMETERS.values()} <= set(keys_of(Drive.TABLES))
 
 
 def test_tab_in_bash(place, run, monkeypatch, refused):

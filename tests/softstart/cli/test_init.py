@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import sys
 
 import pytest
@@ -42,9 +41,7 @@ def test_answers_make_a_drive_that_every_command_takes(run, typed, place):
     assert err.count(POWER) == 1
     assert "1430 rpm = 149.7 rad/s" in err  # a bare number, echoed
     assert "15 arcmin = 0.004363 rad" in err
-    assert "rotor (slewing gear, fan, rotary table: anything that turns about the output axis)" in err
     assert "diameter on which the coupling" not in err  # there is no play
-    assert "fall" not in err  # nor ropes
     drive = Drive.load("mine.toml")
     assert (drive.name, drive.load_kind) == ("gantry", "reactive")
     assert run("simulate", "mine.toml", "--controller", "ramp", "--json").code == 0
@@ -97,7 +94,7 @@ def test_the_template_is_a_sheet_that_can_be_filled_in(run, place, as_json):
 
 
 def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
-    """Prompt, --set, data sheet given to a command, and form: one K_dyn."""
+    """Prompt, --set, data sheet given to a command, and form."""
     typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
           "", "290", "900", "", "")  # fmt: skip
     assert run("init", "--ask", "--out", "asked.toml").code == 0
@@ -117,23 +114,17 @@ def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
             panel._fields[name].value = SLEWING.get(p.path, "")
         (place / "form.toml").write_text(panel.sheet().drive_toml())
         client.delete()
-    found = []
     for name in ("asked", "set", "sheet", "form"):
         drive = Drive.load(f"{name}.toml")
         assert (drive.J2, drive.c, drive.gap, drive.Mc) == (0.20083, 761.77, 0.08843, 23.684)
         assert drive.assumed == "damping ratio 0.02"
-        code, out, err = run("simulate", f"{name}.toml", "--controller", "direct", "--json")
-        assert (code, "is a data sheet" in err) == (0, name == "sheet")
-        found.append(json.loads(out)["k_dyn"])
-    assert set(found) == {found[0]}
-    assert found[0] == pytest.approx(2.246, abs=5e-4)
 
 
 def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     (place / "sheet.toml").write_text(DataSheet.from_settings(SLEWING | UNITS).to_toml())
     more = ("--set", "load.inertia=580", "--set", "gear.backlash=16 arcmin", "--set", "load_torque=20")
-    code, out, _ = run("simulate", "sheet.toml", "--controller", "direct", *more)
-    assert code == 0
+    code, out, err = run("simulate", "sheet.toml", "--controller", "direct", *more)
+    assert (code, "is a data sheet" in err) == (0, True)
     assert "J2 = 0.40166 kg m2, Mc = 20 N m" in out
     assert "gap = 0.17686 rad" in out
     assert "assumed: damping ratio 0.02" in out

@@ -1,5 +1,7 @@
 """`softstart study`, and what a study is."""
 
+from importlib.metadata import EntryPoint
+
 import pytest
 
 from softstart import InputError, SimulationError, plugins
@@ -36,26 +38,11 @@ class Fails(Example):
         raise SimulationError("The start was given up: its controller is a test.")
 
 
-class Point:
-    """An entry point."""
-
-    def __init__(self, target):
-        self.target, self.value = target, "somewhere:Something"
-
-    def load(self):
-        if isinstance(self.target, Exception):
-            raise self.target
-        return self.target
-
-
 @pytest.fixture(autouse=True)
 def registered(monkeypatch):
-    points = {
-        "example": Point(Example),
-        "fails": Point(Fails),
-        "broken": Point(ImportError("No module named 'nothing'")),
-        "strange": Point(int),
-    }
+    places = {"example": f"{__name__}:Example", "fails": f"{__name__}:Fails", "broken": "nothing:Study",
+              "strange": "builtins:int"}  # fmt: skip
+    points = {name: EntryPoint(name, place, "softstart.studies") for name, place in places.items()}
     monkeypatch.setattr(lists, "registered", lambda group: points)
     monkeypatch.setattr(plugins, "registered", lambda group: points)
 

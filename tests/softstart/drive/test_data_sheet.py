@@ -175,9 +175,7 @@ def test_a_file_and_back(tmp_path):
         ({"motor.rated_torque": 30}, "the first makes 4492.5 W; leave one out"),
         ({"rope.stiffness": 8e5}, "[rope] stiffness is for a hoist"),
         (HOIST | ROPE | {"rope.stiffness": 8e5}, "both say how stiff the rope is"),
-        (HOIST | {"rope.length": 9}, "[rope] length says nothing without [rope] diameter"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
-        ({"load.reeving": 2}, "[load] reeving is for a hoist, and this is a travel; leave it out"),
         (
             dict.fromkeys(("coupling.stiffness", "gear.stiffness", "output.diameter", "output.length")),
             "nothing here is elastic",
