@@ -83,7 +83,7 @@ def test_impacts_pile_up_at_the_known_instant(restitution):
     """First impact at t1 = sqrt(2 s/a), then flights of 2 e^k v/a: the sum is t1 (1 + 2 e/(1 - e))."""
     first = math.sqrt(2 * 0.1 / 3.0)
     end = first * (1 + 2 * restitution / (1 - restitution))
-    shaft = Shaft(gap=0.2, restitution=restitution)  # of 0.2 rad: half of it to go
+    shaft = Shaft(gap=0.2, restitution=restitution)
     chain = Chain([Mass(1.0), Mass(2.0)], [shaft], Motor(3.0), target_speed=1e3)
     run = simulate(chain, Pieces(pieces=((0.0, 3.0),)), end + 1.0, fitted_to=CRANE)
     over = [e for e in run.events if e.kind == "impacts over, flanks press"]
