@@ -98,6 +98,8 @@ def test_asks_at_whole_sample_periods_only(name: str) -> None:
         ("take-up", {"slowing": -1.0}),
         ("state-feedback", {"torque_weight": 0.0}),
         ("shaped", {"shaper": "ei"}),
+        ("reduced-two-stage", {"raise_at": "top"}),
+        ("acceleration-delay", {"raise_at": "top"}),
     ],
 )
 def test_refuses_impossible_parameters_in_one_sentence(name: str, wrong: dict[str, Any]) -> None:
