@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -26,24 +27,11 @@ def seen(chain: Chain, damping_ratio: float = 0.02, phase: float = 0.0, at: Sequ
 
     `at` places each twist in its gap, from -1 (opposite flank) to 1 (driving flank).
     """
-    assert chain.motor is not None
-    motor = chain.motor.replace(
-        encoder_lines=4096, torque_lag=0.002, computing_delay=0.001, encoder_phase=phase
-    )
-    shafts = [shaft.replace(damping=0.0, damping_ratio=damping_ratio) for shaft in chain.shafts]
-    if len(at):
-        places = zip(shafts, at, strict=True)
-        shafts = [s.replace(start_position=float(0.5 * s.gap * where)) for s, where in places]
-    return replace(chain, shafts=tuple(shafts), motor=motor)
-
-
-def off(chain: Chain, stiffness: float = 1.0, J1: float = 1.0) -> Chain:
-    """The chain with other stiffnesses, or another inertia of the motor, than the controller is told."""
-    shafts = tuple(s.replace(stiffness=stiffness * s.stiffness) for s in chain.shafts)
-    first = chain.masses[0]
-    return replace(
-        chain, shafts=shafts, masses=(first.replace(inertia=J1 * first.inertia), *chain.masses[1:])
-    )
+    values = {"encoder_lines": 4096, "torque_lag": 0.002, "computing_delay": 0.001, "encoder_phase": phase}
+    values |= {f"shaft_{k}_damping_ratio": damping_ratio for k in range(1, len(chain.masses))}
+    for k, where in enumerate(at):
+        values[f"shaft_{k + 1}_start_position"] = float(0.5 * chain.shafts[k].gap * where)
+    return chain.with_values(values)
 
 
 NOMINAL = seen(CRANE)
@@ -65,18 +53,19 @@ def crane_cells(seed: int, count: int = 4) -> Mapping[str, list[Chain]]:
         places = rng.uniform(-1.0, 1.0, len(chain.shafts)) if at is None else at
         return seen(chain, damping_ratio, float(rng.uniform()), places)
 
-    def flanks() -> Iterator[Sequence[float] | None]:
-        yield (-1.0, -1.0, -1.0)
-        yield from [None] * (count - 1)
-
+    flanks: list[Sequence[float] | None] = [(-1.0, -1.0, -1.0), *[None] * (count - 1)]
     inertias = (0.4, 0.7, 1.0)
-    wrong = ((1.2, 1.0), (0.8, 1.0), (1.0, 1.2), (1.0, 0.8))
+    c = {f"shaft_{k}_stiffness": shaft.stiffness for k, shaft in enumerate(CRANE.shafts, 1)}
+    J1 = {"mass_1_inertia": CRANE.masses[0].inertia}
+    wrong = [{name: by * value for name, value in one.items()} for one in (c, J1) for by in (1.2, 0.8)]
     groups = {
-        f"gaps x{gaps:g}": [one(CRANE.changed(gaps, inertia), at) for inertia in inertias for at in flanks()]
+        f"gaps x{gaps:g}": [one(CRANE.changed(gaps, inertia), at) for inertia in inertias for at in flanks]
         for gaps in (0.5, 1.0, 2.0, 4.0)
     }
     groups["driving flank"] = [one(CRANE.changed(1.0, inertia), (1.0, 1.0, 1.0)) for inertia in inertias]
-    groups["stiffness or J1 20 % off"] = [one(off(CRANE, *which)) for which in wrong for _ in range(count)]
+    groups["stiffness or J1 20 % off"] = [
+        one(CRANE.with_values(which)) for which in wrong for _ in range(count)
+    ]
     groups["undamped"] = [one(CRANE, damping_ratio=0.0) for _ in range(count)]
     return groups
 
@@ -129,14 +118,13 @@ PARTS: dict[str, dict[str, float]] = {  # `take-up` without one of them
     "low speed (the speed 3 times)": {"take_up_speed": 3.0 * OWN["take_up_speed"]},
     "stiff speed loop (a quarter)": {"speed_gain": 0.25 * OWN["speed_gain"]},
 }
+GAPS = ("gaps x0.5", "gaps x1", "gaps x2", "gaps x4")
 STRATEGIES = ("take-up", "current-limit-feedback", "pulse-coast-hold", "state-feedback", "s-curve")
 
 
-def delay_of(chain: Chain) -> float:
-    """Angle in rad by which lag, dead time and a sample delay the torque, at the first elastic frequency."""
-    drive: Any = chain.design_drive
-    sample = make_controller("take-up").fitted(drive).parameters["period"]
-    return float(drive.Omega * (drive.torque_lag + drive.computing_delay + sample))
+def mean_and_worst(figures: Any) -> str:
+    """Two numbers of many."""
+    return f"{figures.mean():.2f}, {figures.max():.2f}" if not np.isnan(figures).any() else "-"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -179,17 +167,15 @@ def idle_before_the_peak(chain: Chain) -> bool:
 def limits(groups: Mapping[str, Sequence[Chain]]) -> None:
     """Print what the speed alone decides, and how far it can be chosen."""
     rows = []
-    for name in ("gaps x0.5", "gaps x1", "gaps x2", "gaps x4"):
-        cells = groups[name]
-        K = at_speeds(cells, SPEEDS)
-        now, near = at_speeds(cells, [1.0])[0], at_speeds(cells, [0.998, 1.002])
-        common, moved = K[K.mean(axis=1).argmin()], near / now - 1.0
-        hard = [chain for chain, one in zip(cells, now, strict=True) if one > HARD]
+    for name in GAPS:
+        K = at_speeds(groups[name], SPEEDS)
+        now, *near = at_speeds(groups[name], [1.0, 0.998, 1.002])
+        hard = [chain for chain, one in zip(groups[name], now, strict=True) if one > HARD]
+        moved = 100.0 * np.abs(near / now - 1.0)
         rows.append([
-            name,
-            *(f"{one.mean():.2f}, {one.max():.2f}" for one in (now, common, K.min(axis=0))),
-            f"{100.0 * np.sqrt((moved**2).mean()):.0f}, {100.0 * np.abs(moved).max():.0f}",
-            f"{sum(idle_before_the_peak(chain) for chain in hard)} of {len(hard)}",
+            name, *map(mean_and_worst, (now, K[K.mean(axis=1).argmin()], K.min(axis=0))),
+            f"{np.sqrt((moved**2).mean()):.0f}, {moved.max():.0f}",
+            f"{sum(map(idle_before_the_peak, hard))} of {len(hard)}",
         ])  # fmt: skip
     heads = ["as it is", "best speed for all", "best speed for each", "speed 0.2 % off: rms, most, %", "idle"]
     table(["starts", *heads], rows)
@@ -197,12 +183,12 @@ def limits(groups: Mapping[str, Sequence[Chain]]) -> None:
 
 def displaced(chain: Chain, most: float, rng: np.random.Generator) -> Chain:
     """The chain with each of its start positions up to `most` off, in rad at the motor shaft."""
-    shafts = []
-    for shaft, gap in zip(chain.shafts, chain.at_motor_shaft().gap, strict=True):
-        half = 0.5 * float(shaft.gap)
+    values = {}
+    for k, gap in enumerate(chain.at_motor_shaft().gap):
+        shaft, half = chain.shafts[k], 0.5 * float(chain.shafts[k].gap)
         to = shaft.start_position + rng.uniform(-most, most) * 2.0 * half / gap
-        shafts.append(shaft.replace(start_position=float(min(max(to, -half), half))))
-    return replace(chain, shafts=tuple(shafts))
+        values[f"shaft_{k + 1}_start_position"] = float(min(max(to, -half), half))
+    return chain.with_values(values)
 
 
 COUNT = 2.0 * np.pi / (4 * 4096)  # rad, of the encoder
@@ -216,7 +202,7 @@ def optima(groups: Mapping[str, Sequence[Chain]]) -> None:
     """
     rows = []
     for place, i in (("opposite flanks", 0), ("random", 2)):
-        for name in ("gaps x0.5", "gaps x1", "gaps x2", "gaps x4"):
+        for name in GAPS:
             chain, rng = groups[name][i], np.random.default_rng(i)
             K, time = played([chain], "take-up", NOMINAL)
             t = float(time[0]) * rigid_time(chain)
@@ -225,10 +211,9 @@ def optima(groups: Mapping[str, Sequence[Chain]]) -> None:
             for counts in (3, 10, 30):
                 near = [displaced(chain, counts * COUNT, rng) for _ in range(40)]
                 off_by = played(near, make_controller("profile", {"profile": best.profile}), NOMINAL)[0]
-                again.append(f"{np.nanmean(off_by):.2f}, {np.nanmax(off_by):.2f}")
+                again.append(mean_and_worst(off_by))
             figures = f"{t:.3f}", f"{K[0]:.2f}", f"{best.k_dyn:.2f}", f"{K[0] / best.k_dyn:.2f}"
             rows.append([f"{name}, {place}", *figures, *again])
-            print(rows[-1], flush=True)
     heads = ["time, s", "take-up", "best found", "ratio", "off by 3 counts", "10", "30"]
     table(["start", *heads], rows)
 
@@ -236,70 +221,44 @@ def optima(groups: Mapping[str, Sequence[Chain]]) -> None:
 # what was aimed at ------------------------------------------------------------------------------------------
 
 SEARCHES = ("s-curve", "current-limit-feedback", "reduced-two-stage", "take-up")  # each a search of its own
-AIMED_AT = {"gaps x4": (math.inf, 1.20), "stiffness or J1 20 % off": (math.inf, 1.3)}  # mean, worst
-USUAL = (1.08, 1.15)
+AIMS = {
+    "nominal": "K_dyn 1.10 in 0.47 s", "gaps x4": "1.20", "stiffness or J1 20 % off": "1.30",
+    "undamped": "K_dyn 2.0",
+}  # fmt: skip
 
 
 def least(chain: Chain, seconds: float) -> float:
-    """The least K_dyn that was found for a start time, by a search from each of four strategies.
-
-    It is no proved optimum: ratios to it may be higher still.
-    """
+    """The least K_dyn found for a start time by a search from each of four strategies: no proved optimum."""
     found = []
     for seed in SEARCHES:
-        try:
+        with suppress(OptimumError):
             found.append(optimize(chain, seconds, time_limit=0.0, seeds=[seed]).k_dyn)
-        except OptimumError:
-            continue
     return min(found)
 
 
-def place(chain: Chain) -> str:
-    """Where its twists lie in the gaps at first."""
-    at = {round(2.0 * float(s.start_position or 0.0) / float(s.gap)) for s in chain.shafts if s.gap}
-    where = {(-1,): "opposite flanks", (1,): "driving flanks"}.get(tuple(at))
-    exact = all(abs(float(s.start_position or 0.0)) == 0.5 * float(s.gap) for s in chain.shafts)
-    return where if where and exact else "between"
-
-
-def beside_the_least(name: str, chain: Chain, fitted_to: Chain | None) -> tuple[float, float]:
-    """K_dyn of `take-up` and its ratio to the least found in its own time; its row is printed."""
-    run = simulate(chain, "take-up", fitted_to=fitted_to, base=chain)
-    best = math.nan if name == "undamped" else least(chain, run.start_time)
-    peak = chain.shaft_names[int(run.k_dyns.argmax())]
-    share = chain.masses[-1].inertia / CRANE.masses[-1].inertia
-    load = f"x{share:.1f}" if fitted_to else f"{len(chain.masses)} masses"
-    when = run.peak_time / run.start_time
-    figures = (f"{run.start_time:.3f}", f"{run.k_dyn:.2f}", f"{best:.2f}", f"{run.k_dyn / best:.2f}")
-    print("| " + " | ".join([name, load, place(chain), *figures, peak, f"{when:.2f}"]) + " |", flush=True)
-    return run.k_dyn, run.k_dyn / best
-
-
 def aims() -> None:
-    """Print each start of `take-up` beside the least K_dyn found in its own time, and the sums of the groups.
+    """Print K_dyn of `take-up` beside the least found in its own time, of each start and of the groups.
 
     The last group are ten random chains on which nothing was tuned.
     """
-    groups = {name: (cells, NOMINAL) for name, cells in crane_cells(3, 3).items()}
-    off_cells, _ = groups["stiffness or J1 20 % off"]
-    groups["stiffness or J1 20 % off"] = (off_cells[::2], NOMINAL)
-    every: dict[str, tuple[list[Chain], Chain | None]] = {"nominal": ([NOMINAL], NOMINAL), **groups}
-    every["random chains"] = (random_chains(1, 10), None)
-    heads = ["group", "J2", "position", "time, s", "take-up", "least found", "ratio", "peak in", "peak at"]
-    print("| " + " | ".join(heads) + " |\n|---|" + "--:|" * (len(heads) - 1))
-    rows, usual = [], []
-    for name, (chains, fitted_to) in every.items():
-        found = np.array([beside_the_least(name, chain, fitted_to) for chain in chains])
-        K, ratio = found.T
-        mean, worst = AIMED_AT.get(name, USUAL)
-        if name in ("gaps x0.5", "gaps x1", "gaps x2", "driving flank"):
-            usual += ratio.tolist()
-        aim = f"{worst:.2f}" if math.isinf(mean) else f"{mean:.2f}, {worst:.2f}"
-        aim = {"nominal": "K_dyn 1.10 in 0.47 s", "undamped": "K_dyn 2.0"}.get(name, aim)
-        rows.append([name, str(len(chains)), *(f"{x.mean():.2f}, {x.max():.2f}" for x in (K, ratio)), aim])
-    among = np.array(usual)
-    both = f"{among.mean():.2f}, {among.max():.2f}"
-    rows.append(["gaps x0.5 to x2, driving flank", str(among.size), "", both, "1.08, 1.15"])
+    groups = {"nominal": [NOMINAL], **crane_cells(3, 3)}
+    groups["stiffness or J1 20 % off"] = groups["stiffness or J1 20 % off"][::2]
+    rows, usual = [], list[float]()
+    for name, chains in {**groups, "random chains": random_chains(1, 10)}.items():
+        pairs = []
+        for chain in chains:
+            (K,), (time,) = played([chain], "take-up", NOMINAL if name in groups else None)
+            best = math.nan if name == "undamped" else least(chain, time * rigid_time(chain))
+            pairs.append((K, K / best))
+            share = chain.masses[-1].inertia / CRANE.masses[-1].inertia
+            print(f"{name}, J2 x{share:.1f}, time x{time:.2f}: {K:.2f}, least {best:.2f}", flush=True)
+        K, ratio = np.array(pairs).T
+        usual += ratio.tolist() if name in (*GAPS[:3], "driving flank") else []
+        both = map(mean_and_worst, (K, ratio))
+        rows.append([name, str(len(chains)), *both, AIMS.get(name, "1.08, 1.15")])
+    rows.append([
+        "gaps x0.5 to x2, driving flank", str(len(usual)), "", mean_and_worst(np.array(usual)), "1.08, 1.15"
+    ])  # fmt: skip
     print()
     table(["starts", "number", "K_dyn: mean, worst", "ratio: mean, worst", "aimed at"], rows)
 
@@ -314,23 +273,24 @@ def main() -> None:
     rows = []
     for group, cells in groups.items():
         found = [played(cells, name, NOMINAL) for name in STRATEGIES]
-        rows.append([group, *(f"{K.mean():.2f}, {K.max():.2f} ({time.mean():.2f})" for K, time in found)])
+        rows.append([group, *(f"{mean_and_worst(K)} ({time.mean():.2f})" for K, time in found)])
     table(["starts", *STRATEGIES], rows)
     K, time = played([NOMINAL], "take-up", NOMINAL)
     print(f"nominal: K_dyn {K[0]:.3f} in {time[0] * rigid_time(NOMINAL):.3f} s\n")
     rows = []
     for part, changes in PARTS.items():
         other = make_controller("take-up", changes)
-        worth = [played(cells, other, NOMINAL)[0] for cells in groups.values()]
-        rows.append([part, *(f"{K.mean():.2f}, {K.max():.2f}" for K in worth)])
+        rows.append([part, *(mean_and_worst(played(cells, other, NOMINAL)[0]) for cells in groups.values())])
     table(["without", *groups], rows)
     limits(groups)
     rows = []
     for chain in random_chains(1, 10):
-        all_of_them = [played([chain], name) for name in STRATEGIES]
-        gaps = sum(shaft.gap > 0.0 for shaft in chain.shafts)
-        about = [f"{len(chain.masses)}, {gaps}", chain.masses[-1].kind, f"{delay_of(chain):.1f}"]
-        rows.append([*about, *(f"{K[0]:.2f} ({time[0]:.2f})" for K, time in all_of_them)])
+        gaps, drive = sum(shaft.gap > 0.0 for shaft in chain.shafts), chain.design_drive
+        sample = make_controller("take-up").fitted(drive).parameters["period"]
+        delay = float(drive.Omega * (drive.torque_lag + drive.computing_delay + sample))  # rad
+        found = [played([chain], name) for name in STRATEGIES]
+        figures = (f"{K[0]:.2f} ({time[0]:.2f})" for K, time in found)
+        rows.append([f"{len(chain.masses)}, {gaps}", chain.masses[-1].kind, f"{delay:.1f}", *figures])
     table(["masses, gaps", "load", "delay", *STRATEGIES], rows)
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, records, simulate
+from softstart import Drive, records, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.kernel.records import S_REF, S_START
-from softstart_controllers.acceleration_delay import AccelerationDelay
 from softstart_controllers.reduced_two_stage import ReducedTwoStage
 
 CRANE = Drive.load("crane-4amtkf")
@@ -55,9 +53,3 @@ def test_peak_is_never_harder_over_a_map(name: str) -> None:
     for where, damping, kind in itertools.product(POSITIONS, (0.0, 0.1), ("active", "reactive")):
         if (where, kind) != ("hanging", "reactive"):
             assert cell(name, where, damping, kind).max() < 1e-6, (where, damping, kind)
-
-
-@pytest.mark.parametrize("make", [ReducedTwoStage, AccelerationDelay])
-def test_another_word_is_refused(make: Any) -> None:
-    with pytest.raises(InputError, match='write "peak" or "end"'):
-        make_controller(make.name, {"raise_at": "top"})

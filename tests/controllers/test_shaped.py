@@ -83,19 +83,6 @@ def test_from_rest_they_are_the_textbooks(ratio: float) -> None:
     assert list(M) == pytest.approx([first, first, second, second], rel=1e-12)
 
 
-def test_after_an_impact_they_are_the_closed_form() -> None:
-    for impact in (0.0, 0.2, 0.7, 1.0):
-        v = impact  # in units of c = Omega = 1
-        D = sensitivity(v, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
-        W = vector(0.0, v, 1.0, 0.0, 1.0, 0.0, 0.0)
-        two = levels(ZV, W, D, 1.0, 0.0, 1.0, 0.5 * math.pi)[:2]
-        assert two == pytest.approx(((1.0 - impact) / 2.0, (1.0 + impact) / 2.0))
-        t = 0.5 / math.pi
-        shares = np.array([-(0.5 + t), 1.0 - t, -t, 0.5 - t])  # of the impact
-        four = levels(ZVD, W, D, 1.0, 0.0, 1.0, 0.5 * math.pi)
-        assert four == pytest.approx([0.25, 0.25, 0.75, 0.75] + impact * shares)
-
-
 SHARES = st.sampled_from([0.0, 0.01, 0.1, 0.5])
 
 

@@ -93,18 +93,6 @@ def test_a_chain_survives_its_file_a_pickle_and_the_way_there_and_back(chain: Ch
     assert twice.masses == chain.brought_to(0).masses  # ratios are 1 there: nothing is left to bring
 
 
-def test_arrays_are_the_chain_at_the_motor_shaft() -> None:
-    chain = Chain.load("crane-4-mass")
-    arrays = chain.at_motor_shaft()
-    np.testing.assert_allclose(arrays.J, [0.031, 0.002, 0.004, 0.173], rtol=1e-14)
-    np.testing.assert_allclose(arrays.c, [4000, 1000, 682.5], rtol=1e-14)
-    np.testing.assert_allclose(arrays.gap, [0.1, 0.2, 0.2], rtol=1e-14)
-    np.testing.assert_allclose(arrays.Mc, [0, 0, 0, 7.16], rtol=1e-14)
-    assert (arrays.motor, arrays.load) == (0, 3)
-    with pytest.raises(ValueError, match="read-only"):
-        arrays.J[0] = 1.0
-
-
 def test_a_drive_and_its_chain_are_described_alike() -> None:
     drive = Drive.load("crane-4amtkf").replace(damping=0.3)
     chain = chain_of(drive)

@@ -10,6 +10,7 @@ import pytest
 
 from softstart import Drive, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.problem import Problem
@@ -82,20 +83,31 @@ def test_a_load_curve_behind_a_gear_is_that_at_the_shaft_of_the_motor(by):
 def test_a_chain_with_all_of_them():
     """Its file is written back as it was, at another shaft it is the same start; alone as in a batch."""
     fan = Mass("0.2 kg*m^2", curve_speed=["0 rpm", "440 rpm", "880 rpm"], curve_torque=[0.0, 5.0, 20.0])
-    shafts = [Shaft(4e3, gap=0.1, damping_ratio=0.02), Shaft(300.0, gap=0.05, damping_ratio=0.02, ratio=4)]
+    shafts = [
+        Shaft(4e3, gap=0.1, damping_ratio=0.02, ratio=3, efficiency=0.8, side="after"),
+        Shaft(300.0, gap=0.05, damping_ratio=0.02, ratio=4),
+    ]
     motor = Motor(62.0, torque_lag="5 ms", initial_torque="10 N*m")
     chain = Chain([Mass(0.03), fan, Mass("inf")], shafts, motor, target_speed="20 rpm")
     assert chain.load_mass == "mass 2"
     assert Chain.from_toml(chain.to_toml()) == chain
-    run = simulate(chain, "direct")
-    there = simulate(chain.brought_to("motor"), "direct")
+    hums = [
+        {"mass 2": PeriodicTorque(0.0, [1.0], [size], [0.0], speed=50.0)} for size in (30.0, 30.0 / 3.0, 0.0)
+    ]
+    run, there, quiet = (
+        simulate(one, "direct", fitted_to=CRANE, excitation=hum)
+        for one, hum in zip((chain, chain.brought_to("motor"), chain), hums, strict=True)
+    )
     assert there.peak_torques == pytest.approx(run.peak_torques, rel=1e-10)
-    batch = simulate([chain, chain.changed(gaps=2.0), chain], "direct")
-    assert batch.peak_torques[[0, 2]].values.tolist() == [run.peak_torques.tolist()] * 2
+    assert there.energy.gears == pytest.approx(run.energy.gears, rel=1e-10)
+    assert run.energy.gears > 0.0
+    assert quiet.peak_torque != pytest.approx(run.peak_torque, rel=1e-6)
+    batch = simulate([chain, chain.changed(gaps=2.0), chain], "direct", fitted_to=CRANE)
+    assert batch.peak_torques[[0, 2]].values.tolist() == [quiet.peak_torques.tolist()] * 2
     assert momentum_bound(Problem(chain, 1.0)).k_dyn == 0.0
     notes = " ".join(reduce_chain(chain, force=True).notes)
-    assert "stays at rest" in notes
-    assert "load curves of mass 2" in notes
+    for words in ("stays at rest", "load curves of mass 2", "0.8) are left out of the drive"):
+        assert words in notes
 
 
 def test_what_is_refused():

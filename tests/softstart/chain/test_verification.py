@@ -19,18 +19,6 @@ CHAIN = Chain.load("crane-4-mass")
 DRIVE = reduce_chain(CHAIN).to_drive()
 
 
-def test_both_sides_are_the_starts_themselves():
-    controller = "current-limit-feedback"
-    found = verify_on_chain(CHAIN, DRIVE, controller)
-    alone = simulate(DRIVE, controller)
-    assert found.drive.k_dyn == alone.k_dyn
-    assert found.drive.start_time == alone.start_time
-    whole = simulate(CHAIN, controller, fitted_to=DRIVE, base=DRIVE)
-    assert found.chain.peak_torque == whole.peak_torque
-    assert found.chain_k_dyn == whole.k_dyn
-    assert found.error == pytest.approx(whole.k_dyn / alone.k_dyn - 1.0, rel=1e-14)
-
-
 def test_a_chain_of_two_masses_is_its_own_drive():
     chain = chain_of(DRIVE)
     found = verify_on_chain(chain, DRIVE, "ramp", parameters={"time": "0.2 s"})

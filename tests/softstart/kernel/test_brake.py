@@ -76,8 +76,3 @@ def test_a_torque_that_never_reaches_the_load_says_so() -> None:
     assert "held by its brake" in run.status.value
     assert math.isnan(run.release_time)
     assert run.peak_torque == pytest.approx(120.0)
-
-
-def test_energy_is_balanced_while_the_motor_is_held() -> None:
-    run = simulate(HELD.replace(start_position="driving-flank", release=0.2), "s-curve")
-    assert abs(run.energy.residual) < 1e-9 * run.energy.motor

@@ -38,32 +38,6 @@ def test_a_motor_that_coasts_to_rest() -> None:
     assert run.energy.dissipated == pytest.approx(0.5 * J1 * w0**2, rel=1e-12)
 
 
-def test_a_motor_breaks_away_behind_a_ramp() -> None:
-    """U = k t moves it at F/k; from then on w1 = k (t - F/k)^2/(2 J1)."""
-    F, k = 4.0, 50.0
-    drive = CRANE.replace(gap=200.0, motor_friction=F, torque_rate=k, load_torque=0.0)
-    run = steady(drive, 62.0, 0.2)
-    (event,) = run.events
-    assert (event.kind, event.time) == ("motor starts", pytest.approx(F / k, rel=1e-13))
-    assert run.at(0.2)["w1"] == pytest.approx(k * (0.2 - F / k) ** 2 / (2.0 * drive.J1), rel=1e-12)
-
-
-@pytest.mark.parametrize("damping", [0.0, 1.5])
-def test_friction_of_a_motor_that_runs_forward_is_a_lower_torque(damping: float) -> None:
-    """As long as the motor runs forward: friction F under Ms is no friction under Ms - F."""
-    F = 6.0
-    plain = CRANE.replace(gap=0.0, damping=damping, target_speed=500.0, motor_inertia=0.5)
-    rough = plain.replace(motor_friction=F, start_position=0.0)
-    one, other = steady(rough, 50.0, 0.4), steady(plain, 50.0 - F, 0.4)
-    assert [event.kind for event in one.events].count("motor stops") == 0
-    assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-14)
-    t = np.linspace(0.0, 0.4, 50)
-    for name in ("w1", "w2", "T"):
-        np.testing.assert_allclose(one.at(t)[name], other.at(t)[name], rtol=1e-12, atol=1e-11)
-    other = plain.replace(starting_torque=plain.Ms - F, maximum_torque=62.0)
-    assert rough.mean_torque == other.mean_torque
-
-
 def test_the_speed_at_which_viscous_friction_takes_all() -> None:
     """Behind it w1 = w2 = (u - F - Mc)/(b1 + b2) and T = Mc + b2 w2; that is settled, too."""
     frictions = {"motor_friction": 2.0, "motor_viscous_friction": 0.3, "load_viscous_friction": 0.2}
@@ -74,6 +48,7 @@ def test_the_speed_at_which_viscous_friction_takes_all() -> None:
     assert [end["w1"], end["w2"]] == pytest.approx([speed, speed], rel=1e-7)
     assert end["T"] == pytest.approx(drive.Mc + 0.2 * speed, rel=1e-7)
     assert 0.0 < run.settling_time(0.02) < 2.0
+    assert drive.mean_torque == CRANE.replace(starting_torque=60.0, maximum_torque=62.0).mean_torque
 
 
 def test_friction_that_no_start_can_have() -> None:

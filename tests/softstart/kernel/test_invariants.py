@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_against_oracle import case, case_with_friction, run_of
+from tests.softstart.kernel.test_brake import braked
 
 from softstart import Drive, simulate
 from softstart.kernel.records import BEYOND, OPEN
@@ -18,7 +19,7 @@ from softstart.kernel.records import BEYOND, OPEN
 SEEDS = st.integers(1_000, 100_000)
 
 
-@pytest.mark.parametrize("make", [case, case_with_friction])
+@pytest.mark.parametrize("make", [case, case_with_friction, braked])
 @settings(max_examples=60, deadline=None)
 @given(seed=SEEDS)
 def test_energy_balance(make: Any, seed: int) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
 from softstart import Drive, TorqueProfile, compare, simulate
 from softstart.controller import Controller, make_controller, ready_controller_names
@@ -50,14 +49,6 @@ def test_a_profile_obeys_the_limits_of_the_machine_that_runs() -> None:
     other = simulate(CRANE, played(braking), END, fitted_to=both)
     assert other.at(0.3)["u"] == 0.0
     np.testing.assert_allclose(other.clipped, (50.0, END - 0.1 - 0.1 * 40.0 / 90.0), rtol=1e-12)
-
-
-def test_a_sampled_profile_is_cut_off_sample_by_sample() -> None:
-    run = simulate(CRANE, played(ABOVE, period=0.01), END)
-    means = 128.0 * (np.arange(10) + 0.5) / 10.0
-    np.testing.assert_allclose(run.at(np.arange(10) * 0.01 + 0.005)["u"], np.minimum(means, 64.0))
-    assert run.clipped.excess == pytest.approx(128.0 * 0.95 - 64.0, rel=1e-12)
-    assert run.clipped.time == pytest.approx(0.05 + END - 0.34, rel=1e-12)
 
 
 def test_it_is_said_once() -> None:

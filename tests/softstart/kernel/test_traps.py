@@ -12,17 +12,6 @@ from softstart import Drive, Status, simulate
 CRANE = Drive.load("crane-4amtkf")
 
 
-def test_a_reactive_load_rests_until_the_shaft_moves_it() -> None:
-    run = simulate(CRANE.replace(load_kind="reactive"), "direct")
-    starts = next(event for event in run.events if event.kind == "load starts")
-    assert float(run.at(starts.time)["T"]) == pytest.approx(7.16, rel=1e-12)
-    before = run.at(np.linspace(0.0, starts.time, 50))
-    assert not before["w2"].any()
-    assert not before["phi2"].any()
-    assert run.at(run.t)["w2"].min() == 0.0  # never backwards; an active load turns back first
-    assert simulate(CRANE, "direct").w2.min() < -0.5
-
-
 def test_the_far_flank_is_grazed_not_hit() -> None:
     """From theta = -gap/2 every rebound comes back to that flank with speed zero, to rounding."""
     for gap in (0.01, 7.3):
@@ -39,6 +28,7 @@ def test_a_start_on_the_flank(speeds: tuple[float, float]) -> None:
     run = simulate(flank.replace(initial_motor_speed=w1, initial_load_speed=w2), "direct")
     assert run.status is Status.REACHED
     assert (run.first_contact == 0.0) == (w1 >= w2)
+    assert w1 != w2 or run.contacts == 1  # T comes back to zero once a period: rounding parts no flanks
     if w1 >= w2:
         expected = 1.0 + math.sqrt(
             1.0 + (368.465 * (w1 - w2) / (flank.Omega * run.peak_torque / run.k_dyn)) ** 2

@@ -33,29 +33,6 @@ def checked(problem: Problem) -> float:
     return claimed
 
 
-CASES = {
-    "mid-gap": CRANE,
-    "pulse ends in contact": CRANE.replace(gap=0.01),
-    "no gap": CRANE.replace(gap=0.0),
-    "wound up": CRANE.replace(start_position=0.30),
-    "on the other flank": CRANE.replace(start_position=-0.25),
-    "motor runs ahead": CRANE.replace(initial_motor_speed=3.0),
-    "load falls": CRANE.replace(initial_load_speed=-2.0),
-    "nothing pulls": CRANE.replace(load_torque=0.0),
-    "friction of nothing": CRANE.replace(load_torque=0.0, load_kind="reactive"),
-    "heavy motor": CRANE.replace(motor_inertia=0.35, gap=0.05),
-}
-
-
-@pytest.mark.parametrize("terminal", ["synchronous", "reached"])
-@pytest.mark.parametrize("drive", CASES.values(), ids=CASES.keys())
-def test_the_exact_plant_agrees(drive: Drive, terminal: Any) -> None:
-    stiff = (drive.J1 + drive.J2) * drive.target_speed / (drive.Ms - drive.Mc)
-    gentler = [checked(Problem(drive, share * stiff, terminal)) for share in (1.3, 1.6, 2.5)]
-    assert gentler == sorted(gentler, reverse=True)
-    assert gentler[0] <= 1.0 + 1e-9
-
-
 def test_a_load_that_comes_back_by_itself_sets_the_least_peak() -> None:
     drive = CRANE.replace(gap=4.0)
     starts = PulseCoastHold.of(Problem(drive, 100.0))
@@ -117,17 +94,18 @@ def test_what_it_is_not_for(changes: Any, terms: Any, reason: str) -> None:
 @settings(max_examples=60, deadline=None)
 @given(
     inertia_ratio=st.floats(0.1, 30.0),
-    load=st.floats(0.0, 0.9),
+    load=st.just(0.0) | st.floats(0.0, 0.9),
     windups=st.floats(0.0, 30.0),
     position=st.floats(-0.5, 0.5),
+    falls=st.just(0.0) | st.floats(-0.3, 0.0),
     periods=st.floats(0.3, 30.0),
     ahead=st.floats(0.0, 0.3),
     share=st.floats(0.02, 1.0 - 1e-6),
     terminal=st.sampled_from(["synchronous", "reached"]),
 )
 def test_any_drive_keeps_the_promises(
-    inertia_ratio: float, load: float, windups: float, position: float, periods: float, ahead: float,
-    share: float, terminal: Any,
+    inertia_ratio: float, load: float, windups: float, position: float, falls: float, periods: float,
+    ahead: float, share: float, terminal: Any,
 ) -> None:  # fmt: skip
     J1, Ms, Omega = 0.02, 50.0, 120.0
     J2 = J1 * inertia_ratio
@@ -136,7 +114,8 @@ def test_any_drive_keeps_the_promises(
     drive = Drive(
         motor_inertia=J1, load_inertia=J2, starting_torque=Ms, load_torque=load * Ms, stiffness=c,
         gap=windups * Ms / c, start_position=position * windups * Ms / c, initial_motor_speed=ahead * target,
-        target_speed=target,
+        initial_load_speed=falls * target, target_speed=target,
+        load_kind="active" if load else "reactive",
     )  # fmt: skip
     starts = PulseCoastHold.of(Problem(drive, 1.0))
     least = max(starts.least_peak, drive.Mc)

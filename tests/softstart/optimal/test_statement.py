@@ -10,7 +10,6 @@ import pytest
 from tests.softstart.optimal.drives import CRANE, played, random_drive, three_masses
 
 from softstart import Drive, InputError, TorqueProfile, optimize, simulate
-from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.optimal.check import BEYOND, torque_allowed
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged, heat_of
@@ -155,14 +154,6 @@ def test_a_chain_agrees_with_the_linear_programs(given, terminal):
         assert best.k_dyn == pytest.approx(claim.value, rel=5e-3)
     else:
         assert claim.value <= 1.001 * best.k_dyn
-
-
-def test_a_drive_as_a_chain_of_two_masses_has_the_same_optimum():
-    masses = [Mass(CRANE.J1), Mass(CRANE.J2, torque=CRANE.Mc)]
-    chain = Chain(masses, [Shaft(CRANE.c, gap=CRANE.gap)], Motor(CRANE.Ms), target_speed=60.0)
-    problem = Problem(chain, 0.2883042, "synchronous")
-    claim, _ = checked(problem, guess(56.0, 0.2883042, chain))
-    assert claim.value == pytest.approx(0.90924724, rel=WITHIN)
 
 
 def test_the_phases_are_those_of_the_record():

@@ -118,13 +118,12 @@ def test_only_limits_make_a_margin():
         sweep(free, "direct", {"gap": [0.5]}, figures=["margin"], workers=1)
 
 
-def test_until_and_fitted_to_are_those_of_simulate():
+def test_until_is_that_of_simulate():
     grid = {"gap": [0.5, 2.0], "load_inertia": [0.1, 0.3]}
-    options = {"until": 0.3, "fitted_to": CRANE.replace(gap=1.0)}
-    results = sweep(CRANE, "current-limit-feedback", grid, figures=FIGURES, workers=1, **options)
+    results = sweep(CRANE, "current-limit-feedback", grid, figures=FIGURES, workers=1, until=0.3)
     assert results.status.values.tolist() != [[0, 0], [0, 0]]
     for index in np.ndindex(2, 2):
-        same(results, index, single(results, index, "current-limit-feedback", **options))
+        same(results, index, single(results, index, "current-limit-feedback", until=0.3))
 
 
 def test_tuned_gains_in_the_place_of_a_controller(tmp_path):
