@@ -247,20 +247,28 @@ def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
     assert problem.start_time is not None
     if shortest is None or shortest[0] > problem.start_time:
         raise _too_short(problem, math.inf if shortest is None else shortest[0])
-    end = min(shortest[0] * (1.0 + EDGE), problem.start_time)
-    shorter = replace(problem, start_time=end)
-    found = searched(shorter, shortest[1])
-    if found is None or found[1].missed > MISSED:  # not the gentlest of its time then, but a start
-        search = Descent(shorter)
+    return _in_shortest_time(problem, *shortest)
+
+
+def _in_shortest_time(
+    problem: Problem, end: float, demand: TorqueProfile
+) -> tuple[str, Found, TorqueProfile]:
+    """The gentlest start of the shortest time found; where none ends in step, the shortest one itself."""
+    assert problem.start_time is not None
+    end = min(end * (1.0 + EDGE), problem.start_time)
+    shortest = replace(problem, start_time=end)
+    found = searched(shortest, demand)
+    if found is None or found[1].missed > MISSED:
+        search = Descent(shortest)
         search.apart = APART
-        start = search.into(shortest[1], end)
+        start = search.into(demand, end)
         start = None if start is None else search.finished(start)
         if start is not None:
             found = "", start, TorqueProfile(search.time, start.torques).simplified()
     if found is None or found[1].missed > MISSED:
         raise OptimumError(
             f"No start of {problem.drive.name} within {problem.start_time:.6g} s was found that keeps all "
-            f"bounds, though one of {shortest[0]:.6g} s exists; ask for more time."
+            f"bounds, though one of {end:.6g} s exists; ask for more time."
         )
     return "the shortest start found", *found[1:]
 
@@ -281,10 +289,6 @@ def searched(
             known = searched(like, near, quick=True)
             near = near if known is None or known[1].missed > MISSED else known[2]
     firsts = _first_demands(search, near)
-    if problem.terminal != "reached":  # begin with an easier end
-        easier = Descent(replace(problem, terminal="reached"), search.players)
-        direct = firsts if problem.terminal == "steady" else firsts[:FINISHED]
-        firsts = [*_tasted(easier, firsts)[:FINISHED], *direct]
     done, merits = [], list[float]()
     for name, demand in _tasted(search, firsts)[: 1 if long else FINISHED]:
         found = search.down(demand, search.latest)
@@ -516,15 +520,8 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
         if found is None:
             sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
             raise InfeasibleError(Verdict(problem, math.inf, sentence))
-        for edge in (EDGE, 10.0 * EDGE, SHORTEST):  # at the very edge no descent may end well
-            timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + edge))
-            with suppress(OptimumError):
-                best = _by_descent(timed, found[1], began)
-                break
-        else:
-            raise OptimumError(
-                f"No start close to the shortest one found, {found[0]:.6g} s, keeps all bounds."
-            )
+        timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + EDGE))
+        best = _answer(timed, *_in_shortest_time(timed, *found), began)
         why = f"the shortest start found, the gentlest of these; {best.why}"
         best = replace(best, problem=problem, why=why)
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
