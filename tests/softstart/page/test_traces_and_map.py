@@ -7,16 +7,13 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from softstart import Drive, simulate
 from softstart.chain import Chain
 from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
-from softstart.page.frames import Screen, channels_at, drawn, landmarks, thinned, traces_of
+from softstart.page.frames import Screen, channels_at, drawn, landmarks, traces_of
 from softstart.page.machines import STEPS, Scale, axes_about, changed, k_dyn_row
 from softstart.page.session import Session
 from softstart.quantities import Units
@@ -44,21 +41,6 @@ def test_thinned_traces_keep_every_located_instant(controller, stiffness):
         assert event.time in traces["t"]
     for stage in run.stages:
         assert stage.peak_time in traces["t"]
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    st.tuples(st.integers(1, 4), st.integers(1, 20), st.integers(1, 10)).flatmap(
-        lambda shape: arrays(np.float64, shape, elements=st.floats(-1e6, 1e6))
-    )
-)
-def test_each_bucket_keeps_its_least_and_largest(boxes):
-    width = boxes.shape[2]
-    keep = thinned(boxes.reshape(boxes.shape[0], -1), width)
-    for k in range(boxes.shape[1]):
-        kept = boxes[:, k, keep[keep // width == k] % width]
-        assert np.array_equal(boxes[:, k].max(axis=1), kept.max(axis=1))
-        assert np.array_equal(boxes[:, k].min(axis=1), kept.min(axis=1))
 
 
 @pytest.mark.parametrize("window", [(0.1, 0.11), (0.0, 1e-5), (0.4, 0.6), (0.7, 0.8)])
