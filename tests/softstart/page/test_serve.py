@@ -218,9 +218,6 @@ def test_the_web_framework_reads_and_stores_nothing_that_others_could_plant():
         folder.mkdir(parents=True)
 
 
-JUNK = (b"40", b"", b"42[", b"42null", b'42["event",NaN]', b'42["event",{"client_id":1}]', b'459-["x"]')
-
-
 @pytest.mark.skipif(find_spec("nicegui") is None, reason="needs NiceGUI")
 def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
     server = subprocess.Popen(
@@ -252,10 +249,6 @@ def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
             with socket.create_connection(("127.0.0.1", port), timeout=10) as raw:
                 raw.sendall(request)
                 assert answer in raw.recv(200)
-                for junk in JUNK if answer == b" 101 " else ():  # of a text frame, masked by zeros
-                    raw.sendall(bytes([0x81, 0x80 | len(junk), 0, 0, 0, 0]) + junk)
-        with urllib.request.urlopen(url, timeout=20) as got:
-            assert b"softstart: Crane travel drive" in got.read()
         server.send_signal(signal.SIGTERM)
         assert server.wait(timeout=60) == 130
         errors = server.stderr.read()
