@@ -150,11 +150,15 @@ def drawn(page: Any) -> None:
 
 
 def choose(page: Any, strategy: str) -> None:
-    """Select a strategy, and wait until its start is drawn."""
+    """Select a strategy, and wait until its start is drawn: its figure is shown before its start has come."""
     page.locator(f'tr[data-name="{strategy}"] input[type=radio]').check()
-    shown = "document.querySelector('.figure .name').textContent"
-    page.wait_for_function(f"name => {shown} === name", arg=strategy)
-    page.wait_for_selector(".player button[title=Play]:enabled")
+    page.wait_for_function(
+        f"""(name) => {{
+          const {{ state, plots }} = {INSTRUMENT};
+          return state.selected === name && plots.main?.u && plots.main === state.traces.get(name);
+        }}""",
+        arg=strategy,
+    )
     drawn(page)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 
 import numpy as np
@@ -25,18 +24,6 @@ def test_ticks_are_round_and_within_or_enclose(page):
     assert run(page, "numbers", "ticks(0, 1, 5)") == pytest.approx([0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert run(page, "numbers", "ticks(-3, 47, 6)") == [0, 10, 20, 30, 40]
     assert run(page, "numbers", "ticks(-3, 47, 6, true)") == [-10, 0, 10, 20, 30, 40, 50]
-
-
-def test_packed_traces_are_read_between_their_points(page):
-    rows = np.array([[0.0, 1.0, 3.0], [2.0, 4.0, 0.0], [5.0, 6.0, 7.0]], dtype="<f4")
-    packed = {"channels": ["t", "T[0]", "w[0]"], "worst": 0, "motor": 0}
-    trace = run(page, "trace", "unpack(...a)", packed | {"data": base64.b64encode(rows).decode()})
-    plain = {name: trace[name] for name in ("t", "T", "w1")}
-    assert plain == {"t": [0, 1, 3], "T": [2, 4, 0], "w1": [5, 6, 7]}
-    assert [run(page, "trace", "indexAt(...a)", plain["t"], t) for t in (-1, 0, 0.5, 1, 9)] == [0, 0, 1, 1, 3]
-    assert [run(page, "trace", "valueAt(...a)", plain, "T", t) for t in (0, 0.5, 2)] == [2, 3, 2]
-    assert run(page, "trace", "extent(...a)", plain, "T", [0, 1]) == [2, 4]
-    assert run(page, "trace", "angleAt(...a)", plain, "w1", 3) == pytest.approx(5.5 + 13.0)
 
 
 def test_contours_lie_on_their_level(page):

@@ -51,6 +51,13 @@ def until(what: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+def spare(jobs: Jobs) -> int:
+    """The process that waits for the next job."""
+    until(lambda: jobs._spare is not None)
+    assert jobs._spare is not None
+    return jobs._spare.pid
+
+
 def over(*jobs: Job) -> bool:
     until(lambda: all(job.state.over for job in jobs))
     return True
@@ -144,25 +151,16 @@ def test_failures_are_sentences(
 
 
 def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
-    """It has imported what it needs by then; a dead one is replaced unnoticed; none outlives the server."""
+    """A dead one is replaced unnoticed; none outlives the server."""
     jobs = Jobs(limit=1, modules=["works_for_jobs"])
     try:
         jobs.warm()
-        until(lambda: jobs._spare is not None)
-        assert jobs._spare is not None
-        waiting = jobs._spare.pid
+        os.kill(dead := spare(jobs), signal.SIGKILL)
+        until(lambda: not alive(dead))
         job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
         assert over(job)
-        assert (job.pid, job.state) == (waiting, State.DONE)
-        until(lambda: jobs._spare is not None)
-        dead = jobs._spare.pid
-        os.kill(dead, signal.SIGKILL)
-        until(lambda: not alive(dead))
-        again = jobs.begin("A", "again", works.noted, str(tmp_path / "log"), "again")
-        assert over(again)
-        assert again.state is State.DONE
-        until(lambda: jobs._spare is not None)
-        last = jobs._spare.pid
+        assert job.state is State.DONE
+        last = spare(jobs)
     finally:
         jobs.end()
     assert not alive(last)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import gc
-import inspect
 import itertools
-import re
 import weakref
 from collections.abc import Iterator
 from typing import Any
@@ -54,18 +52,19 @@ class Hasty:
         return seen
 
 
+class Queue(Jobs):
+    def begin(self, *args: Any, **keywords: Any) -> Any:
+        return Hasty()
+
+
 @pytest.mark.parametrize("looks", [1, 2, 3, 4])
 def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
     from softstart.page.panel_parts import JobView
 
-    class Queue(Jobs):
-        def begin(self, *args: Any, **keywords: Any) -> Any:
-            return job
-
-    job, given, states = Hasty(), [], []
+    given, states = [], []
     view = JobView(Queue(), "A", "it", on_done=given.append, on_state=lambda: states.append(view.busy))
     view.begin("it", print)
-    job.looks = looks
+    view.job.looks = looks
     for _ in range(looks + 2):
         view._refresh()
     assert given == ["the result"]
@@ -75,10 +74,6 @@ def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks
 def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
     """Its one result; `mine` is the tab in which it was begun."""
     from softstart.page.panel_parts import JobView
-
-    class Queue(Jobs):
-        def begin(self, *args: Any, **keywords: Any) -> Any:
-            return Hasty()
 
     jobs = Queue()
     given: dict[str, list[Any]] = {"first": [], "second": [], "late": [], "other": []}
@@ -101,22 +96,6 @@ def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
         view._refresh()
     assert given == {"first": ["the result"], "second": ["the result"], "late": ["the result"], "other": []}
     assert not late.mine
-
-
-def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    """NiceGUI gives itself to a handler that has a parameter; what fails in one ends the shutdown unseen."""
-    from nicegui import app
-
-    from softstart.page.panel_parts import server_jobs
-
-    handlers: list[Any] = []
-    monkeypatch.setattr(app, "on_shutdown", handlers.append)
-    jobs = server_jobs.__wrapped__()
-    (handler,) = handlers
-    assert not inspect.signature(handler).parameters
-    handler()
-    with pytest.raises(InputError, match="ending"):
-        jobs.begin("A", "late", print)
 
 
 def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
@@ -163,30 +142,6 @@ def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> 
     ]
 
 
-def test_no_word_of_the_command_line_stands_on_the_page(client: Any) -> None:
-    """Labels, tips, choices and hints of all tabs; only the command that is offered for copying has them."""
-    from importlib import import_module
-
-    from softstart.page.layout import PANELS
-    from softstart.page.panel_parts import few
-    from softstart.page.panels import grid_of
-
-    for _, module, name in PANELS:
-        getattr(import_module(f"softstart.page.{module}"), name)(Session(controllers=["direct"]), "A")
-    texts = [
-        str(text)
-        for one in client.elements.values()
-        if one.props.get("data-testid") != "command"
-        for text in (getattr(one, "text", ""), getattr(one, "content", ""), *one.props.values())
-    ]
-    assert len(texts) > 200
-    crane = Drive.load("crane-4amtkf")
-    with pytest.raises(InputError) as told:
-        grid_of(crane, ",".join(f"{k}x" for k in range(1, 62)), "1x")
-    texts += few(told.value.sentences)
-    assert [text for text in texts if re.search(r"--[a-z]|softstart [a-z]|minimise", text)] == []
-
-
 def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     from softstart.page import tasks
     from softstart.page.panels import OptimumPanel
@@ -203,11 +158,3 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     session.undo()
     panel.add("optimum")
     assert list(session.controllers) == ["direct", "optimum"]
-
-
-def test_a_further_tab_starts_no_strategy_to_begin_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    from softstart.page import layout, session
-
-    first = layout.gentlest(Drive.load("crane-4amtkf"))
-    monkeypatch.setattr(session, "simulate", pytest.fail)
-    assert layout.gentlest(Drive.load("crane-4amtkf")) == first == "pulse-coast-hold"

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import base64
-import json
 from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from softstart import Drive, simulate
 from softstart.chain import Chain
 from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
-from softstart.page.frames import Screen, channels_at, drawn, landmarks, thinned, traces_of
-from softstart.page.machines import STEPS, Scale, axes_about, changed, entries, k_dyn_row
+from softstart.page.frames import Screen, channels_at, drawn, landmarks, traces_of
+from softstart.page.machines import STEPS, Scale, axes_about, changed, k_dyn_row
 from softstart.page.session import Session
 from softstart.quantities import Units
 
 CRANE = Drive.load("crane-4amtkf")
 CHANNELS = {"u": "u", "T[0]": "T", "theta[0]": "theta", "w[0]": "w1", "w[1]": "w2"}
-SCALES = {path: one.scale for path, one in entries(CRANE).items() if one.scale}
+CHAIN = Chain.load("crane-4-mass")
+DAMPED = changed(CHAIN, {f"shaft[{i}].damping_ratio": "0.04" for i in (1, 2, 3)})
 
 
 @pytest.mark.parametrize("controller", ["direct", "state-feedback", "ramp"])
@@ -44,21 +41,6 @@ def test_thinned_traces_keep_every_located_instant(controller, stiffness):
         assert event.time in traces["t"]
     for stage in run.stages:
         assert stage.peak_time in traces["t"]
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    st.tuples(st.integers(1, 4), st.integers(1, 20), st.integers(1, 10)).flatmap(
-        lambda shape: arrays(np.float64, shape, elements=st.floats(-1e6, 1e6))
-    )
-)
-def test_each_bucket_keeps_its_least_and_largest(boxes):
-    width = boxes.shape[2]
-    keep = thinned(boxes.reshape(boxes.shape[0], -1), width)
-    for k in range(boxes.shape[1]):
-        kept = boxes[:, k, keep[keep // width == k] % width]
-        assert np.array_equal(boxes[:, k].max(axis=1), kept.max(axis=1))
-        assert np.array_equal(boxes[:, k].min(axis=1), kept.min(axis=1))
 
 
 @pytest.mark.parametrize("window", [(0.1, 0.11), (0.0, 1e-5), (0.4, 0.6), (0.7, 0.8)])
@@ -106,34 +88,29 @@ def test_packed_traces_come_back_to_single_precision():
             assert np.array_equal(row, units.shown(traces[name], si).astype("f4"))
 
 
-@pytest.mark.parametrize("kept", [None, CRANE], ids=["fitted to each", "kept"])
-@pytest.mark.parametrize("controller", ["reduced-first-stage", "shaped", "current-limit-feedback"])
-def test_the_map_is_made_of_simulated_starts(controller, kept):
-    axes = axes_about(CRANE, 4, 3)
-    made = make_controller(controller)
+@pytest.mark.parametrize("kept", [False, True], ids=["fitted to each", "kept"])
+@pytest.mark.parametrize(
+    ("machine", "controller"),
+    [
+        (CRANE, "reduced-first-stage"),
+        (CRANE, "shaped"),
+        (CRANE, "current-limit-feedback"),
+        (DAMPED, "ramp"),
+    ],
+)
+def test_the_map_is_made_of_simulated_starts(machine, controller, kept):
+    axes, made, base = axes_about(machine, 4, 3), make_controller(controller), machine if kept else None
     for inertia in axes.inertias:
-        row = k_dyn_row(CRANE, made, axes.gaps, inertia, kept)
+        row = k_dyn_row(machine, made, axes.gaps, inertia, base)
         for gap, k in zip(axes.gaps, row, strict=True):
-            other = CRANE.replace(gap=gap, load_inertia=inertia)
-            assert k == simulate(other, made, fitted_to=kept, base=kept).k_dyn
-
-
-@given(st.sampled_from(sorted(SCALES)), st.integers(0, STEPS))
-def test_a_slider_shows_the_position_it_was_set_to(name, position):
-    scale = SCALES[name]
-    value = scale.value(position)
-    assert scale.low <= value <= scale.high
-    assert abs(scale.position(value) - position) <= 1  # four digits of the value may be half a step off
-    assert float(f"{value:.6g}") == value  # the field shows what is computed with
+            there = machine.moved(gap, inertia)
+            assert there.gap_and_inertia == (pytest.approx(gap), pytest.approx(inertia))
+            assert k == simulate(there, made, fitted_to=base, base=base).k_dyn
 
 
 def test_a_slider_stays_at_its_end_for_values_beyond():
     assert Scale(1.0, 10.0, logarithmic=True).position(-3.0) == 0
     assert Scale(0.0, 1.0).position(7.0) == STEPS
-
-
-CHAIN = Chain.load("crane-4-mass")
-DAMPED = changed(CHAIN, {f"shaft[{i}].damping_ratio": "0.04" for i in (1, 2, 3)})
 
 
 def screen_of(chain: Chain, *controllers: str) -> tuple[Session, Screen, Controls]:
@@ -160,23 +137,6 @@ def test_the_figures_of_a_chain_are_those_of_simulate():
     session.undo()
     session.undo()
     assert session.machine is DAMPED
-
-
-@pytest.mark.parametrize(
-    "chain", [CHAIN, DAMPED, Chain.load("tractor-like")], ids=["bare", "damped", "tractor"]
-)
-def test_each_field_reads_what_it_writes(chain):
-    """Every slider is set to its middle, every value written back as it is shown: nothing else changes."""
-    before = {path: chain.by_path()[path][1] for path in entries(chain)}
-    for path, value in before.items():
-        if isinstance(value, float):
-            assert changed(chain, {path: repr(value)}).by_path()[path][1] == value
-    for path, scale in ((path, one.scale) for path, one in entries(chain).items() if one.scale):
-        there = changed(chain, {path: repr(scale.value(300))}).by_path()
-        assert there[path][1] == scale.value(300)
-        assert {key: there[key][1] for key in before if key != path} == {
-            key: value for key, value in before.items() if key != path
-        }
 
 
 def test_traces_hold_each_shaft_and_body():
@@ -209,20 +169,6 @@ def test_stages_of_a_gap_are_open_where_it_carries_nothing(strategy):
                 assert np.all(inside[f"T[{k}]"] == 0.0)
             else:
                 assert np.all(side * inside[f"theta[{k}]"] >= halves[k] * (1.0 - 1e-9))
-    data = np.frombuffer(base64.b64decode(picture["data"]), dtype="<f4")
-    assert data.size % len(picture["channels"]) == 0
-    assert json.loads(json.dumps(picture)) is not None
-
-
-def test_the_map_of_a_chain_is_made_of_its_starts():
-    axes = axes_about(DAMPED, 3, 3)
-    assert DAMPED.gap_and_inertia == (pytest.approx(0.5), 69.2)
-    controller = make_controller("ramp")
-    row = k_dyn_row(DAMPED, controller, axes.gaps, axes.inertias[2])
-    for gap, k in zip(axes.gaps, row, strict=True):
-        there = DAMPED.moved(gap, axes.inertias[2])
-        assert there.gap_and_inertia == (pytest.approx(gap), pytest.approx(axes.inertias[2]))
-        assert k == simulate(there, "ramp").k_dyn
 
 
 def test_gaps_that_were_closed_on_the_map_open_again_as_they_were():
@@ -252,11 +198,8 @@ def test_a_link_brings_the_chain_back_and_a_drive_replaces_it():
     session.set("shaft[3].gap", "0.6 deg")
     other = links.bench_of(links.link_of(session), Session(controllers=["direct"]).bench)
     assert other.drive == session.machine
-    assert [group["title"] for group in screen.first()["groups"]][3:5] == ["rotor", "rotor - pinion"]
     session.take(Drive.load("crane-4amtkf"))
-    assert [group["title"] for group in screen.first()["groups"]] == [
-        "Units", "Drive", "Motor", "Shaft", "Load", "Start", "Limits"
-    ]  # fmt: skip
+    assert "shaft.gap" in screen.first()["fields"]
     session.undo()
     frame = screen.first()
     assert frame["fields"]["shaft[3].gap"]["text"] == "0.6 deg"

@@ -51,10 +51,12 @@ def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made)
     assert sheet.variants == 2 * len(sheet.varied) + 2
 
 
-def test_lives_of_shafts_are_those_of_fatigue(made):
+def test_lives_of_shafts_are_those_of_fatigue_and_sources_of_a_drive_are_refused(made):
     page = Page(made.to_html()).text
     assert "Lives cannot be given: damping is missing in rotor - pinion" in page
-    assert "How long the shaft line lasts" not in page  # no chapter that only refuses
+    about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
+    with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
+        report(CHAIN, controllers=["ramp"], project=about)
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report(damped, controllers=["take-up"], budget=0.0).to_html()
     found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
@@ -62,9 +64,3 @@ def test_lives_of_shafts_are_those_of_fatigue(made):
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
     assert relative == pytest.approx([life.relative for life in found.by_run[0]], rel=5e-3)
     assert "Longest life: take-up" in page
-
-
-def test_a_source_of_a_parameter_of_a_drive_is_refused():
-    about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
-    with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
-        report(CHAIN, controllers=["ramp"], project=about)

@@ -57,15 +57,6 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     assert hostile.answer in page
 
 
-def test_with_limits_the_report_is_about_the_recommended_strategy():
-    crane = Drive.load("crane-4amtkf").replace(permissible_torque=130.0)
-    made = report(crane, controllers=["ramp", "shaped"], budget=0.0)
-    assert made.choice.chosen.name == made.summary()["recommended"] == "shaped"
-    assert [sheet.name for sheet in made.sheets] == ["shaped"]
-    assert "the simplest strategy that keeps the limits of the drive" in Page(made.to_html()).text
-    assert "On an ordinary inverter" not in made.answer
-
-
 def test_a_drive_on_which_only_direct_start_gets_there():
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0, gap=0.0)
     made = report(crane, controllers=[Lazy()], budget=0.0)
@@ -117,16 +108,6 @@ def test_an_optimum_that_is_found_stands_between_bound_and_strategy(monkeypatch)
     assert float(row["times the bound"]) == pytest.approx(own / bound, abs=5e-3)
     assert "; the gentlest start known has" in made.answer
     assert made.summary()["k_dyn_gentlest_known"] == known
-
-
-def test_without_a_search_nothing_else_is_claimed():
-    made = report(LAGGING, controllers=["direct", "shaped"], budget=0.0)
-    said, best = Page(made.to_html()).text, made.choice.chosen
-    assert "none was looked for" in said
-    assert "the motor torque lags behind its demand" in said
-    assert made.limit.points == ()
-    bound, own = made.lower_bound(best), best.run.k_dyn
-    assert f"between {bound:.3f} (proved) and {own:.3f} (that of {best.name} itself)" in said
 
 
 def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostile):

@@ -3,13 +3,11 @@
 import base64
 import html
 import re
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from softstart import Drive, reporting
+from softstart import Drive
 from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.reporting import Project, document, report
@@ -117,16 +115,6 @@ def test_decimal_commas_stand_in_text_and_figures_and_in_no_command(made, page):
     assert Drive.from_toml(made.provenance["drive"]) == made.drive
     (file,) = verbatim(page)
     assert Drive.from_toml(html.unescape(file)) == made.drive
-
-
-def test_each_inverter_has_a_source_and_only_functions_that_are_known():
-    path = Path(reporting.__file__).with_name("inverters.toml")
-    families = tomllib.loads(path.read_text("utf-8"))["family"]
-    assert len(families) >= 3
-    for family in families:
-        assert set(family) <= {"name", "source", *document.FUNCTIONS}
-        assert re.search(r"p\. \d+", family["source"]), family["name"]
-        assert {"limit", "backlash"} & set(family)
 
 
 def test_what_is_wrong_in_a_project_is_one_clear_sentence():
