@@ -57,7 +57,8 @@ def shows(page: Any, path: str, text: str) -> None:
 
 def drag(page: Any, path: str, start: float, end: float, steps: int) -> None:
     """From one share of the slider's length to another, by mouse."""
-    box = slider(page, path).bounding_box()
+    while (box := slider(page, path).bounding_box()) is None:
+        page.wait_for_timeout(20)  # the fields are being made anew
     x, y, width = box["x"] + 6, box["y"] + box["height"] / 2, box["width"] - 12
     page.mouse.move(x + start * width, y)
     page.mouse.down()

@@ -25,6 +25,7 @@ from softstart.identification.unknowns import (
     values_of,
 )
 from softstart.kernel.records import S_PHI
+from softstart.notebook import Shown
 from softstart.profile import TorqueProfile
 from softstart.quantities import show, to_si
 from softstart.start.comparison import INTERVAL
@@ -62,7 +63,7 @@ class Experiment:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Shown, sheet="identification.plan_sheet"):
     """Experiments for a drive: the standard ones, then the planned one."""
 
     drive: Drive
@@ -100,13 +101,6 @@ class Plan:
             ],
             "best": self.best.name,
         }
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import identification as views
-        from softstart.views import sheet
-
-        return sheet.as_html(views.plan_sheet(self))
 
 
 def plan_experiments(

@@ -20,6 +20,7 @@ from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
+from softstart.notebook import Shown
 from softstart.quantities import RefusedError
 from softstart.start.comparison import INTERVAL
 
@@ -71,7 +72,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Shown, sheet="identification.identification_sheet"):
     """A drive from its logs.
 
     Attributes
@@ -239,12 +240,6 @@ class Identification:
         if not self.logs:
             raise InputError("logs: an identification that was loaded has none; their figure is beside it.")
         return views.figure(self)
-
-    def _repr_html_(self) -> str:
-        from softstart.views import identification as views
-        from softstart.views import sheet
-
-        return sheet.as_html(views.identification_sheet(self))
 
 
 def _or_nan(value: Any) -> Any:

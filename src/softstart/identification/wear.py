@@ -16,6 +16,7 @@ from scipy.stats import t as student
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
+from softstart.notebook import Shown
 from softstart.quantities import show, to_si
 from softstart.start.comparison import INTERVAL
 
@@ -89,7 +90,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Wear:
+class Wear(Shown, sheet="identification.wear_sheet"):
     """How the gap of a drive grows, and when it reaches its limit."""
 
     found: tuple[Identification, ...]  # the oldest first
@@ -129,13 +130,6 @@ class Wear:
             "drive": self.found[-1].drive.name, "gaps": gaps, **growth, "limit": self.limit,
             **{key: when and str(when) for key, when in worn}, "notes": list(self.notes),
         }  # fmt: skip
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import identification as views
-        from softstart.views import sheet
-
-        return sheet.as_html(views.wear_sheet(self))
 
     def plot(self) -> Any:
         """The gaps over time, the line with its interval, and the limit; a matplotlib figure."""

@@ -29,13 +29,14 @@ from softstart.linear.limit_cycles import Cycle, limit_cycles
 from softstart.linear.loop import Loop
 from softstart.linear.plant import single, sizes_of
 from softstart.linear.systems import Mode
+from softstart.notebook import Shown
 
 VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1)))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LinearView:
+class LinearView(Shown, sheet="linear.linear_sheet"):
     """The result of `linear_view`.
 
     Parameters
@@ -160,13 +161,6 @@ class LinearView:
             ],
             "limit_cycles": [asdict(one) for one in self.cycles],
         }
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import linear as views
-        from softstart.views import sheet
-
-        return sheet.as_html(views.linear_sheet(self))
 
     def plot(self) -> Any:
         """Bode diagram with the margins marked, and Nyquist diagram with the describing function's locus."""

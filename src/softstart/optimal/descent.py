@@ -126,7 +126,6 @@ class Descent:
         count = min(max(math.ceil(KNOTS * self.until / self.period), 24), MOST_KNOTS)
         self.even = np.linspace(0.0, self.until, count + 1)
         self.time = self.even
-        self.heat_scale = 1.0
 
     # demands -----------------------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.notebook import Shown
 from softstart.optimal.descent import BEND
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
@@ -140,7 +141,7 @@ class ControllerPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Front:
+class Front(Shown, sheet="optima.front_sheet"):
     """The least K_dyn for each bound on the start time, and the controllers against that limit.
 
     Parameters
@@ -205,12 +206,6 @@ class Front:
             table.writerows(rows)
 
         write_whole(Path(path), write)
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import optima, sheet
-
-        return sheet.as_html(optima.front_sheet(self))
 
     def plot(self) -> Any:
         """The curve with its bound, and the controllers as points."""

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.kernel import records as at
+from softstart.notebook import Shown
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin
@@ -105,7 +106,7 @@ class Kept:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Optimum:
+class Optimum(Shown, sheet="optima.optimum_sheet"):
     """The best start found, as the exact plant runs it, and how much better any start could be.
 
     Parameters
@@ -213,12 +214,6 @@ class Optimum:
     def heat(self) -> float:
         """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
         return heat_of(self.runs[0], self.end_time)
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import optima, sheet
-
-        return sheet.as_html(optima.optimum_sheet(self))
 
     def __repr__(self) -> str:
         """One line with the main figures."""

@@ -13,6 +13,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
+from softstart.notebook import Shown
 from softstart.quantities import to_si
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
@@ -125,7 +126,7 @@ class Life:
 
 
 @dataclass(frozen=True, eq=False)
-class Fatigue:
+class Fatigue(Shown, sheet="fatigue.fatigue_sheet"):
     """Lives of the shafts of a machine under several strategies. It is returned by `fatigue`.
 
     Attributes
@@ -192,13 +193,6 @@ class Fatigue:
             "worn_gap": self.worn_gap,
             "strategies": [row.summary() for row in self.rows],
         }
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import fatigue as views
-        from softstart.views import sheet
-
-        return sheet.as_html(views.fatigue_sheet(self))
 
     def plot(self) -> Any:
         """Ranges of the cycles over how many there are, for each strategy, and lives beside `direct`."""

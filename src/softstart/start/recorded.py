@@ -17,7 +17,6 @@ from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.start.rows import Rows
 
 FIRST_ROWS = 256
-NO_ROWS = np.zeros((0, 1))
 
 
 class Recorder:

@@ -19,6 +19,7 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.kernel import records as at
+from softstart.notebook import Shown
 from softstart.start import metrics
 from softstart.start.engine import run_one
 from softstart.start.recorded import Recorded, Recorder
@@ -80,7 +81,7 @@ class Clipped(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run:
+class Run(Shown, sheet="starts.run_sheet"):
     """One start under one controller. Angles in rad, speeds and torques at the motor shaft, in SI units.
 
     It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
@@ -174,12 +175,6 @@ class Run:
         """
         known = f"K_dyn {self.k_dyn:.3f}" if self._has_base else f"peak torque {self.peak_torque:.4g} N m"
         return f"<Run: {self.controller_name} on {self.drive.name}, {known}, {self._outcome}>"
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import sheet, starts
-
-        return sheet.as_html(starts.run_sheet(self))
 
     @property
     def controller_name(self) -> str:

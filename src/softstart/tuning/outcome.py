@@ -25,6 +25,7 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.notebook import Shown
 from softstart.tuning.question import Question, given_to
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class RobustSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Tuning:
+class Tuning(Shown, sheet="tuning.tuning_sheet"):
     """Tuned gains of one controller over a grid of gaps and load inertias; the result of `tune`.
 
     Attributes
@@ -145,13 +146,6 @@ class Tuning:
             "starts": self.starts,
             "seconds": self.seconds,
         }
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import sheet
-        from softstart.views import tuning as views
-
-        return sheet.as_html(views.tuning_sheet(self))
 
     def plot(self, what: Literal["gains", "metric", "robust", "price"] | None = None) -> Any:
         """A figure: maps of the gains, of the metric tuned and by default, of the robust set, of its price.
