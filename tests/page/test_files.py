@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.page.conftest import INSTRUMENT, SOFTSTART, comes_to
+from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
 
 from softstart import Chain, DataSheet, Drive, simulate
 
@@ -129,9 +129,11 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
     field.wait_for(timeout=120_000)
     run = simulate(chain, "direct")
     k_dyn(files, f"{run.k_dyn:.3f}")
+    at_rest(files)  # the figure comes before the start
     files.locator(".plots canvas").focus()
     for _ in range(60):
         files.keyboard.press("ArrowRight")
+    drawn(files)
     when = float(files.locator(".instant").inner_text().removesuffix(" ms")) / 1000.0
     twist = run.at([when])["twist"][0]
     shares = [
