@@ -20,10 +20,12 @@ def seen_after(drive: Drive, controller: AccelerationDelay = AT_ONCE) -> float:
 
 @pytest.mark.parametrize(("raise_at", "share"), [("end", 1.0), (None, 0.5)])
 def test_delay_is_that_of_the_reduced_torque(raise_at: str | None, share: float) -> None:
-    """Until the peak of stage 2, [G](14), or its end, (15)."""
+    """Until the peak of stage 2, [G](14), or its end, (15); then the first contact is that of (18)."""
     fitted = AccelerationDelay(torque=0.25 * 62, raise_at=raise_at).fitted(CRANE)
     nominal = formulas.two_stages(15.5, 15.5, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
     assert fitted.delay == pytest.approx(share * nominal.contact_duration, rel=1e-12)
+    if raise_at == "end":
+        assert simulate(CRANE, fitted).k_dyn_first_contact == pytest.approx(nominal.k_dyn, rel=1e-12)
 
 
 def test_detection_over_random_drives() -> None:

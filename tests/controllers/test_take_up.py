@@ -9,13 +9,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from tests.controllers.several_gaps import (
-    NOMINAL,
-    crane_cells,
-    played,
-    random_chains,
-    rigid_time,
-)
+from tests.controllers.several_gaps import NOMINAL, crane_cells, played, random_chains, rigid_time
 
 from softstart import Drive, compare, simulate
 from softstart.controller import make_controller

@@ -13,14 +13,7 @@ from tests.softstart.kernel.test_against_oracle import case, run_of
 
 from softstart import Drive, InputError, Run, fatigue, simulate
 from softstart.drive import SNCurve
-from softstart.start.fatigue import (
-    damage_of,
-    damped,
-    impacts,
-    rainflow_cycles,
-    turning_points,
-    worst_damage,
-)  # fmt: skip
+from softstart.start.fatigue import damage_of, damped, impacts, rainflow_cycles, turning_points, worst_damage
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
 HOIST = Drive.load("hoist-15kw")

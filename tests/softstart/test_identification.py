@@ -293,6 +293,7 @@ def test_a_speed_of_encoder_differences_is_summed_to_the_angle(log: Log) -> None
     ("change", "sentence"),
     [
         (lambda t, u, y: (t[::-1], u, y), "it must rise"),
+        (lambda t, u, y: (t, -u, y), "has the wrong sign"),
         (lambda t, u, y: (t[:10], u[:10], y[:10]), "10 samples; a fit needs 30 or more"),
         (lambda t, u, y: (t, u, 0.0 * y), "the angle never changes"),
         (lambda t, u, y: (t[100:], u[100:], y[100:]), "begin the log at standstill"),

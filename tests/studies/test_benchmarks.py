@@ -9,14 +9,7 @@ from softstart.profile import TorqueProfile
 from softstart.study import Verdict
 from softstart_studies.benchmarks import lsoda, optima
 from softstart_studies.benchmarks.problem import Problem
-from softstart_studies.benchmarks.starts import (
-    AT_ONCE,
-    BATCH,
-    Duel,
-    Outcome,
-    claims,
-    fight,
-)
+from softstart_studies.benchmarks.starts import AT_ONCE, BATCH, Duel, Outcome, claims, fight
 
 CRANE = Problem("direct").machines()[0]
 SHORT = Chain(

@@ -1,4 +1,4 @@
-"""The describing function of the gap against Fourier integrals."""
+"""The describing function of the gap against Fourier integrals and the exact free vibration."""
 
 from __future__ import annotations
 
@@ -44,3 +44,11 @@ def test_is_the_first_harmonic(amplitude, bias):
 def test_the_bias_carries_the_mean_torque(amplitude, torque, half):
     bias = bias_for(torque, amplitude, half, 100.0)
     assert 100.0 * mean_twist_beyond(amplitude, half, bias) == pytest.approx(torque, abs=1e-8)
+
+
+def test_its_error_for_the_free_vibration_of_two_masses():
+    """Omega sqrt(N/c) over the exact Omega/(1 + gap/(pi (A - gap/2))): the table of docs/linear-view.md."""
+    for amplitude, percent in ((1.01, 122.0), (1.1, 33.0), (1.5, 6.4), (2.0, 2.3), (4.0, 0.3)):  # in gap/2
+        exact = 1.0 / (1.0 + 2.0 / (math.pi * (amplitude - 1.0)))
+        found = 100.0 * (math.sqrt(share(amplitude, 1.0)) / exact - 1.0)
+        assert found == pytest.approx(percent, rel=0.01, abs=0.05)  # digits of the table

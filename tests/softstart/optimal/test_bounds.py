@@ -1,4 +1,4 @@
-"""No start of any kind lies below the bounds by momentum: closed forms, random torques, all controllers."""
+"""No start of any kind lies below the bounds by momentum: closed forms, random torques."""
 
 from __future__ import annotations
 
