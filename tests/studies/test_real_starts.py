@@ -8,14 +8,7 @@ import pytest
 
 from softstart import fatigue, simulate
 from softstart.study import Verdict
-from softstart_studies.real_starts import (
-    Extent,
-    Findings,
-    claims,
-    concordance,
-    drives,
-    find,
-)
+from softstart_studies.real_starts import Extent, Findings, claims, concordance, drives, find
 
 NAMES = ("direct", "s-curve", "shaped", "pulse-coast-hold")
 PART = Extent(drives=("crane", "hoist"), strategies=NAMES, optima=(), unknown=())

@@ -13,14 +13,7 @@ import pytest
 import xarray
 from tests.kept import parts_in
 
-from softstart import (
-    Chain,
-    Drive,
-    InputError,
-    TorqueProfile,
-    simulate,
-    tune,
-)
+from softstart import Chain, Drive, InputError, TorqueProfile, simulate, tune
 from softstart.cli.running import WRITTEN
 from softstart.clutch import Clutch, engage
 from softstart.views.markdown import file_stem, output_folder, write_table, write_text

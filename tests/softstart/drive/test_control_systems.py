@@ -81,7 +81,9 @@ def test_limits_and_rate_of_the_torque_and_another_gap():
     assert np.all(start(CRANE, 0.03, 62.0, params={"gap": 2.0})[1]["T"] == 0.0)
 
 
-def test_the_opposite_flank_is_the_mirror_image():
-    for law in ("no-pull", "dead-zone", "modelica"):
-        forward, back = (shaft_torque(z, 8.0 * z, 4.0, 1.0, 0.5, law=law) for z in (1.0, -1.0))
-        assert forward == -back > 0.0
+def test_contact_laws_on_both_flanks():
+    """By hand: 0.5 rad beyond the gap, c z = 20 N m, d z' = +-50 N m."""
+    for law, approaching, parting in (("no-pull", 70, 0), ("dead-zone", 70, -30), ("modelica", 40, 0)):
+        for rate, torque in ((50.0, approaching), (-50.0, parting)):
+            assert shaft_torque(1.0, rate, 40.0, 1.0, 1.0, law=law) == torque
+            assert shaft_torque(-1.0, -rate, 40.0, 1.0, 1.0, law=law) == -torque
