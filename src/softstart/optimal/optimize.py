@@ -18,7 +18,7 @@ from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
 from softstart.optimal.check import check, replayed
-from softstart.optimal.descent import APART, MANY, MISSED, TASTE, Descent, Found
+from softstart.optimal.descent import APART, MANY, MISSED, MOST_KNOTS, TASTE, Descent, Found
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
     InfeasibleError,
@@ -43,6 +43,7 @@ DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is appr
 TRIES = 1500  # knots in all starts around one, where one torque serves several machines
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
+SCAN = 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9  # between its bound and a start: where others are looked for
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 NO_SHARE = 1e-9  # of a limit: its logarithm is taken, as a life falls with a power of the torque
@@ -247,28 +248,25 @@ def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
     assert problem.start_time is not None
     if shortest is None or shortest[0] > problem.start_time:
         raise _too_short(problem, math.inf if shortest is None else shortest[0])
-    return _in_shortest_time(problem, *shortest)
+    end = min(shortest[0] * (1.0 + EDGE), problem.start_time)
+    return _at_the_edge(replace(problem, start_time=end), shortest[1])
 
 
-def _in_shortest_time(
-    problem: Problem, end: float, demand: TorqueProfile
-) -> tuple[str, Found, TorqueProfile]:
-    """The gentlest start of the shortest time found; where none ends in step, the shortest one itself."""
+def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Found, TorqueProfile]:
+    """The gentlest start in the shortest time, in which a demand ends; else that of the demand itself."""
     assert problem.start_time is not None
-    end = min(end * (1.0 + EDGE), problem.start_time)
-    shortest = replace(problem, start_time=end)
-    found = searched(shortest, demand)
+    found = searched(problem, demand)
     if found is None or found[1].missed > MISSED:
-        search = Descent(shortest)
+        search = Descent(problem)
         search.apart = APART
-        start = search.into(demand, end)
+        start = search.into(demand, problem.start_time)
         start = None if start is None else search.finished(start)
         if start is not None:
             found = "", start, TorqueProfile(search.time, start.torques).simplified()
     if found is None or found[1].missed > MISSED:
         raise OptimumError(
             f"No start of {problem.drive.name} within {problem.start_time:.6g} s was found that keeps all "
-            f"bounds, though one of {end:.6g} s exists; ask for more time."
+            "bounds, though one exists; ask for more time."
         )
     return "the shortest start found", *found[1:]
 
@@ -289,6 +287,10 @@ def searched(
             known = searched(like, near, quick=True)
             near = near if known is None or known[1].missed > MISSED else known[2]
     firsts = _first_demands(search, near)
+    if problem.terminal != "reached":  # begin with an easier end
+        easier = Descent(replace(problem, terminal="reached"), search.players)
+        direct = firsts if problem.terminal == "steady" else firsts[:FINISHED]
+        firsts = [*_tasted(easier, firsts)[:FINISHED], *direct]
     done, merits = [], list[float]()
     for name, demand in _tasted(search, firsts)[: 1 if long else FINISHED]:
         found = search.down(demand, search.latest)
@@ -489,10 +491,15 @@ def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[floa
             low, high = high, 1.3 * high + 0.1 * period
             if high > longest:
                 return None
+    for middle in (low + share * (high - low) for share in SCAN):  # starts unlike that one may be shorter
+        found = searched(replace(timed, start_time=middle), quick=True)
+        if found is not None and found[1].missed <= MISSED:
+            high, demand = middle, found[2]
+            break
     while high - low > SHORTEST * high:
         middle = 0.5 * (low + high)
         search = Descent(replace(timed, start_time=middle))
-        search.apart = APART  # else the knots of all middles add up
+        search.apart = APART if demand.time.size > MOST_KNOTS else search.apart  # else knots add up
         tried = search.into(demand, middle)
         if tried is not None and tried.missed <= MISSED:
             high, demand = middle, TorqueProfile(search.time, tried.torques)
@@ -520,8 +527,13 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
         if found is None:
             sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
             raise InfeasibleError(Verdict(problem, math.inf, sentence))
-        timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + EDGE))
-        best = _answer(timed, *_in_shortest_time(timed, *found), began)
+        for edge in (EDGE, 10.0 * EDGE, SHORTEST):  # at the very edge no descent may end well
+            timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + edge))
+            with suppress(OptimumError):
+                best = _answer(timed, *_at_the_edge(timed, found[1]), began)
+                break
+        else:
+            raise OptimumError(f"No start near the shortest found, {found[0]:.6g} s, keeps all bounds.")
         why = f"the shortest start found, the gentlest of these; {best.why}"
         best = replace(best, problem=problem, why=why)
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
@@ -532,7 +544,7 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
 
     best, at_least, refused = _first_that_keeps(problem, margins, problem.k_dyn)
     best = replace(best, problem=problem, claimed=best.end_time)
-    kept = _kept(best, Limits(), at_least, margins(best), refused)
+    kept = _kept(best, Limits(), at_least, refused, margins(best))
     return replace(best, kept=kept, seconds=time.perf_counter() - began)
 
 
@@ -552,7 +564,7 @@ def _within_limits(problem: Problem, near: TorqueProfile | None) -> Optimum:
 
     most = math.inf if limits.shaft_torque is None else limits.shaft_torque / problem.base_torque
     best, at_least, refused = _first_that_keeps(problem, margins, most)
-    kept = _kept(best, limits, at_least, refused=refused)
+    kept = _kept(best, limits, at_least, refused)
     return replace(best, kept=kept, seconds=time.perf_counter() - began)
 
 
@@ -643,18 +655,11 @@ def _soonest(problem: Problem, most: float) -> float:
 
 
 def _kept(
-    best: Optimum,
-    limits: Limits,
-    at_least: float,
-    more: tuple[Margin, ...] = (),
-    refused: Margin | None = None,
+    best: Optimum, limits: Limits, at_least: float, refused: Margin | None = None, more: Sequence[Margin] = ()
 ) -> Kept:
     margins = (*Row(best.run, None, worst_case=()).margins(limits), *more)
-    covers = (
-        "every torque within the limits of the motor, by whatever controller, however often the gap closes"
-    )
     unchecked = unchecked_life(best.problem.drive) if limits.shaft_torque or limits.life else ""
-    return Kept(margins, at_least, covers, unchecked, refused)
+    return Kept(margins, at_least, unchecked, refused)
 
 
 # several machines ------------------------------------------------------------------------------------------

