@@ -20,6 +20,7 @@ CASES: dict[str, Problem] = {
     "heat": Problem(CRANE, 0.3, minimise="heat", k_dyn=1.0),
     "curve": Problem(CRANE.replace(torque_lag=0.003), 0.4, "reached", torque_speed=CURVE),
     "smooth": Problem(CRANE, 0.3, smoothness=3e-4),
+    "rate": Problem(CRANE.replace(torque_rate=2000.0), 0.33, "reached"),
     "brake": Problem(HELD.replace(torque_lag=0.005), 0.3, "reached"),
     "chain": Problem(three_masses(), 0.2),
     "gaps": Problem(CRANE, 0.3, "reached", scenarios=(CRANE.replace(gap=0.6),)),
