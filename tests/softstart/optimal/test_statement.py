@@ -157,7 +157,7 @@ def test_a_chain_agrees_with_the_linear_programs(given, terminal):
         assert claim.value == pytest.approx(0.844, rel=4e-3)
         assert best.k_dyn == pytest.approx(claim.value, rel=5e-3)
     else:
-        assert claim.value <= (1.0 + TWO_GAPS) * best.k_dyn
+        assert best.k_dyn <= (1.0 + EXACT) * claim.value  # the statement may end beside it
 
 
 def test_the_phases_are_those_of_the_record():
