@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 46582, "tests": 22690}  # lines; lower a number when it has fallen, never raise it
+MOST = {"src, controllers": 46579, "tests": 22690}  # lines; lower a number when it has fallen, never raise it
 LONGEST = 794  # lines of the longest file
 
 

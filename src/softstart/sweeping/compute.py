@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from softstart.controller.recipe import Recipe
 from softstart.start.batch import prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import PREFIX, Grid, sizes_of, values_of
-
-if TYPE_CHECKING:
-    pass
 
 Block = dict[str, Any]  # figure -> one value a start
 CODES = {status.name: code for code, status in enumerate(Status)}
