@@ -52,8 +52,9 @@ class Node(NamedTuple):
 class Vibration:
     """Natural vibration of a chain, in SI at the motor shaft, gaps closed, undamped.
 
-    `Omega[m]` is the frequency of mode m in rad/s; mode 0 is the rigid one, exactly 0. `shape[m]` are the
-    amplitudes of the masses, the largest 1. `torque[m]` are the torques of the shafts in N m per rad of that.
+    `Omega[m]` is the frequency of mode m in rad/s; mode 0 is the rigid one, exactly 0, which a chain with a
+    mass at rest does not have: `modes` are those that exist. `shape[m]` are the amplitudes of the masses, the
+    largest 1. `torque[m]` are the torques of the shafts in N m per rad of that.
     Frequencies are right to 1e-14 of themselves, also where inertias and stiffnesses span 12 decades; shapes
     to about 1e-14 over the relative distance to the next frequency. Modes closer than about 1e-9 are told
     apart in frequency, but their shapes are any two of the same plane.
@@ -68,6 +69,11 @@ class Vibration:
     def frequency(self) -> Vector:
         """The frequencies in Hz."""
         return self.Omega / (2.0 * math.pi)
+
+    @property
+    def modes(self) -> range:
+        """The numbers of the modes: from 0, the rigid one, or from 1 where a mass stays at rest."""
+        return range(0 if self.chain.at_motor_shaft().held is None else 1, self.Omega.size)
 
     @cached_property
     def nodes(self) -> tuple[tuple[Node, ...], ...]:
@@ -99,7 +105,7 @@ class Vibration:
                     {"between": masses[n.shaft : n.shaft + 2], "share": n.share} for n in self.nodes[m]
                 ],
             }
-            for m in range(self.Omega.size)
+            for m in self.modes
         ]
         return {
             "chain": self.chain.name,
@@ -284,11 +290,12 @@ class TwoMassFigures(NamedTuple):
 class Reduction:
     """A chain reduced to two masses at the motor shaft, which have its frequency, node, inertia and gap.
 
-    `J1` at the motor and `J2` at the load, kg m2, `c` N m/rad, `d` N m s/rad, `gap` rad. `chain` is the chain
-    without a mass at rest, `vibration` its natural vibration. `whole` and `reduced` are the figures of both;
-    what they differ in is the error: how strongly the motor takes part in the mode, and the stiffness.
-    `least_ratio` is the least squared frequency, over that of the first mode, of what is left out; `forced`
-    says that it is below `factor`. `notes` say what a reader must know.
+    `J1` at the motor and `J2` at the load, kg m2, `c` N m/rad, `d` N m s/rad, `gap` rad. `vibration` is the
+    natural vibration of the `chain`. `whole` and `reduced` are the figures of both; what they differ in is
+    the error: how strongly the motor takes part in the mode, and the stiffness. Where a mass stays at rest,
+    two masses have the frequency of the chain without it. `least_ratio` is the least squared frequency, over
+    that of the two masses, of what is left out; `forced` says that it is below `factor`. `notes` say what a
+    reader must know.
     """
 
     chain: Chain
@@ -321,7 +328,7 @@ class Reduction:
         >>> round(drive.J1, 4), round(drive.J2, 4), round(drive.c, 1), drive.gap
         (0.0351, 0.1749, 383.8, 0.5)
         """
-        chain, arrays = self.chain, self.chain.at_motor_shaft()
+        chain, arrays = self.chain, self.chain.freed.at_motor_shaft()
         if chain.motor is None:
             raise InputError("[motor] is missing: a drive needs its starting torque; add it to the chain.")
         if chain.target_speed is None:
@@ -329,6 +336,7 @@ class Reduction:
         reactive, active = (float(arrays.Mc[kind].sum()) for kind in (arrays.reactive, ~arrays.reactive))
         twist = float(arrays.theta0.sum()) * (1.0 if arrays.motor < arrays.load else -1.0)
         speed = float(arrays.J @ arrays.w0) / self.whole.inertia
+        law = chain.freed.shafts[0].contact_law
         return Drive(
             **chain.motor.keywords(),
             name=f"{chain.name}, reduced to two masses",
@@ -342,7 +350,7 @@ class Reduction:
             stiffness=self.c,
             damping=self.d,
             gap=self.gap,
-            contact_law=chain.shafts[0].contact_law,
+            contact_law=law,
             start_position="unknown" if len(chain.positions) > 1 else twist or "mid-gap",
             target_speed=chain.target_speed,
             initial_motor_speed=speed,
@@ -378,7 +386,8 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
 
     Two masses stand for the chain only as long as nothing else vibrates: the second mode, and with open gaps
     the pieces between them, must lie far above the first mode. How much K_dyn is off, because light masses
-    between gaps have impacts of their own, only starts can tell: `two_mass_error`.
+    between gaps have impacts of their own, only starts can tell: `two_mass_error`. A chain with a mass at
+    rest vibrates below the first frequency of the chain without it: it has no two masses unless by `force`.
 
     Parameters
     ----------
@@ -414,7 +423,6 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
     ----------
     [R]; the modal reduction: docs/theory/reduction.md.
     """
-    given, chain = chain, chain.freed
     arrays, load = chain.at_motor_shaft(), chain.load_mass
     wrong = []
     if not factor >= 1.0:
@@ -423,17 +431,19 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
         wrong.append(f"load = {load!r}: motor and load are the same mass; name another one.")
     if wrong:
         raise InputError(wrong)
-    vibration = natural_vibration(chain)
-    Omega, x = float(vibration.Omega[1]), vibration.shape[1]
+    vibration, free = natural_vibration(chain), chain.freed
+    of_free = vibration if free is chain else natural_vibration(free)
+    arrays = free.at_motor_shaft()
+    Omega, x = float(of_free.Omega[1]), of_free.shape[1]
     x1, x2 = float(x[arrays.motor]), float(x[arrays.load])
     if not x1 * x2 < 0.0:
         raise InputError(
             f"load = {load!r}: the node of the first elastic mode ({Omega:.6g} rad/s) does not lie between "
-            f"the motor ({chain.masses[arrays.motor].name}) and the load, so no two masses there vibrate as "
+            f"the motor ({free.masses[arrays.motor].name}) and the load, so no two masses there vibrate as "
             "the chain does; use the chain itself, or name another load."
         )
     refused, ratios = [], []
-    for what, w in _left_out(chain, vibration):
+    for what, w in _left_out(of_free, vibration):
         ratios.append((w / Omega) ** 2)
         if ratios[-1] < factor:
             refused.append(
@@ -447,19 +457,36 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
     J1, J2 = J * x2 / (x2 - x1), J * x1 / (x1 - x2)
     c = Omega**2 * J1 * J2 / J
     d = float(arrays.d @ (x[:-1] - x[1:]) ** 2) / modal * (J1 * x1**2 + J2 * x2**2) / (x1 - x2) ** 2
-    gap, path = float(arrays.gap.sum()), list(arrays.path)
-    whole = TwoMassFigures(
-        Omega, x1 / (x1 - x2), J * x1**2 / modal, float(1.0 / np.sum(1.0 / arrays.c[path])), J, gap
-    )
+    gap = float(arrays.gap.sum())
     reduced = TwoMassFigures(math.sqrt(c / J1 + c / J2), J2 / (J1 + J2), J2 / J1, c, J1 + J2, gap)
-    least, notes = min(ratios, default=math.inf), tuple(_notes(given))
-    return Reduction(chain, vibration, J1, J2, c, d, gap, whole, reduced, factor, least, notes)
+    least, notes = min(ratios, default=math.inf), tuple(_notes(chain))
+    return Reduction(chain, vibration, J1, J2, c, d, gap, _figures(vibration), reduced, factor, least, notes)
 
 
-def _left_out(chain: Chain, vibration: Vibration) -> Iterator[tuple[str, float]]:
-    """What two masses leave out, with its frequency in rad/s: the second mode, and of each piece between two
-    gaps, which vibrates by itself while they are open, the first elastic one.
+def _figures(vibration: Vibration) -> TwoMassFigures:
+    """Those of the chain itself. With a mass at rest its first mode has no node between motor and load."""
+    arrays, x = vibration.chain.at_motor_shaft(), vibration.shape[1]
+    x1, x2, J = float(x[arrays.motor]), float(x[arrays.load]), arrays.moving_J
+    whole = float(J.sum())
+    return TwoMassFigures(
+        Omega=float(vibration.Omega[1]),
+        node=x1 / (x1 - x2) if arrays.held is None else math.nan,
+        participation=whole * x1**2 / float(J @ x**2),
+        stiffness=float(1.0 / np.sum(1.0 / arrays.c[list(arrays.path)])),
+        inertia=whole,
+        gap=float(arrays.gap.sum()),
+    )
+
+
+def _left_out(vibration: Vibration, whole: Vibration) -> Iterator[tuple[str, float]]:
+    """What two masses leave out, with its frequency in rad/s: a mass at rest, the second mode, and of each
+    piece between two gaps, which vibrates by itself while they are open, the first elastic one.
+
+    `vibration` is that of the chain without the mass at rest, `whole` with it.
     """
+    chain = vibration.chain
+    if (held := whole.chain.at_motor_shaft().held) is not None:
+        yield f"the chain held at rest by {whole.chain.masses[held].name}", float(whole.Omega[1])
     if vibration.Omega.size > 2:
         yield "the second mode", float(vibration.Omega[2])
     arrays, names = chain.at_motor_shaft(), [mass.name for mass in chain.masses]
@@ -477,7 +504,10 @@ def _left_out(chain: Chain, vibration: Vibration) -> Iterator[tuple[str, float]]
 def _notes(chain: Chain) -> Iterator[str]:
     """What the two masses leave out."""
     if (held := chain.at_motor_shaft().held) is not None:
-        yield f"{chain.masses[held].name} stays at rest and is left out, with its shaft; the chain has both"
+        yield (
+            f"{chain.masses[held].name} stays at rest: the two masses leave it out, with its shaft, and turn "
+            "freely where the chain is held; frequencies and starts of the chain have both"
+        )
     if curved := [mass.name for mass in chain.masses if mass.curve is not None]:
         yield f"the load curves of {', '.join(curved)} are left out of the drive; the chain has them"
     torques = [mass for mass in chain.masses if mass.torque]

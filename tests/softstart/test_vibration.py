@@ -18,6 +18,7 @@ from tests.twin import chain_of
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration, reduce_chain
 from softstart.errors import InputError
 from softstart.vibration import elastic_frequencies, shapes
+from softstart.views.chains import frequencies_table
 
 Vector = NDArray[np.float64]
 
@@ -188,3 +189,76 @@ def test_a_reduction_that_is_forced_says_so() -> None:
     assert forced.forced
     assert forced.least_ratio == pytest.approx(3.0, rel=1e-12)
     assert not reduce_chain(EQUAL, factor=2.0).forced
+
+
+# a mass at rest ----------------------------------------------------------------------------------------
+
+TEXTBOOK = Chain(
+    [Mass(5.0, name="A"), Mass(11.0, name="B"), Mass("inf", name="C")],
+    [Shaft(0.1e6), Shaft(0.2e6)],
+    Motor(100.0),
+    load_mass="B",
+    target_speed="100 rpm",
+)
+
+
+def turned(chain: Chain) -> Chain:
+    """The same chain from its other end: ratios inverted, shafts on the other side of their gears."""
+    shafts = [
+        one.replace(ratio=1.0 / one.ratio, side="after" if one.side == "before" else "before")
+        for one in chain.shafts[::-1]
+    ]
+    return replace(chain, masses=chain.masses[::-1], shafts=tuple(shafts))
+
+
+def test_a_chain_held_at_its_end_is_reduced_as_it_is() -> None:
+    """Eigenvalues of [[0.1, -0.1], [-0.1, 0.3]] MN m/rad and diag(5, 11): with the wall, not without it."""
+    K = 1e6 * np.array([[0.1, -0.1], [-0.1, 0.3]])
+    exact = np.sqrt(eigh(K, np.diag([5.0, 11.0]), eigvals_only=True))
+    assert exact == pytest.approx([98.3394, 193.9126], abs=1e-4)
+    free = math.sqrt(0.1e6 * (1 / 5 + 1 / 11))
+    for chain in (TEXTBOOK, turned(TEXTBOOK)):
+        vibration = natural_vibration(chain)
+        assert list(vibration.modes) == [1, 2]
+        assert [mode["Omega"] for mode in vibration.summary()["modes"]] == pytest.approx(exact, rel=1e-12)
+        with pytest.raises(InputError, match=r"held at rest by C vibrates at 98\.3394 rad/s.*--force"):
+            reduce_chain(chain)
+        found = reduce_chain(chain, force=True)
+        assert found.forced
+        assert found.least_ratio == pytest.approx((exact[0] / free) ** 2, rel=1e-12)
+        assert found.vibration.Omega[1:] == pytest.approx(exact, rel=1e-12)
+        assert (found.whole.Omega, found.reduced.Omega) == pytest.approx((exact[0], free), rel=1e-12)
+        assert math.isnan(found.whole.node)
+        assert found.chain is chain
+        assert chain.warnings[0].startswith("C stays at rest")
+        columns = zip(*frequencies_table(vibration).rows, strict=True)
+        assert [list(one) for one in columns][1:3] == [["1", "2"], ["98.339", "193.913"]]
+    both = [Mass("inf", name="wall"), *TEXTBOOK.masses]
+    with pytest.raises(InputError, match="one mass may stay at rest"):
+        Chain(both, [Shaft(1.0), *TEXTBOOK.shafts], Motor(1.0, mass="A"), load_mass="B")
+    with pytest.raises(InputError, match="same mass"):
+        reduce_chain(Chain([Mass(1.0), Mass("inf")], [Shaft(5.0)], Motor(1.0)), force=True)
+
+
+@given(st.integers(0, 10**6), st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_frequencies_with_a_mass_at_rest_at_either_end_of_gears(seed: int, at_motor: bool) -> None:
+    """A dense solver in the angles of each mass's shaft, with every gear and side, unit and order."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 6))
+    J, ratios = 10 ** rng.uniform(-1, 1, n), rng.choice([0.5, 1.0, 3.0, 7.0], n)
+    c, sides = 10 ** rng.uniform(2, 4, n), rng.choice(["before", "after"], n)
+    masses = [Mass(f"{1e4 * one:.17g} kg*cm^2", name=f"m{i}") for i, one in enumerate(J)]
+    wall = Mass("inf", name="wall")
+    shafts = [Shaft(one, ratio=i, side=side) for one, i, side in zip(c, ratios, sides, strict=True)]
+    chain = Chain([wall, *masses] if at_motor else [*masses, wall], shafts)
+    K = np.zeros((n + 1, n + 1))
+    for k in range(n):  # the spring sees (angle before)/ratio - angle after on the slow side, [R]
+        row = np.zeros(n + 1)
+        row[k], row[k + 1] = (1.0 / ratios[k], -1.0) if sides[k] == "after" else (1.0, -ratios[k])
+        K += c[k] * np.outer(row, row)
+    free = slice(1, None) if at_motor else slice(0, n)
+    exact = np.sqrt(eigh(K[free, free], np.diag(J), eigvals_only=True))
+    for one in (chain, turned(chain)):
+        vibration = natural_vibration(one)
+        assert vibration.Omega[list(vibration.modes)] == pytest.approx(exact, rel=1e-8)

@@ -271,13 +271,19 @@ class Chain(Words):
         >>> Chain.load("tractor-like").warnings
         ()
         """
+        held = [mass.name for mass in self.masses if math.isinf(mass.inertia)]
+        fixed = [
+            f"{name} stays at rest: strategies are set up for the two masses of the chain without it."
+            for name in held
+        ]
         damped = any(s.damping or s.damping_ratio or s.efficiency < 1.0 for s in self.shafts)
         inelastic = any(s.restitution is not None and s.restitution < 1.0 for s in self.shafts)
         if damped or inelastic or any(mass.damping for mass in self.masses):
-            return ()
+            return tuple(fixed)
         if not any(shaft.gap > 0.0 for shaft in self.shafts):
-            return ()
+            return tuple(fixed)
         return (
+            *fixed,
             "Nothing damps this chain: its light masses rattle in the gaps indefinitely, and late contacts "
             "decide the peaks. Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
         )

@@ -37,8 +37,13 @@ class Verification:
 
     @cached_property
     def worst_shaft(self) -> int:
-        """The index of the shaft between motor and load with the largest torque at the motor shaft."""
-        return max(self.chain.drive.at_motor_shaft().path, key=lambda k: self.chain.peak_torques[k])
+        """The index of the shaft between motor and load with the largest torque at the motor shaft.
+
+        Where a mass stays at rest, of all shafts: those on the way to it carry the motor torque as well.
+        """
+        at = self.chain.drive.at_motor_shaft()
+        shafts = at.path if at.held is None else range(at.c.size)
+        return max(shafts, key=lambda k: self.chain.peak_torques[k])
 
     @property
     def worst_place(self) -> str:
@@ -131,7 +136,8 @@ class TwoMassError:
     """How far two masses are off the chain they stand for, in K_dyn: see `two_mass_error`.
 
     `verified` are the starts of strategies, `of_torques` the largest error under torques over time (a share
-    of the K_dyn of the drive), `failed` says which strategies start the drive but not the chain, and why.
+    of the K_dyn of the drive), `failed` says which strategies bring the drive to its target speed but not the
+    chain, and why.
     """
 
     LIMIT: ClassVar = 0.1
@@ -227,9 +233,13 @@ def two_mass_error(
                 raise
             continue
         try:
-            verified.append(verify_on_chain(chain, drive, made))
+            done = verify_on_chain(chain, drive, made)
         except SimulationError as error:
             failed[made.name] = str(error)
+            continue
+        verified.append(done)
+        if math.isnan(done.chain.start_time) and not math.isnan(done.drive.start_time):
+            failed[made.name] = done.chain.status.value
     return TwoMassError(drive, tuple(verified), _error_of_torques(chain, drive), failed)
 
 

@@ -60,7 +60,7 @@ def reduce(
         with working("reducing the chain ..."):
             found = reduce_chain(chain, **{name: one for name, one in asked.items() if one is not None})
     except InputError as error:
-        vibration, refused = natural_vibration(chain.freed), error.sentences
+        vibration, refused = natural_vibration(chain), error.sentences
         if option_value("as_json"):
             print_json({"chain": chain.name, "vibration": vibration.summary(), "refused": refused})
         else:

@@ -158,6 +158,11 @@ def reduced_drive(machine: Any) -> Drive:
     softstart.errors.InputError: drive = Crane travel drive as a chain of four masses: its widest gap is 40 %
     of all; ...
     """
+    if isinstance(machine, Chain) and (held := machine.at_motor_shaft().held) is not None:
+        raise InputError(
+            f"drive = {machine.name}: {machine.mass_names[held]} stays at rest, and a log is explained by "
+            "two masses that turn freely; leave it out if it did not hold the chain while that was logged."
+        )
     gaps = machine.gaps
     whole = float(gaps.sum())
     if whole > 0.0 and float(gaps.max()) <= DOMINANT * whole:

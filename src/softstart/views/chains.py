@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.errors import listed
 from softstart.views.drawing import COLOURS, drawing, entitle, head, legend_above, new_figure
 from softstart.views.drives import drive_lines
 from softstart.views.numbers import Table, column_of, number, short
@@ -35,7 +37,7 @@ WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; characters of a mass in i
 def vibration_sheet(found: Vibration) -> Sheet:
     """The natural frequencies of a chain."""
     masses = [mass.name for mass in found.chain.masses]
-    modes = range(found.Omega.size)
+    modes = found.modes
     frequencies = [[m, float(found.Omega[m]), float(found.frequency[m])] for m in modes]
     return Sheet(
         title=f"{found.chain.name}: natural frequencies",
@@ -96,7 +98,8 @@ def enough(found: TwoMassError) -> str:
             f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} and under "
             f"{torques} is off by {_percent(found.error)} at most {limit}."
         )
-    said = [f"{name} does not start the chain" for name in found.failed]
+    failed = listed(list(found.failed))
+    said = [f"{failed} {'do' if len(found.failed) > 1 else 'does'} not start the chain"] if failed else []
     if worst is not None and abs(worst.error) > found.LIMIT:
         said.append(
             f"{worst.name} has K_dyn {worst.chain_k_dyn:.3g} on the chain and {worst.drive.k_dyn:.3g} on them"
@@ -149,15 +152,15 @@ def summary(found: Reduction, off: TwoMassError | None) -> dict[str, Any]:
 
 def frequencies_table(vibration: Vibration) -> Table:
     """The lowest natural frequencies with their nodes."""
-    shown = vibration.nodes[:MOST_MODES]
-    nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in of_mode) or "-" for of_mode in shown]
-    more = len(vibration.nodes) - len(shown)
+    shown = vibration.modes[:MOST_MODES]
+    nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) or "-" for m in shown]
+    more = len(vibration.modes) - len(shown)
     of_nodes = "nodes (7.30: behind mass 7, at 0.30 of the twist to mass 8)"
     cells = {
         of_nodes: nodes,
-        "mode": [str(m) for m in range(len(nodes))],
-        "Omega\nrad/s": column_of(vibration.Omega[:MOST_MODES].tolist(), 6),
-        "Hz": column_of(vibration.frequency[:MOST_MODES].tolist(), 5),
+        "mode": list(map(str, shown)),
+        "Omega\nrad/s": column_of(vibration.Omega[shown].tolist(), 6),
+        "Hz": column_of(vibration.frequency[shown].tolist(), 5),
     }
     title = f"Natural frequencies, gaps closed{f' (and {more} above)' if more else ''}"
     return Table.of(title, cells, texts=[of_nodes])
@@ -179,13 +182,22 @@ def two_masses_table(found: Reduction) -> Table:
         "at the motor shaft": [*names, "J1, kg m2", "J2, kg m2"],
         "chain": [*map(short, chain), "-", "-"],
         "two masses": [*map(short, two), short(found.J1), short(found.J2)],
-        "off\n%": [*(f"{one:+.1f}" if abs(one) > 1e-6 else "0" for one in off), "-", "-"],
+        "off\n%": [*map(_signed, off), "-", "-"],
     }
     condition = (
         f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}{', fails' * found.forced}"
     )
     title = f"Two masses instead of {len(found.chain.masses)} ({condition})"
     return Table.of(title, cells, texts=["at the motor shaft"])
+
+
+def _signed(percent: float) -> str:
+    """A difference in per cent; a dash where there is nothing to compare.
+
+    >>> _signed(73.44), _signed(-1e-9), _signed(float("nan"))
+    ('+73.4', '0', '-')
+    """
+    return "-" if math.isnan(percent) else f"{percent:+.1f}" if abs(percent) > 1e-6 else "0"
 
 
 def verified_table(done: Sequence[Verification]) -> Table:

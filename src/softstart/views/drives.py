@@ -39,7 +39,7 @@ def drive_lines(machine: Any) -> list[str]:
             *([named] if masses != ("motor", "load") else []),
         ]
     else:
-        count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().J.sum())
+        count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().moving_J.sum())
         parts = [
             f"  {len(masses)} masses, {count} gap{'' if count == 1 else 's'}; at the motor shaft J = "
             f"{short(inertia)} kg m2, gaps {short(float(machine.gaps.sum()))} rad, load torque {Mc} N m",

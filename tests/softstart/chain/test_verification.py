@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from tests.controllers.several_gaps import random_chains
 from tests.twin import chain_of
 
-from softstart import SimulationError, simulate
-from softstart.chain import Chain, Mass, reduce_chain, two_mass_error, verify_on_chain
+from softstart import InputError, SimulationError, simulate
+from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, two_mass_error, verify_on_chain
 from softstart.chain.two_masses import error_under, torques_to_try
 
 CHAIN = Chain.load("crane-4-mass")
@@ -73,6 +74,30 @@ def test_a_strategy_that_does_not_start_the_chain_counts(monkeypatch):
     assert found.failed == {"ramp": "too many events"}
     assert found.error == np.inf
     assert not found.enough
+
+
+def test_two_masses_are_not_enough_where_the_chain_never_reaches_its_target():
+    """Held at its end it swings about u/c; the largest torque is in the shaft that holds it."""
+    masses = [Mass(5.0, name="A"), Mass(11.0, name="B"), Mass("inf", name="C")]
+    chain = Chain(masses, [Shaft(0.1e6), Shaft(0.2e6)], Motor(100.0), load_mass="B", target_speed="100 rpm")
+    with pytest.raises(InputError, match="held at rest by C"):
+        reduce_chain(chain)
+    drive = reduce_chain(chain, force=True).to_drive()
+    found = verify_on_chain(chain, drive, "direct", 3.0)
+    assert found.worst_place == "B - C"
+    assert found.chain.peak_torque == pytest.approx(269.245, abs=1e-3), "by hand: sum of two modes, below"
+    K, J = 1e6 * np.array([[0.1, -0.1], [-0.1, 0.3]]), np.diag([5.0, 11.0])
+    squares, modes = eigh(K, J)
+    t = np.linspace(0.0, 3.0, 400_001)
+    swings = [
+        100.0 * X[0] * X[1] / w2 * (1 - np.cos(np.sqrt(w2) * t))
+        for w2, X in zip(squares, modes.T, strict=True)
+    ]
+    assert found.chain.peak_torque == pytest.approx(0.2e6 * np.abs(sum(swings)).max(), rel=1e-6)
+    error = two_mass_error(chain, drive, ["direct"])
+    assert not error.enough
+    assert error.error == np.inf
+    assert error.failed["direct"] == error.verified[0].chain.status.value
 
 
 def chains_of_all_kinds(seed: int, count: int) -> Iterator[Chain]:

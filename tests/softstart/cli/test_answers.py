@@ -259,6 +259,12 @@ def test_natural_frequencies_come_first_whatever_cannot_be_reduced(run, place, n
     assert (code, err.count("\n")) == (2, 1)
     found = [line.split()[-1] for line in out.splitlines() if re.match(r"[\d., -]+$", line)]
     assert found == ["0.00", "81.21", "141.21", "378.95", "536.36"]
+    held = Chain([Mass(5.0), Mass(11.0), Mass("inf")], [Shaft(0.1e6), Shaft(0.2e6)])
+    (place / "good.toml").write_text(held.to_toml())
+    for line in (("reduce", "good.toml"), ("reduce", "good.toml", "--force", "--no-starts")):
+        code, out, _ = run(*line)
+        assert code == (0 if "--force" in line else 2)
+        assert re.findall(r"^[\d., ]+ (\d+\.\d{3})  ", out, re.MULTILINE) == ["98.339", "193.913"], "by hand"
     refused = ("reduce", "tractor-like", "--factor", "20")
     assert run(*refused, "--out", "found").code == 2
     nothing_left()
