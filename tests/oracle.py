@@ -55,8 +55,11 @@ class Given:
     gear: Any = -1  # the mass at which the gear of each shaft sits
     # of some masses points and torques of a load curve, and whether it is by angle, 0 where the load begins
     curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] = field(default_factory=dict)
+    friction: Any = 0.0  # Coulomb friction of each mass besides Mc
 
     def __post_init__(self) -> None:
+        self.pull = np.where(self.reactive, 0.0, self.Mc)
+        self.hold = np.where(self.reactive, self.Mc, 0.0) + self.friction
         self.efficiency, self.gear = np.broadcast_arrays(self.efficiency, self.gear, self.c)[:2]
 
 
@@ -80,7 +83,7 @@ class ChainOracle:
         self.side = np.zeros(self.n - 1)
         self.form = ["joined" if gap == 0 else "open" for gap in given.gap]
         self.rigid, self.eta = ~np.isnan(given.restitution), given.efficiency
-        self.rubs = given.reactive.copy()
+        self.rubs = given.hold > 0.0
         self.rubs[given.gear[self.eta < 1]] = True
         self.held = release > 0.0
         self.direction = np.where(self.rubs, np.sign(given.w0), 1.0)
@@ -138,7 +141,7 @@ class ChainOracle:
         self.A[-1, n - 1 + self.load] = 1.0
         moves = self.direction != 0
         push, by = self.pushed(self.direction)
-        by[:, 0] -= self.direction * np.where(g.reactive, g.Mc, 0.0)
+        by[:, 0] -= self.direction * g.hold
         self.A[n - 1 : 2 * n - 1] = moves[:, None] * push / g.J[:, None]
         self.B[n - 1 : 2 * n - 1] = moves[:, None] * by / g.J[:, None]
         rows = list(self.rows())
@@ -147,7 +150,7 @@ class ChainOracle:
         self.F = np.array([by_input for *_, by_input in rows]).reshape(-1, self.k.shape[1])
 
     def pushed(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The torque on each mass that moves in these directions, without friction of a reactive load."""
+        """The torque on each mass that moves in these directions, without Coulomb friction."""
         n, g = self.n, self.g
         passed = np.zeros((n, n - 1))
         for k in range(n - 1):
@@ -157,7 +160,7 @@ class ChainOracle:
                 passed[i, k] = sign * ((self.eta[k] if drives else 1.0 / self.eta[k]) if lossy else 1.0)
         push, by = passed @ self.K, passed @ self.k
         push[:, n - 1 : 2 * n - 1] -= np.diag(g.ground)
-        by[:, 0] -= np.where(g.reactive, 0.0, g.Mc)
+        by[:, 0] -= g.pull
         by[g.motor, 1] += 1.0
         for place, i in enumerate([*(tone[0] for tone in g.tones), *g.curves]):
             by[i, 2 + place] += 1.0 if place < len(g.tones) else -1.0
@@ -198,7 +201,7 @@ class ChainOracle:
             elif self.rubs[i] and self.direction[i] == 0:
                 for name, way in (("forward", 1.0), ("back", -1.0)):
                     push, by = self.pushed(np.where(np.arange(n) == i, way, self.direction))
-                    yield name, i, way * push[i], way * by[i] - (g.Mc[i] if g.reactive[i] else 0.0) * constant
+                    yield name, i, way * push[i], way * by[i] - g.hold[i] * constant
             elif self.rubs[i]:
                 yield "stop", i, -self.direction[i] * speeds[i], 0.0 * constant
         for i, (points, _, _) in g.curves.items():  # where the curve bends the integration starts again
@@ -250,8 +253,8 @@ class ChainOracle:
             direction = np.sign(self.y[self.n - 1 + i])
             if self.rubs[i] and direction != self.direction[i]:
                 if self.direction[i] != 0:
-                    self.happened("load-stops" if self.g.reactive[i] else "gear-holds", i)
-                self.happened("load-starts" if self.g.reactive[i] else "gear-lets-go", i)
+                    self.happened("load-stops" if self.g.hold[i] > 0 else "gear-holds", i)
+                self.happened("load-starts" if self.g.hold[i] > 0 else "gear-lets-go", i)
                 self.direction[i] = direction
 
     def apply(self, name: str, k: int) -> None:
@@ -274,11 +277,11 @@ class ChainOracle:
             self.form[k] = "stiff" if name == "stiffen" else "press"
         elif name == "stop":
             self.y[self.n - 1 + k] = 0.0
-            self.happened("load-stops" if self.g.reactive[k] else "gear-holds", k)
+            self.happened("load-stops" if self.g.hold[k] > 0 else "gear-holds", k)
             self.direction[k] = 0.0
         elif name in ("forward", "back"):
             self.direction[k] = 1.0 if name == "forward" else -1.0
-            self.happened("load-starts" if self.g.reactive[k] else "gear-lets-go", k)
+            self.happened("load-starts" if self.g.hold[k] > 0 else "gear-lets-go", k)
         elif name == "let go":
             self.held = False
             self.direction[k] = 0.0 if self.rubs[k] else 1.0
@@ -446,14 +449,17 @@ def integrate(
     *, J1: float, J2: float, c: float, d: float, gap: float, Mc: float, kind: str, law: str, theta0: float,
     w1_0: float, w2_0: float, torque_pieces: list[Any], lag: float, rate: float, u0: float, t_end: float,
     target: float | None = None, rtol: float = 1e-12, release: float = 0.0, friction: float = 0.0,
-    b1: float = 0.0, b2: float = 0.0,
+    b1: float = 0.0, b2: float = 0.0, load_friction: float = 0.0,
 ) -> Start:  # fmt: skip
-    """A start of two masses; `friction` is Coulomb friction of the motor, b1 and b2 viscous friction."""
+    """A start of two masses; `friction` is Coulomb friction of the motor, b1 and b2 viscous friction.
+
+    `load_friction` is Coulomb friction of the load besides Mc.
+    """
     one, two = np.full(1, c), np.array([J1, J2])
     given = Given(
         two, np.array([friction, Mc]), np.array([friction > 0.0, kind == "reactive"]), np.array([w1_0, w2_0]),
         one, np.full(1, d), np.full(1, gap), [law], np.full(1, theta0), np.array([b1, b2]), [],
-        np.full(1, math.nan), 0,
+        np.full(1, math.nan), 0, friction=np.array([0.0, load_friction]),
     )  # fmt: skip
     path = TorquePath(torque_pieces, lag, rate, u0, t_end)
     run = ChainOracle(given, path, math.inf if target is None else target, rtol, release, 5000).go()

@@ -48,8 +48,9 @@ def chain_of(drive: Drive) -> Chain:
     assert drive.frictions == (0.0, 0.0, 0.0), "a chain has no such friction"
     rotor = Mass(drive.J1, name="motor", initial_speed=drive.initial_motor_speed)
     load = Mass(
-        drive.J2, name="load", torque=drive.Mc, kind=drive.load_kind, initial_speed=drive.initial_load_speed
-    )
+        drive.J2, name="load", torque=drive.load_torque, kind=drive.load_kind, friction=drive.load_friction,
+        initial_speed=drive.initial_load_speed,
+    )  # fmt: skip
     unknown = len(drive.positions) > 1
     where = None if unknown else drive.theta0 or None
     shaft = Shaft(

@@ -28,6 +28,9 @@ from the break-away:
     T = Mc + over (1 - cos Omega s) + rise sin Omega s,     over = (M1 - Mc) share,  rise = S sqrt(share),
                                                             share = J2/(J1 + J2)
 
+A load with an active part and friction besides is a reactive one with the sum `Mc` where its friction holds
+it at rest (`Drive.rests`); where not, it falls, stops and rises within stage 2, which has no closed form.
+
 [G]: R. P. Gerasymiak, V. V. Subbotin, Dual-mass mechanical part electromechanical system behavior analysis,
 pages 18-20. Derivations: docs/theory/stages.md. Doctests: its crane drive with J2 = 5 J1.
 """

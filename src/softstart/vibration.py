@@ -319,9 +319,9 @@ class Reduction:
     def to_drive(self) -> Drive:
         """The two-mass drive, for `compare`, `optimize` and `tune`.
 
-        All load torques act on its load, under the kind of the larger part; damping to the ground and the
-        efficiencies of gears, which a drive does not have, are left out. It starts where the chain does, in
-        mid-gap if the chain does not say otherwise.
+        All load torques and frictions act on its load; damping to the ground and the efficiencies of gears,
+        which a drive does not have, are left out. It starts where the chain does, in mid-gap if the chain
+        does not say otherwise.
 
         >>> from softstart import Chain
         >>> drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
@@ -333,7 +333,7 @@ class Reduction:
             raise InputError("[motor] is missing: a drive needs its starting torque; add it to the chain.")
         if chain.target_speed is None:
             raise InputError("[start] target_speed is missing: a drive needs it; add it to the chain.")
-        reactive, active = (float(arrays.Mc[kind].sum()) for kind in (arrays.reactive, ~arrays.reactive))
+        active, friction = float(arrays.active.sum()), float(arrays.friction.sum())
         twist = float(arrays.theta0.sum()) * (1.0 if arrays.motor < arrays.load else -1.0)
         speed = float(arrays.J @ arrays.w0) / self.whole.inertia
         law = chain.freed.shafts[0].contact_law
@@ -345,8 +345,9 @@ class Reduction:
             units=chain.units,
             motor_inertia=self.J1,
             load_inertia=self.J2,
-            load_torque=active + reactive,
-            load_kind="reactive" if abs(reactive) > abs(active) else "active",
+            load_torque=active or friction,
+            load_kind="active" if active or not friction else "reactive",
+            load_friction=friction if active else 0.0,
             stiffness=self.c,
             damping=self.d,
             gap=self.gap,

@@ -46,7 +46,8 @@ class Mass(ParameterSet):
     """A rigid mass: everything in SI, on its own shaft.
 
     `torque` is the load torque, positive where it brakes a forward motion; `kind` "active" acts always,
-    "reactive" opposes motion and holds the mass at rest up to its size. `damping` is that to the ground.
+    "reactive" opposes motion and holds the mass at rest up to its size, as the `friction` does that acts
+    besides. `damping` is that to the ground.
 
     A mass at the end of a chain with an `inertia` of infinity stays at rest: ground, or what a brake holds.
     `curve_torque` is a load torque that acts besides, always: at the speeds `curve_speed` of the mass, or at
@@ -69,6 +70,8 @@ class Mass(ParameterSet):
         default=0.0)
     kind: LoadKind = parameter("mass.kind", "", "kind of the load torque", '"active"', default="active",
         choices=get_args(LoadKind))
+    friction: Number = parameter("mass.friction", "N*m",
+        "Coulomb friction besides its torque", '"0.7 N*m"', "0 or more", default=0.0)
     initial_speed: Number = parameter("mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"',
         default=0.0)
     curve_speed: MaybeSeries = parameter("mass.curve_speed", "rad/s", "rising speeds of its load curve",

@@ -316,7 +316,8 @@ class Chain(Words):
             travel=float(max(np.maximum(0.5 * at.gap - twist, 0.0)[path].sum() for twist in twists)),
             Ms=math.nan if motor is None else motor.starting_torque,
             Mc=float(at.Mc.sum()),
-            active=bool(np.any((at.Mc != 0.0) & ~at.reactive)),
+            active=bool(at.active.any()),
+            friction=float(at.friction.sum()),
             speed=math.nan if self.target_speed is None else self.target_speed,
             ratio=1.0 / float(at.speed_ratio[at.load]),
         )
@@ -492,12 +493,13 @@ class Chain(Words):
         """
         at = arrays_at(self, self.index(reference))
         placed = self.position in ("mid-gap", "unknown")
-        columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, at.speed_ratio.tolist(), strict=True)
+        columns = zip(self.masses, at.J, at.d_ground, at.w0, at.speed_ratio.tolist(), strict=True)
         masses = [
             m.replace(
                 inertia=float(J),
                 damping=float(d),
-                torque=float(Mc),
+                torque=m.torque * i,
+                friction=m.friction * i,
                 initial_speed=float(w0),
                 **{
                     key: [x * (i if key == "curve_torque" else 1.0 / i) for x in vars(m)[key]]
@@ -505,7 +507,7 @@ class Chain(Words):
                     if vars(m)[key] is not None
                 },
             )
-            for m, J, d, Mc, w0, i in columns
+            for m, J, d, w0, i in columns
         ]
         rows = zip(self.shafts, at.c, at.d, at.gap, at.permissible, at.theta0, strict=True)
         shafts = [
@@ -596,9 +598,10 @@ Flags = NDArray[np.bool_]
 class ChainArrays:
     """N masses and N - 1 shafts, all brought to one shaft, in SI; the arrays are read-only.
 
-    Of the masses: `J` inertia, `d_ground` damping to the ground, `Mc` load torque (braking where positive),
-    `reactive` its kind, `w0` speed at the start, `speed_ratio` the speed of the mass's own shaft over that of
-    the reference shaft (`i` of [R]; own speed = speed here * speed_ratio).
+    Of the masses: `J` inertia, `d_ground` damping to the ground, `active` load torque (braking where
+    positive) and `friction`, the reactive one; `Mc` is their sum, which forward motion takes; `w0` speed at
+    the start, `speed_ratio` the speed of the mass's own shaft over that of the reference shaft (`i` of [R];
+    own speed = speed here * speed_ratio).
     Of the shafts: `c` stiffness (infinite where `rigid`), `d` damping, `gap` total gap, `restitution` (NaN
     where not rigid), `law` contact laws, `theta0` twist at the start, `permissible` torque (NaN where none),
     `torque_ratio` a torque here over the same at the shaft itself, `efficiency` of its gear and `gear`, the
@@ -608,8 +611,8 @@ class ChainArrays:
 
     J: Vector
     d_ground: Vector
-    Mc: Vector
-    reactive: Flags
+    active: Vector
+    friction: Vector
     w0: Vector
     speed_ratio: Vector
     c: Vector
@@ -630,6 +633,11 @@ class ChainArrays:
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+
+    @property
+    def Mc(self) -> Vector:
+        """The load torques against forward motion, N m."""
+        return self.active + self.friction
 
     @property
     def held(self) -> int | None:
@@ -699,13 +707,17 @@ def arrays_at(chain: Chain, index: int) -> ChainArrays:
     c = np.array([shaft.stiffness for shaft in shafts]) * of_shaft * of_shaft
     permissible = [math.nan if s.permissible_torque is None else s.permissible_torque for s in shafts]
     gap = np.array([shaft.gap for shaft in shafts]) / of_shaft
-    Mc = np.array([mass.torque for mass in masses]) * i
+    torque, active = (
+        np.array([mass.torque for mass in masses]) * i,
+        [mass.kind == "active" for mass in masses],
+    )
+    pulls = np.where(active, torque, 0.0)
     angles = np.array([math.nan if s.start_position is None else s.start_position for s in shafts]) / of_shaft
     return ChainArrays(
         J=J,
         d_ground=np.array([mass.damping for mass in masses]) * i * i,
-        Mc=Mc,
-        reactive=np.array([mass.kind == "reactive" for mass in masses]),
+        active=pulls,
+        friction=np.where(active, 0.0, torque) + np.array([mass.friction for mass in masses]) * i,
         w0=np.array([mass.initial_speed for mass in masses]) / i,
         speed_ratio=i,
         c=c,
@@ -714,7 +726,7 @@ def arrays_at(chain: Chain, index: int) -> ChainArrays:
         rigid=np.array([shaft.rigid for shaft in shafts]),
         restitution=np.array([math.nan if s.restitution is None else s.restitution for s in shafts]),
         law=tuple(shaft.contact_law for shaft in shafts),
-        theta0=np.where(np.isnan(angles), _twists(chain, gap, c, Mc), angles),
+        theta0=np.where(np.isnan(angles), _twists(chain, gap, c, pulls), angles),
         permissible=np.array(permissible) * of_shaft,
         torque_ratio=of_shaft,
         efficiency=np.array([shaft.efficiency for shaft in shafts]),
@@ -745,11 +757,11 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
     return found
 
 
-def _twists(chain: Chain, gap: Vector, c: Vector, Mc: Vector) -> Vector:
+def _twists(chain: Chain, gap: Vector, c: Vector, pulls: Vector) -> Vector:
     """Twists of the shafts at the chain's position; those of an unknown one are 0, its middle.
 
     The driving flank is that on which the motor drives the masses behind the shaft. Hanging, each shaft is
-    wound up by the active loads behind it.
+    wound up by the active loads `pulls` behind it.
     """
     if chain.position in ("mid-gap", "unknown"):
         return np.zeros(gap.size)
@@ -757,7 +769,6 @@ def _twists(chain: Chain, gap: Vector, c: Vector, Mc: Vector) -> Vector:
     drives = np.where(np.arange(gap.size) >= motor, 1.0, -1.0)
     if chain.position != "hanging":
         return (0.5 if chain.position == "driving-flank" else -0.5) * drives * gap
-    pulls = np.where([mass.kind == "active" for mass in chain.masses], Mc, 0.0)
     behind = np.cumsum(pulls)[:-1]
     behind[motor:] = np.cumsum(pulls[::-1])[::-1][1 + motor :]
     return np.sign(behind) * drives * (0.5 * gap + np.abs(behind) / c)

@@ -77,20 +77,26 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
     def get(*names: str) -> list[Any]:
         return [math.nan if values.get(name) is None else values[name] for name in names]
 
-    J1, J2, Ms, most, Mc = get(
+    J1, J2, Ms, most, torque = get(
         "motor_inertia", "load_inertia", "starting_torque", "maximum_torque", "load_torque"
     )
+    Mc = torque + values.get("load_friction", 0.0)
     friction, b1, b2 = (values.get(name, 0.0) for name in FRICTIONS)
     target, w1, w2 = get("target_speed", "initial_motor_speed", "initial_load_speed")
-    torque, power, speed = get("rated_torque", "rated_power", "rated_speed")
+    rated, power, speed = get("rated_torque", "rated_power", "rated_speed")
     reactive = values.get("load_kind") == "reactive"
     yield (
         "maximum_torque", "starting_torque", most < Ms,
         "the largest torque must not be below {other}; raise it, or leave it out",
     )  # fmt: skip
     yield (
-        "starting_torque", "load_torque", Ms <= Mc,
+        "starting_torque", "load_torque", Ms <= torque,
         "the starting torque cannot move the load against {other}; raise the one or lower the other",
+    )  # fmt: skip
+    yield (
+        "starting_torque", "load_friction", (Ms > torque) & (Ms <= Mc),
+        "the starting torque cannot move the load against its torque and {other}; raise the one or lower the "
+        "other",
     )  # fmt: skip
     push = Ms - friction
     yield (
@@ -105,11 +111,11 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
             "at {other} this takes more torque than the motor has left; lower the one or the other",
         )  # fmt: skip
     yield (
-        "load_torque", "load_kind", reactive & (Mc < 0.0),
+        "load_torque", "load_kind", reactive & (torque < 0.0),
         'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"',
     )  # fmt: skip
     yield (
-        "rated_torque", "rated_power", abs(torque * speed - power) > 0.05 * power,
+        "rated_torque", "rated_power", abs(rated * speed - power) > 0.05 * power,
         "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong",
     )  # fmt: skip
     yield (
@@ -118,8 +124,13 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
     )  # fmt: skip
     permitted, longest, starts = get("permissible_torque", "permissible_start_time", "starts_per_hour")
     yield (
-        "permissible_torque", "load_torque", abs(Mc) >= permitted,
+        "permissible_torque", "load_torque", abs(torque) >= permitted,
         "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft",
+    )  # fmt: skip
+    yield (
+        "permissible_torque", "load_friction", (abs(torque) < permitted) & (Mc >= permitted),
+        "at constant speed the shaft already carries the load torque and {other}; give the permissible peak, "
+        "at the motor shaft",
     )  # fmt: skip
     yield (
         "starts_per_hour", "permissible_start_time", longest * starts > 3600.0,

@@ -25,9 +25,22 @@ class TwoMasses(NamedTuple):
     travel: float  # rad
     Ms: float  # N m, less the friction of the motor
     Mc: float  # N m
-    active: bool
+    active: bool  # whether a part of Mc acts always
+    friction: float  # the rest of Mc, N m, Coulomb friction
     speed: float  # rad/s
     ratio: float  # turns of the motor for one of the output
+
+    @property
+    def falling(self) -> float:
+        """The torque that moves the load while the gap is open, in size, N m: 0 where friction holds it."""
+        return max(abs(self.Mc - self.friction) - self.friction, 0.0)
+
+    @property
+    def kind(self) -> str:
+        """The parts of the load torque in words: "active", "reactive", or both with their size."""
+        if self.active and self.friction > 0.0:
+            return f"{self.Mc - self.friction:.4g} N m active and {self.friction:.4g} N m friction"
+        return "active" if self.active else "reactive"
 
 
 def doubts(machine: Any) -> list[str]:
@@ -106,7 +119,7 @@ def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
     mean = (of.Ms * of.J2 + of.J1 * of.Mc) / (of.J1 + of.J2)
     if not mean > 0.0:
         return math.nan
-    a = of.Ms / of.J1 + (of.Mc / of.J2 if of.active else 0.0)
+    a = of.Ms / of.J1 + math.copysign(of.falling, of.Mc - of.friction) / of.J2
     decay = math.exp(-0.25 * math.pi * of.d / (J * Omega))
     return 1.0 + decay * math.sqrt(1.0 + of.c * J * 2.0 * a * of.travel / mean**2)
 
@@ -126,7 +139,7 @@ def _not_the_rated_torque(motor: Any) -> Iterator[str]:
 def _nothing_holds(machine: Any) -> Iterator[str]:
     """The start begins in a state that cannot last, and nobody said that it does."""
     two = machine.lumped
-    falls = two.active and two.Mc != 0.0 and machine.brake == "none"
+    falls = two.falling > 0.0 and machine.brake == "none"
     at_rest = machine.initial_load_speed == machine.initial_motor_speed == 0.0
     if falls and at_rest and not machine.position_given:
         yield (

@@ -42,14 +42,24 @@ SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
 library = Library("softstart.drive", "a drive", "drives")
 
 
+def _rests(values: Mapping[str, Any]) -> Any:
+    """Whether friction holds the load of these parameters while the gap is open: a bool, or an array."""
+    friction = values.get("load_friction", 0.0)
+    held = (friction > 0.0) & (abs(values.get("load_torque", math.inf)) <= friction)
+    return values.get("load_kind") == "reactive" or held
+
+
 class Drive(ParameterSet):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
     Each quantity is a number in SI or a string with a unit; many drives are `softstart.records`. Angles are
     in rad at the motor shaft. A drive is frozen; equal drives hash alike.
 
+    The load torque has an active part, which acts always, and a reactive one, Coulomb friction: `load_torque`
+    is of the `load_kind`, `load_friction` is friction besides it. Forward motion takes the sum, Mc.
+
     Without `start_position`, an active load behind a brake hangs, a reversal begins on the opposite flank,
-    and a reactive load at rest with a gap is at an unknown position: friction holds it wherever the last stop
+    and a load at rest that its friction holds, with a gap, is at an unknown position: wherever the last stop
     left it. Any other start begins in mid-gap.
 
     Parameters
@@ -152,6 +162,8 @@ class Drive(ParameterSet):
         '"7.16 N*m"', symbol="Mc")
     load_kind: LoadKind = parameter("load.kind", "", "kind of the load torque", '"active"', default="active",
         choices=get_args(LoadKind))
+    load_friction: Number = parameter("load.friction", "N*m",
+        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=0.0)
     load_viscous_friction: Number = parameter("load.viscous_friction", "N*m*s/rad",
         "viscous friction of the load at the motor shaft", '"0.02 N*m*s/rad"', "0 or more", default=0.0,
         symbol="b2")
@@ -203,16 +215,24 @@ class Drive(ParameterSet):
         if reversal and values.get("target_speed") is not None:
             found = {name: -values["target_speed"] for name in SPEEDS if name not in given}
         if "start_position" not in given:
-            hangs = values.get("brake") == "motor" and values.get("load_kind") == "active"
+            rests = np.all(_rests(values))
+            hangs = values.get("brake") == "motor" and not rests
             gap = np.asarray(values.get("gap", 0.0))
-            anywhere = values.get("load_kind") == "reactive" and np.any(gap > 0.0)
+            anywhere = rests and np.any(gap > 0.0)
             moves = any(np.ndim(values.get(name, 0.0)) or values.get(name, 0.0) != 0.0 for name in SPEEDS)
             at_rest = "unknown" if anywhere and not moves else "mid-gap"
             found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else at_rest
         return found
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
-        yield from contradictions({**values, **self._derived(values)}, self.PARAMETERS, wording)
+        derived = self._derived(values)
+        yield from contradictions({**values, **derived}, self.PARAMETERS, wording)
+        rests = np.asarray(_rests(values))
+        if "start_position" in derived and rests.any() != rests.all():
+            label = wording.label(self.PARAMETERS["start_position"])
+            yield wording.sentence(
+                f"{label} is missing", "friction holds some of these loads at rest and others not; give it"
+            )
         yield from contradicting_limits(values, self.PARAMETERS, wording)
         yield from wrong_units(values, self.PARAMETERS["units"], wording)
 
@@ -313,8 +333,46 @@ class Drive(ParameterSet):
 
     @property
     def Mc(self) -> float:
-        """Torque of the load, N m."""
-        return self.load_torque
+        """Torque of the load against forward motion, N m: `load_torque` and `load_friction`.
+
+        >>> Drive.load("crane-4amtkf").replace(load_friction="0.84 N*m").Mc
+        8.0
+        """
+        return self.load_torque + self.load_friction
+
+    @property
+    def active_torque(self) -> float:
+        """The part of Mc that acts always, N m: backwards if positive, whatever the motion."""
+        return self.load_torque if self.load_kind == "active" else 0.0 * self.load_torque
+
+    @property
+    def reactive_torque(self) -> float:
+        """The part of Mc that is Coulomb friction, N m: holds the load at rest, opposes any motion.
+
+        >>> belt = Drive.load("conveyor-11kw").replace(load_kind="active", load_friction="5 N*m")
+        >>> belt.reactive_torque, belt.Mc - belt.active_torque == belt.reactive_torque
+        (5.0, True)
+        """
+        return self.load_friction + (0.0 if self.load_kind == "active" else self.load_torque)
+
+    @property
+    def falling_torque(self) -> float:
+        """With what torque the load leaves its rest while the gap is open, N m: 0 where friction holds it.
+
+        Positive backwards: the active torque less the friction.
+
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> [crane.replace(load_friction=one).falling_torque for one in (0.0, 2.16, 7.16)]
+        [7.16, 5.0, 0.0]
+        """
+        active: Any = self.active_torque
+        falling = np.copysign(np.maximum(np.abs(active) - self.reactive_torque, 0.0), active)
+        return falling if falling.ndim else float(falling)
+
+    @property
+    def rests(self) -> Any:
+        """Whether friction holds the load at rest while the gap is open; columns have as many answers."""
+        return _rests(vars(self))
 
     @property
     def Ms(self) -> float:
@@ -433,7 +491,8 @@ class Drive(ParameterSet):
         return TwoMasses(
             J1=self.J1, J2=self.J2, c=self.c, d=self.d, gap=self.gap, travel=max(0.0, *travels),
             Ms=self.Ms - self.motor_friction, Mc=self.Mc, active=self.load_kind == "active",
-            speed=self.target_speed, ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
+            friction=self.reactive_torque, speed=self.target_speed,
+            ratio=math.nan if self.gear_ratio is None else self.gear_ratio,
         )  # fmt: skip
 
     @property
@@ -465,7 +524,9 @@ class Drive(ParameterSet):
     @property
     def identity(self) -> dict[str, object]:
         """What a summary of a start says of the machine."""
-        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": self.load_kind}
+        both = self.load_kind == "active" and np.any(self.load_friction > 0.0)
+        kind = "active and reactive" if both else self.load_kind
+        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": kind}
 
     def columns_of(self, states: Mapping[str, Vector]) -> dict[str, Vector]:
         """The states of a start under the headings of a table."""
@@ -526,8 +587,9 @@ class Drive(ParameterSet):
     def theta0(self) -> float:
         """Twist phi1 - phi2 at the start, rad: that of `start_position` in this gap.
 
-        A load that hangs has wound up the shaft by Mc/c beyond the flank that it rests on. Raises
-        `InputError` for an unknown position, which is not one but three (`positions`).
+        A load that hangs has wound up the shaft by its active torque over c beyond the flank that it rests
+        on, as if friction carried nothing of it. Raises `InputError` for an unknown position, which is not
+        one but three (`positions`).
 
         >>> crane = Drive.load("crane-4amtkf")
         >>> [crane.replace(start_position=one).theta0 for one in ("opposite-flank", "mid-gap", 0.1)]
@@ -542,7 +604,8 @@ class Drive(ParameterSet):
                 f"start_position = {show(where)}: this question takes one position; give {wanted}."
             )
         if where == "hanging":
-            angle = np.copysign(0.5 * self.gap + np.abs(self.Mc) / self.c, self.Mc)
+            pull = self.active_torque
+            angle = np.copysign(0.5 * self.gap + np.abs(pull) / self.c, pull)
             return angle if angle.ndim else float(angle)
         return {"mid-gap": 0.0, "driving-flank": 0.5, "opposite-flank": -0.5}[where] * self.gap
 

@@ -38,9 +38,9 @@ FIELDS: Mapping[str, str] = {
     "": "units name",
     "motor": "starting_torque inertia torque_lag maximum_torque minimum_torque torque_rate computing_delay "
     "friction viscous_friction encoder_lines torque_noise",
-    "mass": "inertia torque",
+    "mass": "inertia torque friction",
     "shaft": "gap stiffness damping damping_ratio contact_law permissible_torque",
-    "load": "inertia torque kind viscous_friction",
+    "load": "inertia torque kind friction viscous_friction",
     "start": "target_speed position brake release initial_load_speed",
     "limits": "shaft_torque start_time starts_per_hour life fatigue.slope fatigue.torque fatigue.cycles",
 }

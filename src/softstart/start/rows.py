@@ -170,7 +170,7 @@ def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
     named = made.machines.view(at.MACHINE)[:, 0]
     masses, shaft = made.masses.view(at.MASS)[..., 0], made.shafts.view(at.SHAFT)[:, 0, 0]
     J1, J2 = column(drive.motor_inertia), column(drive.load_inertia)
-    c, Mc, Ms = column(drive.stiffness), column(drive.load_torque), column(drive.starting_torque)
+    c, Mc, Ms = column(drive.stiffness), column(drive.Mc), column(drive.starting_torque)
     friction, b1, b2 = map(column, drive.frictions)
     w1, w2 = column(drive.initial_motor_speed), column(drive.initial_load_speed)
     target = column(drive.target_speed)
@@ -181,9 +181,7 @@ def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
     for i, (J, ground, w0) in enumerate(((J1, b1, w1), (J2, b2, w2))):
         masses["J"][:, i], masses["ground"][:, i], masses["w0"][:, i] = J, ground, w0
     masses["friction"][:, 0] = friction
-    # a reactive load without torque never sticks: it is the same as an active one
-    reactive = (Mc > 0.0) & (drive.load_kind == "reactive")
-    masses["Mc"][:, 1], masses["active"][:, 1] = np.where(reactive, Mc, 0.0), np.where(reactive, 0.0, Mc)
+    masses["Mc"][:, 1], masses["active"][:, 1] = column(drive.reactive_torque), column(drive.active_torque)
     shaft["c"], shaft["d"], shaft["half"] = c, column(drive.damping), 0.5 * column(drive.gap)
     shaft["law"], shaft["eta"] = LAWS[drive.contact_law], 1.0
     shaft["theta0"] = column(drive.theta0)
@@ -202,9 +200,8 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     made = blank((), count, len(curved))
     named = made.machines.view(at.MACHINE)[:, 0]
     masses, shafts = made.masses.view(at.MASS)[0, :, 0], made.shafts.view(at.SHAFT)[0, :, 0]
-    reactive = arrays.reactive & (arrays.Mc > 0.0)
     masses["J"], masses["ground"], masses["w0"] = arrays.J, arrays.d_ground, arrays.w0
-    masses["Mc"], masses["active"] = np.where(reactive, arrays.Mc, 0.0), np.where(reactive, 0.0, arrays.Mc)
+    masses["Mc"], masses["active"] = arrays.friction, arrays.active
     for curve, (i, mass) in zip(made.curves[0].view(at.CURVE)[:, 0], curved, strict=True):
         ratio = float(arrays.speed_ratio[i])
         at_points, torques, by_angle = mass.curve  # type: ignore[misc]

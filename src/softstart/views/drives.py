@@ -35,7 +35,7 @@ def drive_lines(machine: Any) -> list[str]:
         parts = [
             f"  motor  J1 = {J1} kg m2{torque}",
             f"  shaft  c = {c} N m/rad, gap = {gap} rad, contact law {machine.contact_laws[0]}",
-            f"  load   J2 = {J2} kg m2, Mc = {Mc} N m, {'active' if two.active else 'reactive'}",
+            f"  load   J2 = {J2} kg m2, Mc = {Mc} N m, {two.kind}",
             *([named] if masses != ("motor", "load") else []),
         ]
     else:

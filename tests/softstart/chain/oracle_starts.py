@@ -79,6 +79,7 @@ def built(given: Given, motor: Motor, target: float) -> Chain:
     masses, shafts = [], []
     for i in range(given.J.size):
         own = {"torque": float(given.Mc[i]), "kind": "reactive" if given.reactive[i] else "active"}
+        own["friction"] = float(np.broadcast_to(given.friction, given.J.shape)[i])
         if i in given.curves:
             points, torques, by_angle = given.curves[i]
             own |= {"curve_angle" if by_angle else "curve_speed": list(points), "curve_torque": list(torques)}

@@ -40,7 +40,7 @@ FIELDS = {
     "Mc": "load_torque", "kind": "load_kind", "law": "contact_law", "theta0": "start_position",
     "lag": "torque_lag", "rate": "torque_rate", "target": "target_speed", "friction": "motor_friction",
     "w1_0": "initial_motor_speed", "w2_0": "initial_load_speed",
-    "b1": "motor_viscous_friction", "b2": "load_viscous_friction",
+    "b1": "motor_viscous_friction", "b2": "load_viscous_friction", "load_friction": "load_friction",
 }  # fmt: skip
 
 
@@ -51,7 +51,7 @@ def drive_of(drawn: dict[str, Any]) -> Drive:
     torques = [u for _, u, *_ in pieces]
     torques += [u + (end - t) * sum(slope) for (t, u, *slope), end in zip(pieces, ends, strict=True)]
     limits = {
-        "starting_torque": max(*torques, 1.1 * drawn["Mc"], 1e-09),
+        "starting_torque": max(*torques, 1.1 * (drawn["Mc"] + drawn.get("load_friction", 0.0)), 1e-09),
         "minimum_torque": min(0.0, *torques),
     }
     fields = {FIELDS[name]: value for name, value in drawn.items() if name in FIELDS}
@@ -96,6 +96,27 @@ def case_with_friction(seed: int) -> dict[str, Any]:
 def test_friction_of_motor_and_load(block: int) -> None:
     for seed in range(20_000 + block * DRIVES_PER_BLOCK, 20_000 + (block + 1) * DRIVES_PER_BLOCK):
         compare_with_oracle(case_with_friction(seed), seed)
+
+
+def case_of_both_parts(seed: int) -> dict[str, Any]:
+    """A random start with an active load torque, some driving, and friction of 0.05 to 2 times that."""
+    drawn, rng = case(seed), np.random.default_rng((seed, 29))
+    Mc = drawn["Mc"] / 3.0
+    most = max(u for _, u in drawn["torque_pieces"])
+    drives = rng.random() < 0.4 and Mc * drawn["J1"] / drawn["J2"] < 0.5 * most  # the mean torque is above 0
+    sign = -1.0 if drives else 1.0
+    return drawn | {
+        "kind": "active",
+        "Mc": sign * Mc,
+        "load_friction": Mc * float(10 ** rng.uniform(-1.3, 0.3)),
+    }
+
+
+@pytest.mark.hypothesis
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_a_load_with_an_active_and_a_reactive_part(block: int) -> None:
+    for seed in range(40_000 + block * DRIVES_PER_BLOCK, 40_000 + (block + 1) * DRIVES_PER_BLOCK):
+        compare_with_oracle(case_of_both_parts(seed), seed)
 
 
 SHAFTS_WITH_RATES_APART: list[dict[str, Any]] = [
