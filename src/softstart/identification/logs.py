@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from softstart.arrays import Vector
@@ -36,14 +36,21 @@ MOST_ROWS: Final = 1000  # samples of angle or speed that the fit looks at
 LEAST_COUNT: Final = 1e-5  # of the largest difference: a smaller step is rounding
 HOLE: Final = 20.0  # typical sample periods without a sample
 TURN: Final = 2.0 * math.pi
+WIDTHS: Final = range(8, 65)  # bits of a counter
+TICKS: Final = (1.0, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of a clock, s
+DAY: Final = 86400.0
+COARSE: Final = 0.01  # of the duration: stamps rounded to more do not tell the sample period
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Log:
     """What an inverter logged of one start: the motor's torque and its angle or speed.
 
-    The log begins while the drive stands still. An angle that wraps at a full turn is unwrapped. A step that
-    all differences of the values are multiples of is taken for what the encoder, or the log, rounds to.
+    The log begins while the drive stands still; angle and clock may begin anywhere. An angle that wraps, at
+    full turns or where a counter overflows, is unwrapped; a clock too. A step that all differences of the
+    values are multiples of is taken for what the encoder, or the log, rounds to. A sample that is there twice
+    counts once; other samples with one time stamp are spread evenly, if stamps of even samples would be
+    rounded like that.
 
     Parameters
     ----------
@@ -63,7 +70,8 @@ class Log:
     ------
     InputError
         For times that do not rise, too few samples, a hole, a motor that turns at the beginning, a torque or
-        a motion that is zero throughout, and a torque whose sign is not that of the motion.
+        a motion that is zero throughout, an angle that jumps, and a torque whose sign is not that of the
+        motion.
 
     Examples
     --------
@@ -89,6 +97,7 @@ class Log:
     name: str
     count: float  # rad or rad/s; 0 where none is seen
     notes: tuple[str, ...] = field(default=())
+    sign: float = 1.0  # -1 where torque and motion were turned round
 
     def __init__(
         self,
@@ -113,17 +122,17 @@ class Log:
             if key != kind and not np.isfinite(column).all():
                 i = int(np.argmin(np.isfinite(column)))
                 raise InputError(f"{name}: the {key} of sample {i + 1} is missing; cut the log there.")
+        notes: list[str] = []
+        columns["time"] = _clock(columns["time"], notes)
+        columns = _even(_once(columns, notes), notes)
         seconds, torques, values = columns.values()
         _check_times(seconds, name)
-        notes: list[str] = []
         seen = np.isfinite(values)
-        jumps = float(np.abs(np.diff(values[seen])).max(initial=0.0))
-        if kind == "angle" and jumps >= 0.6 * TURN and float(np.ptp(values[seen])) <= 1.001 * TURN:
-            notes.append("the angle wraps at a full turn and was unwrapped")
-            values[seen] = np.unwrap(values[seen])
+        if kind == "angle":
+            values[seen] = _continuous(seconds[seen], values[seen], name, notes)
         vars(self).update(
             time=seconds, torque=torques, values=values, kind=kind, torque_is=torque_is, name=name,
-            count=_count(values),
+            count=_count(np.diff(values[seen])),
         )  # fmt: skip
         self._check_motion()
         every = math.ceil(int(seen.sum()) / MOST_ROWS)
@@ -185,6 +194,15 @@ class Log:
         """The first samples of the log, as they are."""
         return self.changed(time=self.time[:count], torque=self.torque[:count], values=self.values[:count])
 
+    def forward(self) -> Log:
+        """The log with torque and motion turned round, if the motor first turns backward in it."""
+        if float(np.sum(self.moved[0][self._early])) >= 0.0:
+            return self
+        told = "the drive first turns backward, and torque and motion were both turned round"
+        return self.changed(
+            torque=-self.torque, values=-self.values, sign=-self.sign, notes=(*self.notes, told)
+        )
+
     def summed(self, lines: float) -> Log:
         """The angle, if the speed is the difference of the counts of an encoder with so many lines.
 
@@ -193,7 +211,8 @@ class Log:
         """
         steps = np.diff(self.time)
         period = float(np.median(steps))
-        even = float(np.ptp(steps)) <= 1e-6 * period and bool(np.isfinite(self.values).all())
+        rounding = 4.0 * np.spacing(np.max(np.abs(self.time)))  # of a clock that counts from 1970
+        even = float(np.ptp(steps)) <= 1e-6 * period + rounding and bool(np.isfinite(self.values).all())
         counts = self.count * period / TURN * 4.0 * lines
         if self.kind != "speed" or not even or abs(counts - 1.0) > 0.01:
             return self
@@ -217,6 +236,16 @@ class Log:
             speed = np.gradient(speed, self.time[seen])
         return speed, cumulative_trapezoid(self.torque, self.time, initial=0.0)[seen]
 
+    @property
+    def _early(self) -> slice:
+        """The samples of the motion before half the impulse and half the speed.
+
+        Later a motor that hits the flank of a load at rest may fly back.
+        """
+        speed, impulse = map(np.abs, self.moved)
+        early = (impulse <= 0.5 * np.max(impulse)) & (speed <= 0.5 * np.max(speed))
+        return slice(0, max(4, int(np.argmin(early)) if not early.all() else early.size))
+
     def _check_motion(self) -> None:
         name, kind = self.name, self.kind
         seen = np.isfinite(self.values)
@@ -238,9 +267,7 @@ class Log:
                 f"{name}: the motor turns at {first:.3g} rad/s where the log begins; begin the log at "
                 "standstill."
             )
-        # before half the impulse and half the speed: a motor that hits the flank of a load at rest flies back
-        early = (np.abs(impulse) <= 0.5 * np.max(np.abs(impulse))) & (np.abs(speed) <= 0.5 * fastest)
-        share = slice(0, max(4, int(np.argmin(early)) if not early.all() else early.size))
+        share = self._early
         if float(np.sum(speed[share] * impulse[share])) < 0.0:
             word, side = ("rises", "below") if float(speed[share][-1]) > 0.0 else ("falls", "above")
             raise InputError(
@@ -267,13 +294,108 @@ def _check_times(time: Vector, name: str) -> None:
         )
 
 
-def _count(values: Vector) -> float:
-    """The step that all differences of the values are multiples of; 0 if there is none.
+def _once(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
+    """The columns without samples that repeat the one before, stamp and all."""
+    rows = np.array(list(columns.values()))
+    again = np.zeros(rows.shape[1], dtype=bool)
+    again[1:] = np.all((rows[:, 1:] == rows[:, :-1]) | np.isnan(rows[:, 1:] + rows[:, :-1]), axis=0)
+    if not again.any():
+        return columns
+    count = int(again.sum())
+    notes.append(f"{count} sample{'s' * (count > 1)} repeated the one before and {_were(count)} left out")
+    return {key: column[~again] for key, column in columns.items()}
 
-    >>> _count(np.array([0.0, 0.7, 2.1, 3.5, 3.5, 9.1, 14.0, 14.7, 16.8, 17.5, 18.9])).__round__(12)
+
+def _were(count: int) -> str:
+    return "were" if count > 1 else "was"
+
+
+def _clock(time: Vector, notes: list[str]) -> Vector:
+    """Times that go on where a counter of ticks overflowed, or a clock passed midnight."""
+    back = np.diff(time) < -0.5 * float(np.ptp(time)) if time.size > 2 else np.zeros(0, dtype=bool)
+    if int(back.sum()) != 1:
+        return time
+    others = np.diff(time)[~back]
+    width = _width(time, back, TICKS, 0.5 * float(np.median(others)), DAY)
+    if width is None:
+        return time
+    notes.append(f"the clock wraps at {width:.7g} s and was unwrapped")
+    return time + width * np.append(0, np.cumsum(back))
+
+
+def _even(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
+    """Columns whose samples share time stamps, spread over even times that are rounded to such stamps."""
+    time = columns["time"]
+    steps = np.diff(time)
+    if np.all(steps > 0.0) or np.any(steps < 0.0) or not steps.any():
+        return columns
+    stamp, index = _count(steps), np.arange(time.size)
+    period, start = np.polyfit(index, time - time[0], 1)
+    even = time[0] + start + period * index
+    # even times that were rounded, down or to the nearest, lie within a stamp about a line
+    if not 0.0 < stamp < COARSE * (time[-1] - time[0]) or float(np.ptp(even - time)) > 1.25 * stamp:
+        return columns
+    notes.append(
+        f"the time stamps are rounded to {stamp:.4g} s, and several samples share one: they were spread "
+        f"evenly, one each {period:.4g} s"
+    )
+    return columns | {"time": even}
+
+
+def _continuous(time: Vector, values: Vector, name: str, notes: list[str]) -> Vector:
+    """An angle without the jumps of a counter that overflows, or of an encoder that counts within a turn."""
+    steps = np.diff(values)
+    jumps = np.abs(steps) > 0.5 * float(np.ptp(values))
+    if not jumps.any():
+        return values
+    count = _count(steps[~jumps])
+    width = _width(values, jumps, (count,), 2.5 * count, TURN)
+    if width is None:
+        i = int(np.argmax(jumps))
+        raise InputError(
+            f"{name}: the angle jumps from {values[i]:.6g} to {values[i + 1]:.6g} rad at {time[i + 1]:g} s, "
+            "and neither full turns nor the overflow of a counter explain it; cut the log there, or make the "
+            "angle continuous."
+        )
+    turns = width / TURN
+    what = f"{turns:.0f} full turns" if abs(turns - round(turns)) < 1e-5 else f"{width:.7g} rad"
+    notes.append(f"the angle wraps at {'a full turn' if round(turns, 5) == 1 else what} and was unwrapped")
+    return np.unwrap(values, period=width)
+
+
+def _width(
+    values: Vector, jumps: NDArray[np.bool_], units: Sequence[float], room: float, other: float
+) -> float | None:
+    """The range of a counter that overflows at these jumps: a power of two of a unit, or times `other`.
+
+    It is a jump and the step that stood in its place, which is that of the neighbours, to within `room` and
+    the difference of those neighbours; and it holds all values.
+
+    >>> counts = np.array([65000.0, 65300.0, 64.0, 364.0, 664.0])
+    >>> _width(counts, np.array([False, True, False, False]), [1.0], 2.5, 360.0)
+    65536.0
+    """
+    steps, places = np.diff(values), np.flatnonzero(~jumps)
+    if not places.size:
+        return None
+    at = np.flatnonzero(jumps)
+    nearest_before = steps[places[np.maximum(np.searchsorted(places, at) - 1, 0)]]
+    nearest_after = steps[places[np.minimum(np.searchsorted(places, at), places.size - 1)]]
+    each = np.abs(steps[at] - 0.5 * (nearest_before + nearest_after))
+    width = float(np.median(each))
+    room = max(room, float(np.median(np.abs(nearest_after - nearest_before))), 1e-6 * width)
+    known = [*(unit * 2.0**bits for unit in units for bits in WIDTHS), other * max(1, round(width / other))]
+    fits = [one for one in known if abs(one - width) <= room and one > (1.0 - 1e-9) * float(np.ptp(values))]
+    return min(fits, key=lambda one: abs(one - width), default=None)
+
+
+def _count(steps: Vector) -> float:
+    """The step that all of these are multiples of; 0 if there is none.
+
+    >>> _count(np.diff([0.0, 0.7, 2.1, 3.5, 3.5, 9.1, 14.0, 14.7, 16.8, 17.5, 18.9])).__round__(12)
     0.7
     """
-    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    steps = np.abs(steps)
     largest = float(steps.max(initial=0.0))
     steps = steps[steps > 1e-9 * largest]
     if steps.size < 8:

@@ -65,7 +65,7 @@ class LogModel:
     1/sqrt(block): independent errors of the samples have the same standard deviation as these.
     """
 
-    log: Log
+    log: Log  # an angle counted from its first sample, so that its zero is nowhere in the fit
     guess: Drive
     drive: Drive  # the guess without limits
     dead_time: float
@@ -80,6 +80,8 @@ class LogModel:
         wide = drive.replace(**unlimited(log), brake="none")
         block = max(1, math.ceil(log.time.size / most_blocks))
         rows = np.isfinite(log.values)
+        if log.kind == "angle":
+            log = log.changed(values=log.values - log.values[rows][0])
         values = log.values[rows]
         if log.kind == "angle" and log.count:
             values, variance = edges(log.time[rows], values, log.count)

@@ -104,7 +104,8 @@ def identify(
     """
     drive = load_machine(drive) if isinstance(drive, str) else drive
     machine, drive = drive, reduced_drive(drive)
-    read = [one.summed(float(drive.encoder_lines)) for one in ([logs] if isinstance(logs, Log) else logs)]
+    each = [logs] if isinstance(logs, Log) else logs
+    read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in each]
     if not read or searches < 1:
         raise InputError("logs, searches: there is none; give a log and a whole number of 1 or more.")
     asked, moving = _free(free, drive, read)
@@ -148,6 +149,18 @@ def identify(
         notes=tuple(notes),
         residuals=tuple(fitter.left(best)),
     )
+
+
+def _directed(log: Log, drive: Drive) -> Log:
+    """The log as the drive counts: where both directions are alike, the first one is forward."""
+    turned = log.forward()
+    if turned is log or drive.load_kind == "reactive" or float(drive.Mc) == 0.0:
+        return turned
+    told = (
+        "the drive first turns backward, where the active load drives it; if the log counts the other way "
+        "than the drive file, turn both round: --columns torque=-NAME,angle=-NAME"
+    )
+    return log.changed(notes=(*log.notes, told.replace("angle", log.kind)))
 
 
 def reduced_drive(machine: Any) -> Drive:
@@ -357,7 +370,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         each = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
         signals = model.signals(each, spot.error)[:, model.rows] / model.root
         shapes = [(one - signals[0]) / step for one, step in zip(signals[1:], steps.values(), strict=True)]
-        shapes.append(math.sqrt(model.block) * spot.response.sum(axis=1))
+        shapes.append(model.log.sign * math.sqrt(model.block) * spot.response.sum(axis=1))
         logs.append(np.array(shapes) @ spot.rotation.T / np.sqrt(spot.variance(best.sizes)))
     sure = [(SURE, "", 0.0, 0.0)]
     for name, shape in zip((*steps, "offset"), np.hstack(logs), strict=True):

@@ -127,7 +127,10 @@ class Unknown:
 def unknowns_of(
     names: Sequence[str], drive: Drive, logs: Sequence[Log], moving: Sequence[bool]
 ) -> tuple[Unknown, ...]:
-    """The parameters that all logs share, then the position of each log that is `moving`, then offsets."""
+    """The parameters that all logs share, then the position of each log that is `moving`, then offsets.
+
+    An offset is that of an angle counted from its first sample, as `LogModel` has it.
+    """
     # the unit of a friction takes a tenth of the torque that accelerates, if viscous at the target speed
     torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
     found = []
@@ -139,7 +142,7 @@ def unknowns_of(
             continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
             value = 0.04 * math.sqrt(float(drive.c * drive.J1 * drive.J2 / (drive.J1 + drive.J2)))
-        value = value or float(np.median(np.diff(logs[0].time)))
+        value = value or min(float(np.median(np.diff(one.time))) for one in logs)
         reach = 100.0 if name in LESS_KNOWN else 3.0 * FACTOR
         if power is None:
             middle, end, sign = math.log(abs(value)), math.log(reach), math.copysign(1.0, value)
@@ -151,9 +154,8 @@ def unknowns_of(
     found += [Unknown(POSITION, "position", half, 0.0, 1.0, log=i) for i, one in enumerate(moving) if one]
     for i, log in enumerate(logs):
         if log.kind == "angle":
-            first = -float(log.values[np.isfinite(log.values)][0])
             room = max(20.0 * log.count, 100.0 * log.scale)
-            found.append(Unknown("offset", "offset", first, first - room, first + room, log=i))
+            found.append(Unknown("offset", "offset", 0.0, -room, room, log=i))
     return tuple(found)
 
 
