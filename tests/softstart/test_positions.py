@@ -7,10 +7,11 @@ import re
 
 import numpy as np
 import pytest
+from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_brake import HOIST
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, compare, records, simulate
+from softstart import Drive, InputError, compare, formulas, records, simulate
 from softstart.chain import reduce_chain
 from softstart.drive import UNKNOWN_POSITIONS
 
@@ -108,6 +109,36 @@ def test_unknown_is_the_worst_of_three(name: str) -> None:
             assert np.array_equal(getattr(run, figure), worst, equal_nan=True), figure
         assert run.k_dyn == three[run.position].k_dyn
         assert run.summary()["positions"]["worst"] == run.position
+
+
+def test_every_figure_of_an_unknown_position_is_the_largest() -> None:
+    """By hand: the flanks meet with sqrt(2 a gap) from the far flank, and K_dyn of that contact is (18).
+
+    The torque peak is largest from the far flank, but the start from mid-gap takes longest: the excess of a
+    demand that rises for good, 20 N m + 300 N m/s beyond 64 N m, belongs to that.
+    """
+    drive = CRANE.replace(start_position="unknown")
+    direct, figures = simulate(drive, "direct"), simulate([drive], "direct")
+    v = math.sqrt(2.0 * (62.0 / 0.035 + 7.16 / 0.175) * 0.5)
+    reduced, mean = 0.035 * 0.175 / 0.21, formulas.mean_shaft_torque(62.0, 0.035, 0.175, 7.16)
+    first = 1.0 + math.sqrt(1.0 + 368.465 * reduced * v**2 / mean**2)
+    rising = Pieces(pieces=((0.0, 20.0, 300.0),), end=10.0)
+    run, clipped = simulate(drive, rising), simulate([drive], rising)
+    ends = {name: one.end_time for name, one in run.positions.items()}
+    assert run.position == "opposite-flank"
+    assert max(ends, key=lambda name: ends[name]) == "mid-gap"
+    excess, over = 20.0 + 300.0 * ends["mid-gap"] - 64.0, ends["mid-gap"] - 44.0 / 300.0
+    for single, many, exact in (
+        (direct.impact_speed, figures.impact_speed, v),
+        (direct.k_dyn_first_contact, figures.k_dyn_first_contact, first),
+        (run.clipped.excess, clipped.torque_excess, excess),
+        (run.clipped.time, clipped.torque_excess_time, over),
+        (run.start_time, clipped.start_time, ends["mid-gap"] - drive.elastic_period),
+    ):
+        assert [single, many.item()] == pytest.approx([exact, exact], rel=1e-9)
+    damped = simulate(drive.replace(damping=1.0), "direct", 2.0)
+    each = [one.settling_time() for one in damped.positions.values()]
+    assert damped.settling_time() == max(each) > min(each)
 
 
 def test_a_reversal_is_one_word() -> None:

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 import subprocess
 import sys
 from decimal import Decimal
@@ -157,6 +158,20 @@ def test_ordinary_units_are_those_of_pint(monkeypatch):
         assert to_si(f"1 {written}", unit) == factor
     for unit in set(QUANTITIES) - {"1"}:
         assert to_si(f"0.37 {unit}", unit) == to_si(f"0.37 ({unit})", unit) == 0.37
+
+
+def test_every_unit_has_the_size_that_pint_has_by_itself():
+    """In its own list, where angles have no dimension and the base unit of mass is the kilogram."""
+    theirs = pint.UnitRegistry()
+    called = {"PS": "metric_horsepower", "kp": "kgf", "h": "hour"} | dict.fromkeys(("U", "r", "rev"), "turn")
+    lines = [line for line in quantities._DEFINITIONS.splitlines() if "- =" not in line]
+    names = {name for line in lines for name in re.findall(r"[^\W\d]\w*(?= =|$)", line)}
+    assert len(names) > 50
+    for name in names | set(quantities._USUAL.split()):
+        size, dimensions = quantities.read_unit(name)
+        exact = theirs.Quantity(1.0, called.get(name, name)).to_base_units().magnitude
+        assert size / 1000.0 ** dict(dimensions).get("[mass]", 0.0) == pytest.approx(exact, rel=1e-12), name
+    assert to_si("3600 arcsec", "rad") == to_si("60 arcmin", "rad") == pytest.approx(math.pi / 180, rel=1e-15)
 
 
 # each can be read in two ways, or has a mark too many

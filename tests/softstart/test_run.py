@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
 from softstart import Drive, InputError, Run, SimulationError, Status, formulas, records, simulate
@@ -70,6 +71,39 @@ def test_settling_of_a_damped_drive() -> None:
     assert math.isnan(simulate(CRANE, "direct", until=1.0).settling_time())
     with pytest.raises(InputError, match="band = 0"):
         run.settling_time(0.0)
+
+
+def test_the_torque_is_settled_for_one_elastic_period_at_least() -> None:
+    settled = simulate(DAMPED, "direct", until=2.0).settling_time(0.1)
+    for periods, found in ((1.01, settled), (0.99, math.nan)):
+        short = simulate(DAMPED, "direct", until=settled + periods * DAMPED.elastic_period)
+        assert short.settling_time(0.1) == pytest.approx(found, rel=1e-12, nan_ok=True)
+
+
+def test_the_load_has_settled_at_999_of_its_speed_for_five_elastic_periods() -> None:
+    """A load that falls back crosses 99.9 % upwards there; one that falls after five periods has settled."""
+    swinging = simulate(CRANE, "reduced-first-stage")
+    settled = swinging.settled_time
+    before, after = simulate(CRANE, "reduced-first-stage", until=1.0).at([settled - 1e-7, settled])["w2"]
+    assert after == pytest.approx(0.999 * CRANE.target_speed, rel=1e-12)
+    assert swinging.start_time < settled
+    assert before < after
+    # 1 N m never slows this load down; then the motor brakes
+    weak = CRANE.replace(gap=0.0, load_torque=0.0, target_speed=2.0, minimum_torque=-62.0)
+    start, period = simulate(weak, Pieces(pieces=((0.0, 1.0),))).start_time, 2.0 * math.pi / weak.Omega
+    for periods, found in ((4.5, math.nan), (5.5, start)):
+        braked = Pieces(pieces=((0.0, 1.0), (start + periods * period, -62.0)))
+        assert simulate(weak, braked).settled_time == pytest.approx(found, rel=1e-12, nan_ok=True)
+
+
+def test_a_start_without_end_is_given_up_after_a_hundred_stiff_ones_and_a_hundred_periods() -> None:
+    """Counted from the release of a brake; no start lasts more than 100,000 elastic periods."""
+    drive = CRANE.replace(load_kind="reactive", damping=2.0)
+    limit = 100.0 * (0.21 * drive.target_speed / (62.0 - 7.16) + 2.0 * math.pi / drive.Omega)
+    for given, begin in (({}, 0.0), ({"brake": "motor", "release": 0.25}, 0.25)):
+        weak = simulate(drive.replace(**given, start_position="mid-gap"), "direct", parameters={"torque": 7.0})
+        assert weak.status is Status.NOT_REACHED
+        assert weak.end_time == pytest.approx(begin + limit, rel=1e-12)
 
 
 def test_csv_reads_back(run: Run, tmp_path: Path) -> None:

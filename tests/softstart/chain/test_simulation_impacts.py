@@ -100,6 +100,28 @@ def test_impacts_pile_up_at_the_known_instant(restitution):
     assert abs(run.energy.residual) < 1e-12 * run.energy.motor
 
 
+def test_the_impulse_of_a_shaft_is_its_largest_and_a_contact_that_takes_no_time_is_the_first() -> None:
+    """By hand: 3 N m on two masses of 1 kg m2 on a spring, the second of which bounces off a third.
+
+    T = 1.5 (1 - cos(w t)) N m until the flanks meet after 1 rad, and the path from motor to load closes and
+    opens at once: what the spring has carried by then is the peak of the first contact.
+    """
+    shafts = [Shaft(100.0), Shaft(gap=2.0, restitution=0.5)]
+    chain = Chain([Mass(1.0), Mass(1.0), Mass(2.0)], shafts, Motor(3.0), target_speed=1e3)
+    run = simulate(chain, Pieces(pieces=((0.0, 3.0),)), 3.0, fitted_to=CRANE)
+    w, t = math.sqrt(200.0), run.first_contact
+    assert 0.75 * t**2 - 0.0075 * (1.0 - math.cos(w * t)) == pytest.approx(1.0, rel=1e-12)
+    v = 1.5 * t - 0.0075 * w * math.sin(w * t)
+    assert (run.impact_speed, run.contacts) == (pytest.approx(v, rel=1e-12), len(run.events))
+    assert [stage.number for stage in run.stages[:3]] == [1, 3, 5]
+    assert run.k_dyn_first_contact * run.base_torque == pytest.approx(3.0, rel=1e-12)
+    assert run.peak_torque > 3.5
+    impulses = [abs(event.impulse) for event in run.events]
+    assert impulses[0] == pytest.approx(1.5 * v * 2.0 / 3.0, rel=1e-12)
+    assert run.peak_impulses.tolist() == [0.0, max(impulses)]
+    assert impulses[-1] < max(impulses)
+
+
 def test_pressed_flanks_part_when_they_would_have_to_pull():
     """A torque that sinks along a line: the flanks part at its zero, where their torque is zero."""
     motor = Motor(3.0, minimum_torque=-3.0, torque_rate=2.0)

@@ -53,6 +53,16 @@ def test_the_line_is_that_of_weighted_least_squares() -> None:
     assert np.all(np.diag(scattered.covariance) > 5.0 * np.diag(covariance)[::-1])
 
 
+def test_the_interval_of_three_gaps_that_scatter_is_that_of_student() -> None:
+    """By hand: b is the second difference; its squares are b^2/6, and t of 95 % and one degree is 12.706."""
+    b = 0.006
+    line = Line.through(np.arange(3.0), np.array([0.08, 0.09, 0.1 + b]), np.full(3, 1e-3))
+    growth, lower, upper = line.growth
+    assert growth == pytest.approx(0.01 + b / 2, rel=1e-12)
+    assert [upper - growth, growth - lower] == pytest.approx([12.7062 * b / math.sqrt(12.0)] * 2, rel=1e-5)
+    assert line.chance == pytest.approx(math.erfc(b / 1e-3 / math.sqrt(12.0)), rel=1e-9)
+
+
 @pytest.mark.parametrize("slope", [0.004, 0.0015])
 def test_intervals_hold_growth_and_date_in_95_of_100_lives(slope: float) -> None:
     generator, t, s = np.random.default_rng(2), np.array([0.0, 1.0, 2.5]), np.array([1e-3, 1.5e-3, 1e-3])
@@ -108,6 +118,27 @@ def test_what_else_has_changed_is_named(new: Identification) -> None:
     assert any("another scale of the torque signal" in note for note in notes)
     each = [with_value(new, "gap", value, 0.001) for value in (0.08, 0.12, 0.09)]
     assert any("do not lie on a line" in note for note in follow_wear(each, ["2024-07-01", *DATES]).notes)
+
+
+def test_deviations_and_thresholds_by_hand(new: Identification) -> None:
+    """Half an interval is 1.96 deviations: of the growth of two gaps sqrt(2) of it over the time between."""
+    older, newer = (with_value(new, "gap", gap, 0.001) for gap in (0.08, 0.09))
+    growth, lower, upper = follow_wear([older, newer], DATES).line.growth
+    years = 365.0 / 365.25
+    assert [growth, upper - growth, growth - lower] == pytest.approx(
+        [0.01 / years, *[math.sqrt(2.0) * 0.001 / years] * 2], rel=1e-9
+    )
+    # 3 deviations of the difference of two values, each 2 % / 1.96
+    soft, share = new["stiffness"].value, math.sqrt(2.0) * 0.02 / 1.959964
+    before = with_value(older, "stiffness", soft, 0.02 * soft)
+    for times, named in ((2.95, 0), (3.05, 1)):
+        after = with_value(newer, "stiffness", soft * (1.0 + times * share), 0.02 * soft)
+        assert len(follow_wear([before, after], DATES).notes) == named
+    # the chance of b/sqrt(6) deviations is 1 % at 2.5758 (normal, both sides)
+    for deviations, named in ((2.55, 0), (2.6, 1)):
+        b = math.sqrt(6.0) * deviations * 0.001 / 1.959964
+        each = [with_value(new, "gap", gap, 0.001) for gap in (0.08, 0.09, 0.1 + b)]
+        assert len(follow_wear(each, ["2025-07-01", "2026-07-01", "2027-07-01"]).notes) == named
 
 
 def test_what_cannot_be_followed_is_refused(new: Identification, tmp_path: Path) -> None:

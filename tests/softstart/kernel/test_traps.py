@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Drive, Status, simulate
 
@@ -18,6 +19,17 @@ def test_the_far_flank_is_grazed_not_hit() -> None:
         run = simulate(CRANE.replace(gap=gap, start_position=-gap / 2), "direct", until=1.0)
         assert {stage.side for stage in run.stages} == {0, 1}
         assert float(np.min(run.theta)) == pytest.approx(-gap / 2, abs=1e-9 * gap)
+
+
+@pytest.mark.parametrize(("share", "touched"), [(0.9e-9, 0), (1.1e-9, 1)])
+def test_a_billionth_of_the_gap_is_a_graze(share: float, touched: int) -> None:
+    """The motor flies against its own brake, a = 20/J1: it would overlap the flank by v^2/2a - gap/2."""
+    a = 20.0 / 0.035
+    v = math.sqrt(2.0 * a * (0.25 + share * 0.5))
+    drive = CRANE.replace(load_torque=0.0, minimum_torque=-62.0, initial_motor_speed=v)
+    run = simulate(drive, Pieces(pieces=((0.0, -20.0),)), until=1.5 * v / a)
+    assert run.contacts == touched
+    assert run.peak_torque == pytest.approx(touched * 368.465 * share * 0.5, rel=1e-3)
 
 
 @pytest.mark.parametrize("speeds", [(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)])
