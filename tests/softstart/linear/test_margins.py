@@ -39,6 +39,29 @@ def test_an_integrator(gain):
     assert found.delay_margin == pytest.approx(found.phase_margin / w, rel=1e-9)
 
 
+def pair(r, angle, k):
+    """Where |z - r e^(i angle)| |z - r e^(-i angle)| = k on the circle: quadratic in cos w."""
+    a, b = 1.0 + r * r, r * math.cos(angle)
+    rest = a * a - 2.0 * r * r + 2.0 * r * r * math.cos(2.0 * angle) - k**2
+    return sorted(math.acos(one) for one in np.roots([4.0 * r * r, -4.0 * a * b, rest]))
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.3, 2.5])
+def test_no_crossing_of_a_narrow_resonance_or_notch_is_missed(angle):
+    """L = k/((z - p)(z - p*)) is above 1 near its peak alone, and (z - p)(z - p*)/(k z^2) below 1 in a notch."""
+    for narrow, resonates in ((1e-5, True), (3e-2 * angle, False)):
+        r = 1.0 - (narrow if resonates else 0.1 * narrow)
+        k = 2.0 * narrow * math.sin(angle) * (1.5 if resonates else 1.0)
+        A, B = [[2.0 * r * math.cos(angle), -r * r], [1.0, 0.0]], [[1.0], [0.0]]
+        loop = System(np.array(A), np.array(B), np.array([[0.0, k]]), np.zeros((1, 1)))
+        if not resonates:
+            A, C = [[0.0, 0.0], [1.0, 0.0]], [[-A[0][0] / k, r * r / k]]
+            loop = System(np.array(A), np.array(B), np.array(C), np.array([[1.0 / k]]))
+        found = [one.frequency for one in margins(loop, 1.0).gain_crossovers]
+        assert len(found) == 2
+        assert found == pytest.approx(pair(r, angle, k), rel=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_as_python_control_has_them(seed):
     rng = np.random.default_rng(seed)
