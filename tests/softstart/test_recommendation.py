@@ -1,6 +1,7 @@
 """Settled times, flags, limits and the one recommendation of compare, page and report."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from softstart.controller.finding import ready_controller_names
 from softstart.drive import library
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
-from softstart.start.recommendation import flags
+from softstart.start.recommendation import _unbeaten, flags
 
 CRANE = Drive.load("crane-4amtkf")
 HOIST = Drive.load("hoist-15kw")
@@ -57,6 +58,27 @@ def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
                 assert slow == ("slow" in words), (name, position, one)
                 assert (run.k_dyn > 1.001 * direct.k_dyn) == ("harder" in words)
                 assert not math.isnan(run.settled_time)
+
+
+def test_thresholds_of_flags_and_of_what_another_strategy_beats():
+    """Slow beyond twice the time of direct; harder by 0.1 %; no gain below 0.1 %; as quick within 1e-4."""
+
+    def run(k_dyn, settled_time=1.0):
+        return SimpleNamespace(k_dyn=k_dyn, settled_time=settled_time, start_time=1.0, drive=CRANE)
+
+    for found, word in ((run(1.0009), ""), (run(1.0011), "harder"), (run(1.0, 1.999), ""),
+                        (run(1.0, 2.001), "slow")):  # fmt: skip
+        assert [one.word.split()[0] for one in flags(found, run(1.0))] == [word] * bool(word)
+    direct = SimpleNamespace(run=run(2.0), effort=Effort.CONTACTOR)
+    for k, time, names in (
+        (1.9981, 1.5, "d"),
+        (1.9979, 1.5, "dr"),
+        (1.0, 1.00011, "dr"),
+        (1.0, 1.00009, "r"),
+    ):
+        other = SimpleNamespace(run=run(k, time), effort=Effort.RAMPS)
+        best = _unbeaten([other, direct])
+        assert "".join("d" if one is direct else "r" for one in best) == names
 
 
 def test_flagged_strategies_are_never_recommended():

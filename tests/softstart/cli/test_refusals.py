@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from softstart.errors import SimulationError
+
 START = "simulate crane-4amtkf --controller "
 RAMP = "tune --controller ramp --gaps 0.5,2 --inertias 2J1,5J1 --restarts 1 --workers 1 --no-optimum "
 GRID = "sweep --controller ramp --axis shaft.gap=0.5,1 "
@@ -98,6 +100,32 @@ def test_a_start_that_cannot_be_finished(controller, says, command, run, nothing
     assert err.startswith("softstart: The start was given up: ")
     assert "own.py, line" in err
     assert says in err
+    nothing_left()
+
+
+FAILURES = {
+    "memory": (MemoryError(), 3, "there is not enough memory for this."),
+    "unfinished": (SimulationError("The start cannot be finished."), 3, "The start cannot be finished."),
+    "disk": (OSError(28, "No space left on device"), 2, "could not be written: No space left on device."),
+    "stopped": (KeyboardInterrupt(), 130, "interrupted; no incomplete file was left behind."),
+}
+
+
+@pytest.mark.parametrize("name", FAILURES)
+def test_how_a_command_fails_is_its_exit_code(name, run, nothing_left, monkeypatch):
+    """Nothing on standard output, one sentence, no file."""
+    error, code, says = FAILURES[name]
+
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr("softstart.simulate", fail)
+    monkeypatch.setattr("softstart.start.comparison.simulate", fail)
+    for line in ("simulate good.toml --controller direct", "compare good.toml --json --out results"):
+        ended = run(*line.split())
+        assert (ended.code, ended.out) == (code, "")
+        assert ended.err.startswith("softstart: ")
+        assert ended.err.endswith(f"{says}\n")
     nothing_left()
 
 

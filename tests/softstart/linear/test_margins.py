@@ -48,7 +48,7 @@ def pair(r, angle, k):
 
 @pytest.mark.parametrize("angle", [0.05, 0.3, 2.5])
 def test_no_crossing_of_a_narrow_resonance_or_notch_is_missed(angle):
-    """L = k/((z - p)(z - p*)) is above 1 near its peak alone, and (z - p)(z - p*)/(k z^2) below 1 in a notch."""
+    """L = k/((z - p)(z - p*)), above 1 near its peak alone; (z - p)(z - p*)/(k z^2), below 1 in a notch."""
     for narrow, resonates in ((1e-5, True), (3e-2 * angle, False)):
         r = 1.0 - (narrow if resonates else 0.1 * narrow)
         k = 2.0 * narrow * math.sin(angle) * (1.5 if resonates else 1.0)

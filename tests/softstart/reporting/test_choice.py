@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,8 +11,9 @@ from softstart.controller import make_controller
 from softstart.optimal.front import FrontPoint
 from softstart.reporting import report
 from softstart.reporting.choice import robustness
-from softstart.reporting.document import for_customer
-from softstart.reporting.limit import bound_at, limit
+from softstart.reporting.document import answer, for_customer
+from softstart.reporting.limit import Limit, bound_at, limit
+from softstart.reporting.sheet import Setting
 
 from .conftest import Page
 
@@ -79,6 +81,45 @@ def test_no_strategy_reaches_the_speed():
     assert made.limit.refusal
     assert "no strategy is recommended" in made.to_html()
     assert made.summary()["recommended"] is None
+
+
+@pytest.mark.parametrize(("over", "proved"), [(0.99, True), (1.01, False)])
+def test_an_optimum_within_1_percent_of_its_bound_is_proved(hostile, over, proved):
+    """Against every start by the momentum bound; by a certificate among those whose gap closes once."""
+    time = 1.2 * hostile.choice.direct.run.start_time
+    bound = bound_at(hostile.drive, time)
+    near = FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=bound * (1.0 + 0.01 * over))
+    far = replace(near, k_dyn=1.2 * bound, k_dyn_lower_bound=1.2 * bound / (1.0 + 0.01 * over))
+    every, single, loose = Limit(points=(near,)).proofs(hostile.drive)
+    assert (every or loose) == pytest.approx([over], rel=1e-9)
+    assert bool(every) == proved
+    for kind, certain in (("certificate", proved), ("momentum", False)):
+        every, single, loose = Limit(points=(replace(far, bound_kind=kind),)).proofs(hostile.drive)
+        assert (every, single) == ([], [(time, pytest.approx(over, rel=1e-9))] if certain else [])
+        assert loose == ([] if certain else [pytest.approx(20.0)])
+
+
+def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(hostile):
+    best = hostile.choice.chosen
+    (sheet,) = [one for one in hostile.sheets if one.name == best.name]
+    time, k = sheet.exact.start_time, sheet.exact.k_dyn
+
+    def said(words, *, known=1.0, **changes):
+        point = FrontPoint(best.run.start_time, "reached", "OPTIMAL", "", k_dyn=known * best.run.k_dyn)
+        made = replace(hostile, limit=Limit(points=(point,)), sheets=(replace(sheet, **changes),))
+        return words in answer(made)
+
+    calm = {"rounded": SimpleNamespace(k_dyn=k, start_time=time), "worst_k_dyn": k, "slowest": time}
+    for share, told in ((1.049, False), (1.051, True)):
+        for harm in (SimpleNamespace(k_dyn=share * k, start_time=time),
+                     SimpleNamespace(k_dyn=k, start_time=share * time)):  # fmt: skip
+            assert said("But these are exact values", **calm | {"rounded": harm}) == told
+        for harm in ({"worst_k_dyn": share * k}, {"slowest": share * time}):
+            assert said("With values half a step off", **calm | harm) == told
+    for share, told in ((0.9951, False), (0.9949, True)):
+        assert said("the gentlest start known has", known=share, **calm) == told
+    for step, coarse in ((0.099, False), (0.101, True)):
+        assert Setting("time", "", "s", 1.0, 1.0, step).coarse == coarse
 
 
 def test_search_for_optima_ends_when_its_time_is_up():
