@@ -14,6 +14,10 @@ import ast
 from importlib import import_module
 from pathlib import Path
 
+from softstart.isolation import NUMBA, isolate
+
+isolate(NUMBA)
+
 __version__ = "0.1.0"
 
 _DEFINED_IN = {

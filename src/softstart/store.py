@@ -12,12 +12,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import secrets
 import shutil
 import socket
 import sqlite3
 import stat
 import sys
-import tempfile
 import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -229,7 +229,8 @@ def fresh_folder(home: Path, *also: Path) -> Iterator[Path]:
     for left in (path for place in (home, *also) for path in place.glob(f"{prefix}*.part")):
         if sys.platform != "win32" and not _runs(left.name.removeprefix(prefix).partition("-")[0]):
             shutil.rmtree(left, ignore_errors=True)
-    path = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", suffix=".part", dir=home))
+    path = home / f"{prefix}{os.getpid()}-{secrets.token_hex(4)}.part"
+    path.mkdir()
     try:
         with at_stop(lambda: _remove(path)):
             yield path

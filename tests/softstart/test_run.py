@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import math
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.patience import patient
 from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
@@ -236,3 +239,24 @@ def test_a_controller_that_does_not_return_is_named_once(
     assert said.count(f"The controller {controller.name} has not returned for 0.2 s") == 1
     simulate(CRANE, "direct")
     assert capsys.readouterr().err == ""
+
+
+def test_controllers_that_come_and_go_in_many_threads_are_watched_to_the_last(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between two of them the watcher goes to sleep; each one wakes it, and there is never a second one."""
+    monkeypatch.setattr(engine, "SILENCE", 0.2)
+    for _ in range(2):
+        with ThreadPoolExecutor(8) as pool:
+            list(pool.map(lambda _: engine.watched(Sleeper()).__enter__(), range(200)))
+            pool.submit(lambda: None).result()
+            engine._watched.clear()
+        deadline = time.monotonic() + patient(5.0)
+        while engine._busy.is_set() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert not engine._busy.is_set()
+        with engine.watched(Sleeper()):
+            while not (err := capsys.readouterr().err) and time.monotonic() < deadline:
+                time.sleep(0.02)
+        assert err.count("has not returned for 0.2 s") == 1
+    assert [one.name for one in threading.enumerate()].count("softstart-watch") == 1

@@ -2,7 +2,10 @@
 
 import os
 
+from softstart.isolation import isolate
 from softstart.parallel import ONE_THREAD
+
+isolate("matplotlib")
 
 for _name, _count in ONE_THREAD.items():
     os.environ.setdefault(_name, _count)  # before numpy is imported

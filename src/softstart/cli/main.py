@@ -34,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _main(list(arguments))
     sys.excepthook = _internal_error
+    _open_closed_streams()
     watcher = _stop_on_signals()
     for stream in (sys.stdout, sys.stderr):  # a question mark for what the terminal's encoding lacks
         if hasattr(stream, "reconfigure"):
@@ -43,6 +44,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if STOPPING.is_set():
             watcher.join()  # until the process is ended
     return code
+
+
+def _open_closed_streams() -> None:
+    """Put something in the place of standard streams that are closed; else another file gets their number.
+
+    Input ends at once, output fails as on a full disk, and messages are lost: the exit code remains.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            os.dup2(os.open(os.devnull, os.O_WRONLY if name == "stderr" else os.O_RDONLY), number)
+            mode = "w" if number else "r"
+            setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
 def _main(given: list[str]) -> int:

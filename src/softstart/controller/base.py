@@ -213,6 +213,16 @@ def parameter(
     )  # fmt: skip
 
 
+# what a class says of itself: its type, and how it is written
+DECLARED: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("name", "summary", "source"), (str, "a text in quotes")),
+    "sensors": (Sensor, "Sensor.STAGE, Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |"),
+    "effort": (Effort | None, "one of Effort, as Effort.RAMPS"),
+    "needs": (tuple, 'names of parameters with commas after them, as ("time",)'),
+    "saturates": (bool, "True or False"),
+}
+
+
 @dataclass(frozen=True)
 class Controller:
     """A strategy for the start. Subclass `PlainController` or `CompiledController`.
@@ -251,7 +261,11 @@ class Controller:
     saturates: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        wrong = []
+        wrong = [
+            f"{type(self).__name__}: {name} = {value!r}: declare it in the class as {form}."
+            for name, (kind, form) in DECLARED.items()
+            if not isinstance(value := getattr(self, name), kind)
+        ]
         for one in fields(self):
             value, rule, choices = (
                 getattr(self, one.name),

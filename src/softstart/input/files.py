@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
 import stat
-import tempfile
 from collections.abc import Callable
 from functools import cached_property, partial
 from importlib import resources
@@ -148,21 +148,17 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
     Raises InputError if the file cannot be written there.
     """
     refused = f"output = {path}: the file cannot be written there"
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        # a new file with the rights that the system gives to one: asking for the umask would set it for
+        # a moment, in all threads
+        opened = temporary.open("xb" if binary else "x", encoding=None if binary else "utf-8")
     except OSError as error:
         remedy = "give a folder that exists and that you may write to"
         raise InputError(f"{refused}: {error.strerror or error}; {remedy}.") from None
-    temporary = Path(name)
     try:
-        with (
-            at_stop(partial(temporary.unlink, missing_ok=True)),
-            os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream,
-        ):
+        with at_stop(partial(temporary.unlink, missing_ok=True)), opened as stream:
             write(stream)
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
         temporary.replace(path)
     except OSError as error:
         raise InputError(f"{refused}: {error.strerror or error}; nothing was left behind.") from None

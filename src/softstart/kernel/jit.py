@@ -16,6 +16,14 @@ import numba
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
+from softstart.errors import InputError
+
+_config: Any = numba.config
+if _config.DISABLE_JIT:
+    raise InputError(
+        "NUMBA_DISABLE_JIT = 1: softstart simulates with compiled code alone; unset this variable."
+    )
+
 _njit: Any = numba.njit
 _cfunc: Any = numba.cfunc
 _type_callable: Any = type_callable

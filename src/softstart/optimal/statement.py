@@ -52,6 +52,7 @@ OPTIONS = {
     "ipopt.max_iter": 200, "ipopt.max_cpu_time": 120.0, "ipopt.acceptable_tol": 1e-3,
     "ipopt.acceptable_iter": 8, "ipopt.acceptable_constr_viol_tol": 1e-8,
     "ipopt.acceptable_obj_change_tol": 1e-6,
+    "ipopt.option_file_name": "",  # else IPOPT reads ipopt.opt of the current folder, whoever wrote it
 }  # fmt: skip
 NEAR = {"ipopt.mu_strategy": "adaptive", "ipopt.bound_push": 1e-4, "ipopt.bound_frac": 1e-4}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import pickle
 import threading
 import time
@@ -14,7 +13,7 @@ from enum import Enum
 from typing import Any
 
 from softstart.errors import InputError, SimulationError
-from softstart.parallel import DiedError, Message, Progress, Worker
+from softstart.parallel import DiedError, Message, Progress, Worker, checked_workers
 
 NICENESS = 10  # the live page comes first
 OUT_OF_MEMORY = "The computation needs more memory than there is; ask for fewer points or a smaller grid."
@@ -164,7 +163,7 @@ class Jobs:
         self._jobs: list[Job] = []  # that are not over
         self._tabs: dict[Hashable, set[Hashable]] = {}
         self._shown: dict[tuple[Hashable, str], Job] = {}
-        self._threads = ThreadPoolExecutor(limit or max(2, (os.cpu_count() or 1) - 1))
+        self._threads = ThreadPoolExecutor(limit or max(2, checked_workers(None) - 1))
         self._ended = False
 
     def begin(self, user: Hashable, title: str, work: Callable[..., Any], *args: Any) -> Job:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +19,7 @@ from softstart.drive.records import Records, each_of
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
-from softstart.parallel import Pool
+from softstart.parallel import Pool, checked_workers
 from softstart.start.engine import run_one, watched
 from softstart.start.recorded import Recorder
 from softstart.start.rows import MAX_EVENTS, Rows, blank, joined, rows_of
@@ -385,7 +384,7 @@ def simulate_many(
         named = {one.shaft_names for one in machines}
     found = batch.figures(
         controller.set_ups(fitted_to or machines), means if base is None else base.mean_torque,
-        until=until, workers=workers or os.cpu_count() or 1,
+        until=until, workers=workers or checked_workers(None),
     )  # fmt: skip
     data: dict[str, Any] = {
         name: (dims, one[0].reshape(shape), *one[1:])

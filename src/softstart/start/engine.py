@@ -28,7 +28,9 @@ from softstart.start.status import Status, status_of
 
 SILENCE = 60.0  # s after which a controller that has not returned is named
 _watched: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
-_watcher: list[threading.Thread] = []
+_busy = threading.Event()  # the watcher looks as long as it is set
+_watchers: list[threading.Thread] = []  # one at most: it sleeps, and does not end
+_starting = threading.Lock()
 
 
 class watched:  # noqa: N801  a context manager, used like a function
@@ -41,26 +43,32 @@ class watched:  # noqa: N801  a context manager, used like a function
 
     def __enter__(self) -> None:
         _watched[threading.get_ident()] = time.monotonic(), self.name
-        if not (_watcher and _watcher[0].is_alive()):
-            _watcher[:] = [threading.Thread(target=_watch, name="softstart-watch", daemon=True)]
-            _watcher[0].start()
+        if not (_busy.is_set() and _watchers[0].is_alive()):  # in a forked process it is not
+            _wake()
 
     def __exit__(self, *_: object) -> None:
         _watched.pop(threading.get_ident(), None)
 
 
+def _wake() -> None:
+    """Let the watcher look, which is started at the first time."""
+    with _starting:
+        if not (_watchers and _watchers[0].is_alive()):
+            _watchers[:] = [threading.Thread(target=_watch, name="softstart-watch", daemon=True)]
+            _watchers[0].start()
+        _busy.set()
+
+
 def _watch() -> None:
-    """Look at the controllers that compute, until there are none for some seconds."""
+    """Look at the controllers that compute, while there are any."""
     named: set[tuple[float, str]] = set()
-    idle = 0
     while True:
-        idle = 0 if _watched else idle + 1  # between two steps of a plain controller there is none
-        if idle > 10:
-            _watcher.clear()  # from here on a controller starts a watch of its own
-            if not _watched or _watcher:
-                return
-            _watcher[:] = [threading.current_thread()]
+        _busy.wait()
         time.sleep(0.1 if SILENCE < 1.0 else 0.5)
+        # in this order: who begins meanwhile is seen here, or sees that it is cleared
+        _busy.clear()
+        if _watched:
+            _busy.set()
         for began, name in set(_watched.values()) - named:
             if time.monotonic() - began >= SILENCE:
                 named.add((began, name))

@@ -54,11 +54,17 @@ STYLE: dict[str, Any] = {
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Softstart's look, without touching the caller's settings or needing a screen."""
+    """Softstart's look, without touching the caller's settings or needing a screen.
+
+    Of these only the fonts count: a matplotlibrc may ask for LaTeX, or for a figure of any size.
+    """
     import matplotlib as mpl
 
-    settings: Any = STYLE
-    with mpl.rc_context(settings), warnings.catch_warnings():
+    settings: Any = mpl.rcParams
+    fonts = {name: settings[name] for name in ("font.family", "font.sans-serif")}
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()
+        settings.update(STYLE | fonts)
         # a drive may be named in any script: what the font lacks is drawn as a box
         warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         yield

@@ -6,7 +6,6 @@ Everything is made ready beside the folder and then put in place, or nothing is.
 from __future__ import annotations
 
 import csv
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -108,9 +107,6 @@ def _put_in_place(asked: str, stage: Path, target: Path) -> None:
 
 
 def _make_parents_and_rename(stage: Path, target: Path) -> None:
-    umask = os.umask(0)
-    os.umask(umask)
-    stage.chmod(0o777 & ~umask)
     made: list[Path] = []
     try:
         for parent in reversed(target.parents):
