@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +13,12 @@ from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_brake import HOIST
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, compare, formulas, records, simulate
-from softstart.chain import reduce_chain
+from softstart import Drive, InputError, TorqueProfile, compare, fatigue, formulas, records, simulate
+from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain
+from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
+from softstart.optimal.result import largest_heat
+from softstart.views.starts import figure_rows
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -139,6 +144,123 @@ def test_every_figure_of_an_unknown_position_is_the_largest() -> None:
     damped = simulate(drive.replace(damping=1.0), "direct", 2.0)
     each = [one.settling_time() for one in damped.positions.values()]
     assert damped.settling_time() == max(each) > min(each)
+
+
+# figures of an unknown position by hand -----------------------------------------------------------------
+
+
+def chain(rng: np.random.Generator, rigid: bool) -> Chain:
+    """Four masses with a gear and three gaps, one of them rigid if so; friction holds the load anywhere."""
+    masses = [Mass(one) for one in rng.uniform(0.01, 0.3, 3)]
+    load = Mass(1.5, torque=rng.uniform(0.0, 30.0), kind="reactive")
+    gap = {"gap": rng.uniform(0.05, 0.5), "permissible_torque": 100.0}
+    middle = {"stiffness": "inf", "restitution": 0.4} if rigid else {"stiffness": 900.0, "damping": 0.4}
+    shafts = [
+        Shaft(400.0, damping=0.3, **gap), Shaft(**middle, **gap), Shaft(2e3, damping=2.0, ratio=3, **gap)
+    ]  # fmt: skip
+    return Chain([*masses, load], shafts, Motor(60.0), target_speed=40.0, position="unknown")
+
+
+def machines(seed: int) -> Iterator[tuple[Drive | Chain, list[Drive | Chain]]]:
+    """Machines of unknown position, each with what it is at the three positions."""
+    rng = np.random.default_rng(seed)
+    drive = CRANE.replace(
+        gap=rng.uniform(0.02, 2.0), load_torque=rng.uniform(0.0, 30.0), load_kind="reactive", damping=0.5,
+        start_position="unknown",
+    )  # fmt: skip
+    yield drive, [drive.replace(start_position=one) for one in UNKNOWN_POSITIONS]
+    for rigid in (False, True):
+        several = chain(rng, rigid)
+        yield several, [replace(several, position=one) for one in UNKNOWN_POSITIONS]
+
+
+LARGEST = ("k_dyn", "k_dyn_first_contact", "impact_speed", "start_time", "settled_time", "used_torque")
+OF_SHAFTS = ("k_dyns", "peak_torques", "peak_impulses", "utilisation", "shaft_factors")
+OF_ONE = (
+    "first_contact", "torque_at_contact", "stage_durations", "contacts", "events", "stages", "energy",
+    "end_time",
+)  # fmt: skip
+FITTED = CRANE.replace(start_position="mid-gap")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_figure_of_an_unknown_position_has_its_rule(seed: int) -> None:
+    """Largest, by itself; or of the start with the largest torque of all shafts; never of another one."""
+    for machine, three in machines(seed):
+        run = simulate(machine, "reduced-two-stage", fitted_to=FITTED)
+        each = [simulate(one, "reduced-two-stage", fitted_to=FITTED) for one in three]
+        hardest = max(each, key=lambda one: one.peak_torque)
+        for name in LARGEST:
+            known = [getattr(one, name) for one in each]
+            worst = np.fmax.reduce(known) if name in ("k_dyn_first_contact", "impact_speed") else max(known)
+            np.testing.assert_equal(getattr(run, name), worst, err_msg=name)
+        for name in OF_SHAFTS:
+            np.testing.assert_equal(getattr(run, name), np.max([getattr(one, name) for one in each], axis=0))
+        for k in range(len(machine.shaft_names)):
+            of_shaft = max(each, key=lambda one: one.peak_torques[k])
+            assert run.peak_times[k] == of_shaft.peak_times[k]
+            at = abs(np.atleast_1d(of_shaft.at(run.peak_times[k])["T"])[k])
+            assert at == pytest.approx(run.peak_torques[k], rel=1e-9)
+            struck = [one.impulse for start in each for one in start.events if one.place == k]
+            assert run.peak_impulses[k] == max(map(abs, struck), default=0.0)
+        assert run.peak_time == hardest.peak_time
+        assert run.settling_time() == pytest.approx(
+            np.maximum.reduce([one.settling_time() for one in each]), nan_ok=True
+        )
+        assert run.clipped == tuple(np.max([one.clipped for one in each], axis=0))
+        for name in OF_ONE:
+            np.testing.assert_equal(getattr(run, name), getattr(hardest, name), err_msg=name)
+            np.testing.assert_equal(getattr(run.shown, name), getattr(hardest, name), err_msg=name)
+        assert run.t[-1] == run.end_time
+        batch = simulate([machine, machine], "reduced-two-stage", fitted_to=FITTED).isel(start=0)
+        for name in (
+            "k_dyn",
+            "k_dyn_first_contact",
+            "peak_torque",
+            "peak_time",
+            "impact_speed",
+            "start_time",
+        ):
+            np.testing.assert_equal(float(batch[name]), getattr(run, name), err_msg=name)
+        for name in ("first_contact", "torque_at_contact", "contacts", "end_time"):
+            np.testing.assert_equal(float(batch[name]), getattr(hardest, name), err_msg=name)
+        stage_2_end = hardest.recorded.notes["stage_2_end"]
+        np.testing.assert_equal(float(batch["stage_2_end"]), float(stage_2_end), err_msg="of the same start")
+
+
+def test_what_a_person_reads_says_of_which_start_it_is() -> None:
+    """The figures that one start has alone name it; the line of the start time is that of the curves."""
+    drive = CRANE.replace(start_position="unknown", load_kind="reactive", damping=0.5)
+    run = simulate(drive, "reduced-two-stage")
+    assert run.shown.start_time < run.start_time, "hardest from the driving flank, latest from the other one"
+    rows = dict(figure_rows(run))
+    for name in (
+        "first contact",
+        "motor torque at contact",
+        "stage 1, stage 2",
+        "contacts",
+        "end of the run",
+    ):
+        assert rows[name].endswith(f" from {run.position}"), name
+    for name in ("K_dyn", "start time", "settled time", "speed of impact"):
+        assert "from" not in rows[name]
+    lines = [
+        line.get_xdata()[0] for axes in run.plot().axes for line in axes.lines if line.get_linestyle() == ":"
+    ]
+    assert run.shown.start_time in lines
+    assert not {one.start_time for one in run.each if one is not run.shown} & set(lines)
+    (life,) = fatigue(run).rows
+    assert (life.start.k_dyn, life.summary()["start_time"]) == (run.k_dyn, run.start_time)
+    assert life.run in run.each
+
+
+def test_heat_of_a_start_that_ends_before_the_others_is_whole() -> None:
+    """Constant torque: the heat is (u/Ms)^2 times the latest start time, whichever torque is largest."""
+    drive = CRANE.replace(start_position="unknown", load_kind="reactive", target_speed=20.0, gap=2.0)
+    player = make_controller("profile", {"profile": TorqueProfile([0.0, 9.0], [31.0, 31.0])})
+    run = simulate(drive, player)
+    assert min(one.end_time for one in run.each) < run.start_time, "else nothing is shown"
+    assert largest_heat([run], run.start_time) == pytest.approx(0.25 * run.start_time, rel=1e-12)
 
 
 def test_a_reversal_is_one_word() -> None:

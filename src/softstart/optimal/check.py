@@ -17,7 +17,7 @@ from softstart.chain.machines import Machine
 from softstart.controller import make_controller
 from softstart.kernel import records as at
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import LowerBound, OptimumError, heat_of
+from softstart.optimal.result import LowerBound, OptimumError, largest_heat
 from softstart.optimal.starts import Played, carried, wanted
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
@@ -63,7 +63,8 @@ def check(
     """
     wrong = [*_beyond(problem, "demand", profile.time, profile.torque)]  # straight lines
     for run in runs:
-        wrong += [*_realised(problem, run), *_torque_speed(problem, profile, run)]
+        for one in run.each:
+            wrong += [*_realised(problem, one), *_torque_speed(problem, profile, one)]
         wrong += _terminal(problem, run, end)
     if wrong := [*wrong, *_figures(problem, runs, end, claimed, bound)]:
         raise OptimumError(" ".join(wrong))
@@ -141,7 +142,7 @@ def _figures(
 ) -> Iterator[str]:
     """What was claimed, and the bounds of the problem on what is not minimised."""
     k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
-    heat = heat_of(runs[0], end)
+    heat = largest_heat(runs, end)
     value, name = {
         "k_dyn": (k_dyn, "K_dyn"),
         "heat": (heat, "The heat in s"),

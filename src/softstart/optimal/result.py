@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.kernel import records as at
 from softstart.notebook import Shown
 from softstart.optimal.problem import Problem
@@ -30,6 +31,11 @@ def heat_of(run: Run, until: float) -> float:
     index = np.repeat(np.arange(half.size), nodes.size)
     u = run.recorded.at(times.ravel(), index)["u"].reshape(times.shape)
     return float(half @ (u * u @ weights)) / float(run.drive.motor.starting_torque) ** 2
+
+
+def largest_heat(runs: Iterable[Run], until: float) -> float:
+    """The largest heat of these starts, from whatever position: one that ended before `until` has less."""
+    return max(heat_of(one, until) for run in runs for one in run.each)
 
 
 @dataclass(frozen=True)
@@ -169,6 +175,12 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
         return tuple(run.peak_torque / base for run in self.runs)
 
     @property
+    def k_dyns(self) -> Vector:
+        """Dynamic coefficient of each shaft; the largest of all machines."""
+        largest: Vector = np.max([run.k_dyns for run in self.runs], axis=0)
+        return largest
+
+    @property
     def worst(self) -> int:
         """Index of the machine with the largest peak."""
         return int(np.argmax(self.k_dyn_each))
@@ -211,7 +223,7 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
     @property
     def heat(self) -> float:
         """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
-        return heat_of(self.runs[0], self.end_time)
+        return largest_heat(self.runs, self.end_time)
 
     def __repr__(self) -> str:
         """One line with the main figures."""
@@ -254,7 +266,7 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
             "profile": {"time": self.profile.time.tolist(), "torque": self.profile.torque.tolist()},
         }
         if len(run.drive.shaft_names) > 1:
-            found["k_dyns"] = dict(zip(run.drive.shaft_names, run.k_dyns.tolist(), strict=True))
+            found["k_dyns"] = dict(zip(run.drive.shaft_names, self.k_dyns.tolist(), strict=True))
         if problem.scenarios:
             found["k_dyn_each"], found["start_times"] = list(self.k_dyn_each), list(self.start_times)
             found["worst"], found["scenarios"] = self.worst, [one.name for one in problem.scenarios]

@@ -528,7 +528,7 @@ def landmarks(run: Run) -> Vector:
     peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
     """
     events, joints = run.recorded.events["time"], run.recorded.spans[:, at.S_START]
-    peaks = [*run.peak_times, *(stage.peak_time for stage in run.stages)]
+    peaks = [*run.recorded.shafts["peak_time"], *(stage.peak_time for stage in run.stages)]
     if joints.size > JUMPS:
         joints = joints[:0]
     sudden = np.concatenate([events, joints])

@@ -90,8 +90,8 @@ def traces_figure(rows: Sequence[Row]) -> Any:
                 shade_open_gap(panel, run, longest)
             _torques(panel, run)
             panel.set_title(f"{name_in_figure(row.name)}: {run.k_dyn:.3f}", pad=3)
-            if not math.isnan(run.start_time):
-                panel.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
+            if not math.isnan(run.shown.start_time):
+                panel.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
         axes[0, 0].set_xlim(0.0, longest)
         axes[0, 0].set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
         for panel in axes.flat[len(rows) :]:

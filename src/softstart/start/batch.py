@@ -76,10 +76,11 @@ class Notes:
 
 
 def worst_of(notes: Sequence[Notes]) -> Notes:
-    """Of the same starts from several positions the worst, figure by figure.
+    """Of the same starts from several positions the worst, figure by figure, as a `Run` has them.
 
     They are the notes of the position with the largest |T|, or of one whose start could not be finished, with
-    the latest start time, the hardest impact, and the largest |T| of each shaft and of a first contact.
+    the latest start time, the largest excess of the demand, the hardest impact, and of each shaft the largest
+    |T| with its instant, the largest impulse, and the largest |T| of a first contact (NaN without one).
     """
     starts, shafts = np.stack([one.starts for one in notes]), np.stack([one.shafts for one in notes])
     rows = np.arange(starts.shape[1])
@@ -90,14 +91,12 @@ def worst_of(notes: Sequence[Notes]) -> Notes:
     for name in _LATEST:
         worst.starts[name] = np.max(starts[name], axis=0)
     worst.starts["impact_speed"] = np.fmax.reduce(starts["impact_speed"], axis=0)
-    first = np.abs(shafts["first_peak"]).max(axis=2)
-    hardest = np.argmax(np.where(np.isnan(starts["stage_2_end"]), -1.0, first), axis=0)
-    worst.starts["stage_2_end"] = starts["stage_2_end"][hardest, rows]
-    worst.shafts["first_peak"] = shafts["first_peak"][hardest, rows]
-    for k in range(shafts.shape[2]):
-        place = np.argmax(np.abs(shafts["peak"][:, :, k]), axis=0)
-        for name in ("peak", "peak_time"):
-            worst.shafts[name][:, k] = shafts[name][place, rows, k]
+    first = np.where(np.isnan(starts["stage_2_end"])[..., None], np.nan, np.abs(shafts["first_peak"]))
+    worst.shafts["first_peak"] = np.fmax.reduce(first, axis=0)
+    worst.shafts["impulse"] = shafts["impulse"].max(axis=0)
+    place = np.abs(shafts["peak"]).argmax(axis=0)[None]
+    for name in ("peak", "peak_time"):
+        worst.shafts[name] = np.take_along_axis(shafts[name], place, axis=0)[0]
     return worst
 
 
@@ -312,7 +311,8 @@ def figures(notes: Notes, base: Any, until: float | None = None) -> Figures:
     rows, worst = np.arange(good.size), notes.peaks.argmax(axis=1)
     peak = notes.peaks[rows, worst]
     first = np.abs(notes.shafts["first_peak"]).max(axis=1)
-    first = np.where(np.isnan(notes["stage_2_end"]), np.nan, first)
+    # of several positions `worst_of` has left out those without a stage 2
+    first = np.where(np.isnan(notes["stage_2_end"]) & (notes["position"] == 0.0), np.nan, first)
     k_dyn = formulas.dynamic_coefficient(np.where(good, peak, 0.0), base)
     k_first = formulas.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
     found: Figures = {

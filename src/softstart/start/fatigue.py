@@ -36,8 +36,12 @@ class Life:
 
     Attributes
     ----------
+    start : Run
+        The start. K_dyn, peak torque, start time and utilisation are its own, of an unknown position the
+        worst.
     run : Run
-        The start; of an unknown position the one that does most damage to this shaft.
+        The same; of an unknown position the start that does most damage to this shaft, to which cycles,
+        impacts and life belong.
     shaft : int
         The index of the shaft; 0 of a drive.
     turning_points : array of shape (n, 2)
@@ -67,6 +71,7 @@ class Life:
         How much the damage over wear, a share of it, changes with half the number of gaps.
     """
 
+    start: Run
     run: Run
     shaft: int
     turning_points: Matrix
@@ -105,9 +110,9 @@ class Life:
             "controller": self.run.controller_name,
             "shaft": self.shaft_name,
             "position": self.run.position,
-            "k_dyn": float(self.run.k_dyns[self.shaft]),
-            "peak_torque": float(self.run.peak_torques[self.shaft]),
-            "start_time": self.run.start_time,
+            "k_dyn": float(self.start.k_dyns[self.shaft]),
+            "peak_torque": float(self.start.peak_torques[self.shaft]),
+            "start_time": self.start.start_time,
             "equivalent_torque": self.equivalent_torque,
             "relative_life": self.relative,
             **({"relative_life_range": self.relative_range} if self.relative_range else {}),
@@ -279,7 +284,7 @@ def fatigue(
     rows = []
     for i, run in enumerate(asked, 1):
         for k, counted in enumerate(damages(run, curve)):
-            life = _life(counted, curve, reference[k].damage)
+            life = _life(run, counted, curve, reference[k].damage)
             pairs = zip(others[0], others[i], strict=True)
             both = tuple(life_ratio(first[k].damage, own[k].damage) for first, own in pairs)
             life = replace(life, relative_range=both)
@@ -420,7 +425,7 @@ def miner(spectrum: Matrix, curve: SNCurve) -> float:
 
 def damages(run: Run, curve: SNCurve) -> list[Damage]:
     """The damage to each shaft, where the start position is unknown from the one that does most to it."""
-    each = list(run.positions.values()) or [run]
+    each = run.each
     shafts = range(len(run.drive.shaft_names))
     return [max((damage_of(one, curve, k) for one in each), key=lambda found: found.damage) for k in shafts]
 
@@ -430,8 +435,8 @@ def worst_damage(run: Run, curve: SNCurve) -> Damage:
     return max(damages(run, curve), key=lambda found: found.damage)
 
 
-def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
-    """The figures of a shaft that is counted, beside the damage of `direct`."""
+def _life(start: Run, found: Damage, curve: SNCurve, reference: float) -> Life:
+    """The figures of a shaft that is counted in a start, beside the damage of `direct`."""
     damage, run, shaft = found.damage, found.run, found.shaft
     energies = impacts(run, shaft)
     torque = float(curve.torque(1.0 / damage)) if damage > 0.0 else 0.0
@@ -439,8 +444,8 @@ def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
     rate = run.drive.limits.starts_per_hour
     hours = starts / rate if rate is not None else math.nan
     return Life(
-        run, shaft, found.points, found.spectrum, torque, life_ratio(reference, damage), starts, hours,
-        float(run.utilisation[shaft]), energies.size, float(energies.sum()),
+        start, run, shaft, found.points, found.spectrum, torque, life_ratio(reference, damage), starts, hours,
+        float(start.utilisation[shaft]), energies.size, float(energies.sum()),
     )  # fmt: skip
 
 
@@ -451,7 +456,7 @@ def life_ratio(reference: float, damage: float) -> float:
 
 def _again(run: Run, machine: Any) -> Run:
     """The same start of a changed machine, its controller as it was set up."""
-    until = run.end_time if math.isnan(run.start_time) else None
+    until = max(one.end_time for one in run.each) if math.isnan(run.start_time) else None
     return simulate(machine, run.controller, until, fitted_to=run.told, base=run.base)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart import formulas
-from softstart.arrays import Vector
+from softstart.arrays import Matrix, Vector
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
@@ -132,10 +132,11 @@ class Run(Shown, sheet="starts.run_sheet"):
         The records of the kernel.
     position : str
         Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
-        with the largest |T|, to which traces, events and stages belong.
+        with the largest |T|, whose start is `shown`.
     positions : mapping of str to Run
-        The starts from each position, if it is unknown. Then K_dyn, peaks, impact speed, start and settled
-        time are the largest among them.
+        The starts from each position, if it is unknown. Then K_dyn, peaks with their instants, impulses,
+        impact speed, excess of the demand, start and settled times are the largest among them, each by
+        itself. Traces, events, stages, contacts, energy and end of the run are those of `shown`.
     told : Drive or None
         The drive whose numbers the controller works with, if not `drive`.
 
@@ -197,10 +198,23 @@ class Run(Shown, sheet="starts.run_sheet"):
             return max(self.positions, key=lambda name: float(self.positions[name].peak_torque))
         return str(next(iter(self.drive.positions)))
 
+    @property
+    def each(self) -> tuple[Run, ...]:
+        """The starts from each position, this one alone where that is known."""
+        return tuple(self.positions.values()) or (self,)
+
+    @property
+    def shown(self) -> Run:
+        """The start to which traces, events and stages belong: of an unknown position that of `position`."""
+        return self.positions[self.position] if self.positions else self
+
     def _worst(self, figure: Callable[[Run], float], worst: Any = np.maximum) -> float:
         """A figure of this start, or the largest of those from each position."""
-        runs = self.positions.values() or (self,)
-        return float(worst.reduce([figure(run) for run in runs]))
+        return float(worst.reduce([figure(run) for run in self.each]))
+
+    def _of_shafts(self, name: str) -> Matrix:
+        """What the kernel notes of each shaft: a row for each position, a column for each shaft."""
+        return np.stack([run.recorded.shafts[name] for run in self.each])
 
     # figures -------------------------------------------------------------------------------------------
 
@@ -211,20 +225,20 @@ class Run(Shown, sheet="starts.run_sheet"):
     @property
     def peak_torques(self) -> Vector:
         """Largest |T| of each shaft, N m, located; impacts of rigid flanks have `peak_impulses` instead."""
-        runs = self.positions.values() or (self,)
-        peaks: Vector = np.max([np.abs(run.recorded.shafts["peak"]) for run in runs], axis=0)
+        peaks: Vector = np.abs(self._of_shafts("peak")).max(axis=0)
         return peaks
 
     @property
     def peak_times(self) -> Vector:
-        """When |T| of each shaft is largest, s."""
-        times: Vector = self.recorded.shafts["peak_time"].copy()
+        """When |T| of each shaft is largest, s: in the start in which it is."""
+        where = np.abs(self._of_shafts("peak")).argmax(axis=0)
+        times: Vector = self._of_shafts("peak_time")[where, np.arange(where.size)]
         return times
 
     @property
     def peak_impulses(self) -> Vector:
         """Largest impulse of each shaft's impacts, N m s; 0 where none was."""
-        impulses: Vector = self.recorded.shafts["impulse"].copy()
+        impulses: Vector = self._of_shafts("impulse").max(axis=0)
         return impulses
 
     @property
@@ -480,7 +494,7 @@ class Run(Shown, sheet="starts.run_sheet"):
         """Instants of the traces, s: an even grid and every event and located peak."""
         edges = self.recorded.events["time"]
         grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
-        peaks = [self.peak_times, [stage.peak_time for stage in self.stages]]
+        peaks = [self.recorded.shafts["peak_time"], [stage.peak_time for stage in self.stages]]
         when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), *peaks])
         return np.unique(when.clip(0.0, self.end_time))
 
@@ -620,5 +634,5 @@ def worst_run(runs: Mapping[str, Run], machine: Any) -> Run:
     """The start of a machine whose position is unknown, from those of each position."""
     hardest = max(runs.values(), key=lambda run: run.peak_torque)
     statuses = [run.status for run in runs.values()]
-    status = next((one for one in statuses if one is not Status.REACHED), Status.REACHED)
+    status = max(statuses, key=list(Status).index)  # of those that end a run: not released is worst
     return replace(hardest, drive=machine, status=status, positions=dict(runs))

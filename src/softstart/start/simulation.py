@@ -70,8 +70,9 @@ def simulate(
     Between two events a machine is linear: its Taylor series are summed to the last digit, and events are
     certified first roots of them. There is no step size and no output grid. A drive whose start position is
     unknown is started from both flanks and from mid-gap by the same controller, which is not told where;
-    every figure is the worst of the three. A shaft without a gap is a spring that pulls too; rigid gaps close
-    by impacts, angular momentum kept; those that pile up are followed to their known end.
+    peaks, impacts and times are each the worst of the three (see `Run`). A shaft without a gap is a spring
+    that pulls too; rigid gaps close by impacts, angular momentum kept; those that pile up are followed to
+    their known end.
 
     Parameters
     ----------

@@ -76,8 +76,8 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
         ]
     cells = {
         "strategy": [row.run.controller_name for row in rows],
-        "K_dyn": [number(row.run.k_dyn, 3) for row in rows],
-        "start\ntime s": column_of([row.run.start_time for row in rows]),
+        "K_dyn": [number(row.start.k_dyn, 3) for row in rows],
+        "start\ntime s": column_of([row.start.start_time for row in rows]),
         "equivalent\ntorque N m": column_of([row.equivalent_torque for row in rows]),
         **{heading: list(map(cell, rows)) for _, heading, _, cell in figures},
         "impacts": [str(row.impacts) for row in rows],
@@ -94,7 +94,7 @@ def conclusion(found: Fatigue) -> str:
         return row.worn_relative if worn else row.relative
 
     least = [min(rows, key=life) for rows in found.by_run]
-    best = max([row for row in least if not math.isnan(row.run.start_time)] or least, key=life)
+    best = max([row for row in least if not math.isnan(row.start.start_time)] or least, key=life)
     name, wears = best.run.controller_name, " while the gap wears" if worn else ""
     if name == REFERENCE:
         return f"Longest life: direct{wears}."

@@ -54,7 +54,7 @@ def _facts(best: Optimum) -> list[list[str]]:
     facts += [gap] if problem.minimise == "k_dyn" and kept is None else []
     facts += [["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"]]
     if len(shafts) > 1:
-        facts += [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(shafts, run.k_dyns, strict=True)]
+        facts += [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(shafts, best.k_dyns, strict=True)]
     latest = problem.start_time if kept is None else None
     facts += [["start time", f"{short(best.end_time)} s{allowed(latest, ' s')}"]]
     facts += [["its lower bound", f"{short(kept.at_least)} s"], gap] if kept is not None else []

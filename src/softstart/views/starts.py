@@ -58,8 +58,9 @@ def machine_lines(machine: Any, fitted_to: Drive | None = None) -> list[str]:
 
 
 def figure_rows(run: Run) -> list[list[str]]:
-    """The figures of the start, as words and numbers."""
+    """The figures of the start, as words and numbers; of an unknown position some are those of one start."""
     first, second = run.stage_durations
+    of_one = f" from {run.position}" if run.positions else ""
     names, clipped = run.drive.shaft_names, clipped_torque(run)
     where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
@@ -69,14 +70,18 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
         ["shaft torque settled after", with_unit(run.settling_time(), "s")],
-        ["first contact", with_unit(run.first_contact, "s")],
+        ["first contact", f"{with_unit(run.first_contact, 's')}{of_one}"],
         ["speed of impact", with_unit(run.impact_speed, "rad/s")],
-        ["motor torque at contact", with_unit(run.torque_at_contact, "N m")],
-        ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}"],
-        ["contacts", str(run.contacts)],
-        ["end of the run", with_unit(run.end_time, "s")],
+        ["motor torque at contact", f"{with_unit(run.torque_at_contact, 'N m')}{of_one}"],
+        ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}{of_one}"],
+        ["contacts", f"{run.contacts}{of_one}"],
+        ["end of the run", f"{with_unit(run.end_time, 's')}{of_one}"],
         *([["torque cut off", clipped]] if clipped else []),
-        *([] if math.isnan(run.release_time) else [["brake released", with_unit(run.release_time, "s")]]),
+        *(
+            []
+            if math.isnan(run.release_time)
+            else [["brake released", f"{with_unit(run.release_time, 's')}{of_one}"]]
+        ),
         *(
             [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
             for name, one in run.positions.items()
@@ -90,8 +95,9 @@ def position_notes(runs: Sequence[Run]) -> list[str]:
     if not worst:
         return []
     text = (
-        "The start position is unknown: each figure is the worst of both flanks and mid-gap. K_dyn is "
-        f"largest from: {', '.join(worst)}."
+        "The start position is unknown: K_dyn, torques, impacts and times of a start are the worst of both "
+        "flanks and mid-gap; curves, stages and contacts belong to the start with the largest torque: "
+        f"{', '.join(worst)}."
     )
     known = "Friction holds the load anywhere; give start.position if it is always the same."
     return [text if runs[0].drive.position_given else f"{text} {known}"]
@@ -210,8 +216,8 @@ def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
 def shaft_torques(axes: Axes, run: Run) -> None:
     """The torque of each shaft with its peak, and where K_dyn is 1."""
     for (name, line), torque, time, peak in zip(
-        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.peak_times, run.recorded.shafts["peak"],
-        strict=True,
+        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.recorded.shafts["peak_time"],
+        run.recorded.shafts["peak"], strict=True,
     ):  # fmt: skip
         axes.plot(run.t, torque, label=name, **line)
         axes.plot([time], [peak], "o", ms=4, color=line["color"])
@@ -232,7 +238,7 @@ def speeds(axes: Axes, run: Run) -> None:
         axes.axhline(target, color=GREY, lw=0.8, ls=":", label="target")
     reached = not math.isnan(run.start_time)
     if reached:
-        axes.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
+        axes.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
     title = f"start time {run.start_time:.4f} s" if reached else run.status.value
     head(axes, title, f"speed, {units.of('rad/s')}")
 

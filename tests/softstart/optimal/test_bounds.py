@@ -25,8 +25,8 @@ from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import SimulationError
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.bounds import earliest_pull, least_heat, momentum_bound, momentum_shortest_time
-from softstart.optimal.check import heat_of
 from softstart.optimal.problem import Problem
+from softstart.optimal.result import heat_of
 
 
 def slack(machine: Any, k_dyn: float, start_time: float, terminal: Any = "reached") -> float:

@@ -12,10 +12,10 @@ import pytest
 from tests.softstart.optimal.drives import CRANE, CURVE, LONG, damped_crane, played
 
 from softstart import TorqueProfile
-from softstart.optimal.check import check, heat_of, replayed, torque_allowed
+from softstart.optimal.check import check, replayed, torque_allowed
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import solve
-from softstart.optimal.result import LowerBound, OptimumError
+from softstart.optimal.result import LowerBound, OptimumError, heat_of
 from softstart.optimal.starts import carried
 from softstart.start.rows import rows_of
 
