@@ -20,13 +20,19 @@ from softstart.input.parameters import REQUIRED
 from softstart.plugins import STUDIES, registered
 from softstart.study import find_study
 
+OUTPUT = {"": "", "value": "yes", "limit": "yes, without losses", "here": "always"}
+
 
 def drive_file() -> str:
     """Every key of a drive file."""
     lines: list[str] = []
     for table in dict.fromkeys(p.table for p in PARAMETERS.values()):
-        lines += [_heading(table, False), "", "| key | symbol | unit | default | range | meaning | example |"]
-        lines += ["|---|---|---|---|---|---|---|"]
+        lines += [
+            _heading(table, False),
+            "",
+            "| key | symbol | unit | default | range | meaning | example | at output |",
+        ]
+        lines += ["|---|---|---|---|---|---|---|---|"]
         for p in (p for p in PARAMETERS.values() if p.table == table):
             default = "**required**" if p.required else _default(p.default, p.unit, p.follows)
             if p.name == "target_speed":
@@ -34,7 +40,7 @@ def drive_file() -> str:
             limit = _choices(p.choices) or _limit(p.limit, p.unit)
             lines.append(
                 f"| `{p.key}` | {p.symbol and f'`{p.symbol}`'} | {_unit(p.unit)} | {default} | {limit} "
-                f"| {prose(p.meaning)} | `{p.example}` |"
+                f"| {prose(p.meaning)} | `{p.example}` | {OUTPUT[p.at_output]} |"
             )
         lines.append("")
     return "\n".join(lines)

@@ -332,10 +332,11 @@ def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
     return float(numbers) if numbers.ndim == 0 else numbers
 
 
-def shortest(value: float, unit: str) -> str:
+def shortest(value: float, unit: str, within: float = 0.0) -> str:
     """The shortest text that `parse` reads back to this very float: in SI, or in the unit it was written in.
 
-    Another unit than that of SI is named only where the number would have more than `MOST_DIGITS` digits.
+    Another unit than that of SI is named only where the number would have more than `MOST_DIGITS` digits. A
+    value that was brought over to another shaft is as it was written `within` a share of it.
 
     >>> shortest(0.5, "rad"), shortest(0.06981317007977318, "rad"), shortest(92.1533845053006, "rad/s")
     ('0.5', '4 deg', '880 rpm')
@@ -343,10 +344,13 @@ def shortest(value: float, unit: str) -> str:
     ('0.3333333333333333', '15000 N*m/deg')
     """
     plain = repr(float(value))
+    if within and abs(float(f"{value:.{MOST_DIGITS}g}") - value) <= within * abs(value):
+        plain = f"{value:.{MOST_DIGITS}g}"
     if len(plain) <= MOST_DIGITS or not math.isfinite(value):
         return plain
     texts = [f"{value / ORDINARY[one, unit]:.{MOST_DIGITS}g} {one}" for one in TYPED.get(unit, ())]
-    return min((one for one in texts if parse(one, unit) == value), key=len, default=plain)
+    same = [one for one in texts if abs(cast("float", parse(one, unit)) - value) <= within * abs(value)]
+    return min(same, key=len, default=plain)
 
 
 class Units(NamedTuple):
@@ -465,6 +469,8 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     written = stripped[match.end() :].strip()
     if "," in written:
         raise RefusedError(doubtful_comma(stripped, unit))
+    if re.search(r"\sat\s", written):
+        raise RefusedError('"at output" does not apply here; leave it out')
     named = infinite and "inf" in match.group().lower()  # infinity is written, not a number with many digits
     number = _checked(float(match.group()), unit, named)
     if not written:

@@ -103,7 +103,11 @@ class Chain(Words):
     brake: ClassVar[str] = "none"
     release_time: ClassVar[float] = 0.0
     position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
-    gear_ratio: ClassVar[None] = None  # masses and shafts are given at their own shafts
+    gear: ClassVar[None] = None  # masses and shafts are given at their own shafts
+    NO_GEAR: ClassVar[str] = (
+        'the gears of a chain are in its shafts, so that it has no one output; leave out "at output", and '
+        "write the value at the motor shaft, or that of one shaft at its own side, as shaft[2].gap"
+    )
     KIND: ClassVar[str] = "chain"
     LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 

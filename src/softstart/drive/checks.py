@@ -127,6 +127,12 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
         "permissible_torque", "load_torque", abs(torque) >= permitted,
         "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft",
     )  # fmt: skip
+    output, ratio = get("permissible_output_torque", "gear_ratio")
+    yield (
+        "permissible_output_torque", "load_torque", abs(Mc) * ratio >= output,
+        "at constant speed {other} at the motor shaft is more than that at the output already; give the "
+        "permissible peak there",
+    )  # fmt: skip
     yield (
         "permissible_torque", "load_friction", (abs(torque) < permitted) & (Mc >= permitted),
         "at constant speed the shaft already carries the load torque and {other}; give the permissible peak, "

@@ -13,8 +13,10 @@ from softstart.drive.model import Drive
 from softstart.errors import InputError
 from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import text_of
+from softstart.input.gear import Gear
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
 from softstart.input.parameters import Mistake, Parameter, Wording, bare, read_value, without_unit
+from softstart.quantities import Units, shortest
 
 __all__ = [
     "ABOUT", "INSTEAD", "MACHINES", "TYPICAL", "USUAL", "DataSheet", "Machine", "echo", "if_empty", "typed",
@@ -73,14 +75,14 @@ SETTLE = {
 }  # fmt: skip
 
 
-def _maybe(path: str, unit: str, meaning: str, example: str) -> Any:
+def _maybe(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
     """A quantity above 0 that need not be given."""
-    return parameter(path, unit, meaning, example, "above 0", default=None)
+    return parameter(path, unit, meaning, example, "above 0", default=None, **more)
 
 
-def _nothing(path: str, unit: str, meaning: str, example: str) -> Any:
+def _nothing(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
     """A quantity that is 0 where it is not given."""
-    return parameter(path, unit, meaning, example, "0 or more", default=0.0)
+    return parameter(path, unit, meaning, example, "0 or more", default=0.0, **more)
 
 
 class DataSheet(ParameterSet):
@@ -159,8 +161,9 @@ class DataSheet(ParameterSet):
     efficiency: Number = parameter("gear.efficiency", "1", "efficiency of all gears", "0.94",
         "above 0 and at most 1", default=0.95)
     gear_stiffness: MaybeNumber = _maybe("gear.stiffness", "N*m/rad", "stiffness of the gears at the output",
-        '"25 N*m/arcmin"')
-    backlash: Number = _nothing("gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"')
+        '"25 N*m/arcmin"', at_output="here")
+    backlash: Number = _nothing("gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"',
+        at_output="here")
     shaft_diameter: MaybeNumber = _maybe("output.diameter", "m",
         "diameter of the steel shaft behind the gears", '"55 mm"')
     shaft_length: MaybeNumber = _maybe("output.length", "m", "length of the steel shaft behind the gears",
@@ -182,12 +185,17 @@ class DataSheet(ParameterSet):
     resistance: MaybeNumber = parameter("load.resistance", "1", "resistance to motion over weight", "0.008",
         "from 0 to 1", default=None)
     output_inertia: Number = _nothing("load.inertia", "kg*m^2",
-        "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"')
+        "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"', at_output="here")
     output_torque: Number = _nothing("load.torque", "N*m", "further torque of the load at the output",
-        '"20 N*m"')
+        '"20 N*m"', at_output="here")
     motors: Number = parameter("load.motors", "1", "motors on one load and rope", "2", "above 0", default=1.0)
     damping_ratio: Number = parameter("shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03",
         "from 0 to 1", default=0.02)
+    permissible_output_torque: MaybeNumber = _maybe("limits.output_torque", "N*m",
+        "permissible peak torque at the output, by the catalogue of the gearbox", '"1.6 kN*m"',
+        at_output="here")
+    permissible_torque: MaybeNumber = _maybe("limits.shaft_torque", "N*m",
+        "permissible peak torque at the motor shaft, as of a coupling there", '"130 N*m"')
     # fmt: on
 
     # making one -------------------------------------------------------------------------------------------
@@ -371,6 +379,10 @@ class DataSheet(ParameterSet):
         return self.efficiency if {"efficiency", "ratio"} & self.given().keys() else 1.0
 
     @property
+    def _gear(self) -> Gear:
+        return Gear(self.ratio, self._eta)
+
+    @property
     def _arm(self) -> float:
         """Radius on which the load moves with the output, m."""
         return (self.radius or 0.0) / self.reeving
@@ -378,20 +390,20 @@ class DataSheet(ParameterSet):
     @cached_property
     def _stiffnesses(self) -> dict[str, float]:
         """By part, N m/rad at the motor shaft."""
-        behind = self.ratio**2 * self._eta
+        gear = self._gear
         rope, found = self.rope_stiffness, {}
         if self.rope_length and self.rope_diameter:
             rope = self.rope_modulus * METAL * self.rope_diameter**2 / self.rope_length
         if self.coupling_stiffness is not None:
             found["coupling"] = self.coupling_stiffness
         if self.gear_stiffness is not None:
-            found["gears"] = self.gear_stiffness / behind
+            found["gears"] = gear.to_motor(self.gear_stiffness, "N*m/rad")
         if self.shaft_diameter and self.shaft_length:
             twist = STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length)
-            found["output shaft"] = twist / behind
+            found["output shaft"] = gear.to_motor(twist, "N*m/rad")
         if rope:
-            shared = behind * self.motors
-            found[f"rope{self._mark('rope_modulus')}"] = rope * self.reeving * self._arm**2 / shared
+            drum = rope * self.reeving * self._arm**2 / self.motors
+            found[f"rope{self._mark('rope_modulus')}"] = gear.to_motor(drum, "N*m/rad")
         return found
 
     @cached_property
@@ -401,9 +413,10 @@ class DataSheet(ParameterSet):
         if self.coupling_play and self.coupling_diameter:
             found["coupling"] = 2.0 * self.coupling_play / self.coupling_diameter
         if self.backlash:
-            found["gears"] = self.backlash * self.ratio
+            found["gears"] = self._gear.to_motor(self.backlash, "rad")
         if self.output_play and self.play_diameter:
-            found["behind the gears"] = 2.0 * self.output_play / self.play_diameter * self.ratio
+            play = 2.0 * self.output_play / self.play_diameter
+            found["behind the gears"] = self._gear.to_motor(play, "rad")
         return found
 
     @cached_property
@@ -426,7 +439,9 @@ class DataSheet(ParameterSet):
 
     def _lines(self) -> dict[str, tuple[str, str]]:
         """The drive file by parameter of a drive: the value as TOML, and what it is from."""
-        i, eta, rated, mark = self.ratio, self._eta, self.rated, self._mark
+        geared = bool({"ratio", "efficiency"} & self.given().keys())
+        gear, rated, mark = self._gear, self.rated, self._mark
+        i, eta = gear
         stiffness = 1.0 / sum(1.0 / one for one in self._stiffnesses.values())
         through = "no gears"
         if i != 1.0 or eta != 1.0:
@@ -434,8 +449,8 @@ class DataSheet(ParameterSet):
         shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
         inertia, inertia_from, torque, torque_from = self._load
         J1 = self.motor_inertia + self.added_inertia
-        J2 = inertia / (i**2 * eta) / self.motors
-        Mc = torque / (i * eta) / self.motors
+        J2 = gear.to_motor(inertia / self.motors, "kg*m^2")
+        Mc = gear.to_motor(torque / self.motors, "N*m")
         damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * J1 * J2 / (J1 + J2))
         speed = f'"{self.rated_speed * 30.0 / math.pi:.6g} rpm"'
         hoist, gap = self.machine == "hoist", sum(self._gaps.values())
@@ -443,11 +458,25 @@ class DataSheet(ParameterSet):
         unsaid = assumed and "source" not in self.given()
         more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
 
+        def at_motor(number: float) -> str:
+            return f"at the motor {number:.5g}, " if geared else ""
+
         def parts(found: Mapping[str, float]) -> str:
             return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in found.items())
 
         def si(number: float | None, unit: str) -> str:
             return "" if number is None else f'"{number:.5g} {unit}"'
+
+        def there(number: float, unit: str, behind: object = True) -> str:
+            """At the output, where it can be known there: as the sheet says it."""
+            if not (geared and behind):
+                return si(number, unit)
+            value = float(gear.to_output(number, unit))
+            if unit == "rad":  # as catalogues give a backlash
+                return f'"{Units("arcmin").shown(value, unit):.9g} arcmin at output"'
+            text = shortest(value, unit, within=1e-12)
+            text = f"{value:.6g}" if len(text) > 15 else text  # computed
+            return f'"{text} at output"' if " " in text else f'"{text} {unit} at output"'
 
         def of_ratio(torque: float | None, ratio: float | None, mark: str) -> tuple[str, str]:
             if torque is not None or ratio is None or rated is None:
@@ -465,18 +494,26 @@ class DataSheet(ParameterSet):
             "rated_torque": (si(self.rated_torque, "N*m"), "plate"),
             "rated_speed": (speed, "plate"),
             "torque_lag": (si(1e3 * self.torque_lag or None, "ms"), "of the inverter"),
-            "gear_ratio": (f"{i:.5g}" if "ratio" in self.given() else "", ""),
-            "stiffness": (si(stiffness, "N*m/rad"),
+            "gear_ratio": (f"{i!r}".removesuffix(".0") if geared else "", ""),
+            "gear_efficiency": (f"{eta:.9g}" if geared else "", f"of all gears{mark('efficiency')}"),
+            "stiffness": (there(stiffness, "N*m/rad", "coupling" not in self._stiffnesses),
                           f"in series, {parts(self._stiffnesses)}"
                           f"{'; rope assumed rigid' if 'rope' in self.assumed else ''}"),
             "damping": (si(damping, "N*m*s/rad"),
                         f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
-            "gap": (si(gap, "rad"), parts(self._gaps) if gap else no_gap or "given as 0"),
-            "load_inertia": (si(J2, "kg*m^2"), f"{inertia_from}; {through}{shared}"),
-            "load_torque": (si(Mc, "N*m"), f"{torque_from}; {through}{shared}"),
+            "gap": (there(gap, "rad", gap and "coupling" not in self._gaps),
+                    parts(self._gaps) if gap else no_gap or "given as 0"),
+            "load_inertia": (there(J2, "kg*m^2"), f"{inertia_from}; {at_motor(J2)}{through}{shared}"),
+            "load_torque": (there(Mc, "N*m"), f"{torque_from}; {at_motor(Mc)}{through}{shared}"),
             "load_kind": ('"active"', "a load that hangs") if hoist else ('"reactive"', "friction"),
             "target_speed": (speed, "rated speed"),
         }  # fmt: skip
+        limits = self.permissible_torque, self.permissible_output_torque
+        if not geared:  # one shaft, for which the smaller one counts
+            limits = min((one for one in limits if one is not None), default=None), None
+        found["permissible_torque"], found["permissible_output_torque"] = (
+            (si(one, "N*m"), "") for one in limits
+        )
         if hoist:
             found |= {
                 "start_position": ('"hanging"', "the brake holds the motor, the load winds up the shaft"),
@@ -488,7 +525,10 @@ class DataSheet(ParameterSet):
         return found
 
     def drive_toml(self) -> str:
-        """The drive file: every number at the motor shaft, with what it is from in a comment."""
+        """The drive file: each number where it is known, with what it is from in a comment.
+
+        That of a part behind the gear is "at output" there, which `Drive` brings to the motor shaft.
+        """
         blocks, found = [], self._lines()
         for table in Drive.TABLES:
             lines = [(p.key, *found[p.name]) for p in table.parameters if found.get(p.name, ("",))[0]]
@@ -503,7 +543,7 @@ class DataSheet(ParameterSet):
 
     @cached_property
     def drive(self) -> Drive:
-        """The drive of `drive_toml`: its numbers have five digits, as those of the file."""
+        """The drive of `drive_toml`: what is computed has five or six digits there, what is typed all."""
         try:
             return Drive.from_toml(self.drive_toml(), where="the drive that follows")
         except InputError as error:

@@ -73,13 +73,15 @@ class SNCurve:
 class Limit:
     """One limit of a drive: its name and unit, the figure of a start that it bounds, how large that may be.
 
-    `most` is an array where the limit differs from start to start.
+    `most` is an array where the limit differs from start to start. It bounds `scale` times the figure: of a
+    torque at the output that is the gear ratio.
     """
 
     name: str
     unit: str
     figure: str
     most: Any
+    scale: Any = 1.0
 
     def share_left(self, value: ArrayLike) -> NDArray[np.float64]:
         """What such a figure leaves of the limit, a share: below 0 where it is exceeded.
@@ -87,7 +89,7 @@ class Limit:
         >>> float(Limit("shaft torque", "N m", "peak_torque", 200.0).share_left(150.0))
         0.25
         """
-        return np.asarray(1.0 - np.asarray(value, dtype=np.float64) / self.most)
+        return np.asarray(1.0 - np.asarray(value, dtype=np.float64) / (self.most / self.scale))
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,8 @@ class Limits:
     Attributes
     ----------
     shaft_torque : float or None
-        Permissible peak of the shaft torque, N m at the motor shaft.
+        Permissible peak of the shaft torque, N m at the motor shaft; of a limit there and one at the output
+        the stricter.
     start_time : float or None
         Longest start time, s.
     starts_per_hour : float or None
@@ -108,6 +111,11 @@ class Limits:
         What it withstands.
     used_torque : float or None
         What a start may use of the permissible torques of the shafts of a chain, %: 100 where one is given.
+    output_torque : float or None
+        Permissible peak of the torque at the output of the gear, N m there. It is checked without losses, the
+        safe side: `shaft_torque` is at most `output_torque/ratio`.
+    ratio : float or None
+        That of the gear.
     """
 
     shaft_torque: float | None = None
@@ -116,6 +124,8 @@ class Limits:
     life: float | None = None
     fatigue: SNCurve | None = None
     used_torque: float | None = None
+    output_torque: float | None = None
+    ratio: float | None = None
 
     @property
     def starts(self) -> float | None:
@@ -131,8 +141,13 @@ class Limits:
     @property
     def each(self) -> tuple[Limit, ...]:
         """The limits that there are; of the life the share in per cent that the starts asked for use."""
+        output, ratio = self.output_torque, self.ratio
+        torque = Limit("shaft torque", "N m", "peak_torque", self.shaft_torque)
+        if output is not None and ratio is not None and np.all(self.shaft_torque == output / ratio):
+            # where the output decides, it is told there
+            torque = Limit("output torque", "N m", "peak_torque", output, ratio)
         found = (
-            Limit("shaft torque", "N m", "peak_torque", self.shaft_torque),
+            torque,
             Limit("permissible torque", "%", "used_torque", self.used_torque),
             Limit("start time", "s", "start_time", self.start_time),
             Limit("used life", "%", "used_life", None if self.life is None else 100.0),
@@ -159,13 +174,22 @@ class Limits:
 
 
 def limits_of(values: Mapping[str, Any]) -> Limits:
-    """The limits among the values of a drive."""
+    """The limits among the values of a drive.
+
+    >>> limits = limits_of({"permissible_output_torque": 1600.0, "gear_ratio": 40.0})
+    >>> limits.shaft_torque, limits.each[0].name
+    (40.0, 'output torque')
+    """
     slope, torques, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
     points = tuple(sorted(zip(torques or (), cycles or (), strict=True), reverse=True))
     fatigue = SNCurve(slope, points) if slope is not None or points else None
+    torque, output = values.get("permissible_torque"), values.get("permissible_output_torque")
+    ratio = values.get("gear_ratio")
+    if output is not None and ratio is not None:  # the stricter of two
+        torque = output / ratio if torque is None else np.minimum(torque, output / ratio)
     return Limits(
-        values.get("permissible_torque"), values.get("permissible_start_time"),
-        values.get("starts_per_hour"), values.get("required_life"), fatigue,
+        torque, values.get("permissible_start_time"), values.get("starts_per_hour"),
+        values.get("required_life"), fatigue, None, output, ratio,
     )  # fmt: skip
 
 
@@ -180,6 +204,12 @@ def contradicting_limits(
         subject = f"{wording.label(parameters[key])} = {wording.show(value)}"
         return wording.sentence(subject, reason.format(other=other and wording.label(parameters[other])))
 
+    if values.get("gear_ratio") is None:
+        for key in ("permissible_output_torque", "gear_efficiency"):
+            if values.get(key) not in (None, parameters[key].default):
+                yield wrong(
+                    key, "without {other} there is no output; give it, or leave this out", "gear_ratio"
+                )
     if values.get("required_life") is not None and values.get("starts_per_hour") is None:
         yield wording.missing(parameters["starts_per_hour"]).sentence
     slope, torque, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))

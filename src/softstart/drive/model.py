@@ -17,6 +17,7 @@ from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
+from softstart.input.gear import NO_GEAR, Gear
 from softstart.input.parameter_set import (
     MaybeNumber,
     MaybeSeries,
@@ -26,8 +27,8 @@ from softstart.input.parameter_set import (
     parameter,
     read_settings,
 )  # fmt: skip
-from softstart.input.parameters import Knob, Parameter, Wording
-from softstart.quantities import show
+from softstart.input.parameters import Knob, Parameter, Wording, read_value
+from softstart.quantities import RefusedError, show
 
 __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
 
@@ -94,6 +95,7 @@ class Drive(ParameterSet):
     WHAT: ClassVar[str] = "a drive"
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
+    NO_GEAR: ClassVar[str] = NO_GEAR
     # as a chain has it
     motor_index, load_index = 0, 1
     mass_names: ClassVar[tuple[str, ...]] = ("motor", "load")
@@ -149,29 +151,32 @@ class Drive(ParameterSet):
         "0 or more", default=0.0)
     gear_ratio: MaybeNumber = parameter("gear.ratio", "1", "turns of the motor for one of the output", "31.5",
         "above 0", default=None)
+    gear_efficiency: Number = parameter("gear.efficiency", "1", "efficiency of all gears", "0.94",
+        "above 0 and at most 1", default=1.0)
     stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"',
-        "above 0", symbol="c")
+        "above 0", symbol="c", at_output="value")
     damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"',
-        "0 or more", default=0.0, symbol="d")
-    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap")
+        "0 or more", default=0.0, symbol="d", at_output="value")
+    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap",
+        at_output="value")
     contact_law: ContactLaw = parameter("shaft.contact_law", "", "law of the shaft torque in contact",
         '"no-pull"', default="no-pull", choices=get_args(ContactLaw))
     load_inertia: Number = parameter("load.inertia", "kg*m^2", "inertia of the load at the motor shaft",
-        '"0.175 kg*m^2"', "above 0", symbol="J2")
+        '"0.175 kg*m^2"', "above 0", symbol="J2", at_output="value")
     load_torque: Number = parameter("load.torque", "N*m", "torque of the load at the motor shaft",
-        '"7.16 N*m"', symbol="Mc")
+        '"7.16 N*m"', symbol="Mc", at_output="value")
     load_kind: LoadKind = parameter("load.kind", "", "kind of the load torque", '"active"', default="active",
         choices=get_args(LoadKind))
     load_friction: Number = parameter("load.friction", "N*m",
         "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=0.0)
     load_viscous_friction: Number = parameter("load.viscous_friction", "N*m*s/rad",
         "viscous friction of the load at the motor shaft", '"0.02 N*m*s/rad"', "0 or more", default=0.0,
-        symbol="b2")
+        symbol="b2", at_output="value")
     target_speed: Number = parameter("start.target_speed", "rad/s", "speed that the load is to reach",
-        '"880 rpm"', "above 0", default=None, follows="rated_speed")
+        '"880 rpm"', "above 0", default=None, follows="rated_speed", at_output="value")
     start_position: NumberOrWord = parameter("start.position", "rad",
         "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"', default="mid-gap",
-        choices=get_args(Position), symbol="theta", formerly="shaft.start_position")
+        choices=get_args(Position), symbol="theta", formerly="shaft.start_position", at_output="value")
     brake: Brake = parameter("start.brake", "", "brake that holds the motor until its release", '"motor"',
         default="none", choices=get_args(Brake))
     release: NumberOrWord = parameter("start.release", "s",
@@ -179,14 +184,19 @@ class Drive(ParameterSet):
         choices=("torque",))
     initial_speed: NumberOrWord = parameter("start.initial_speed", "rad/s",
         "speed of motor and load at the start, or minus the target speed", '"-20 rad/s"', default=0.0,
-        choices=("reversal",))
+        choices=("reversal",), at_output="value")
     initial_load_speed: Number = parameter("start.initial_load_speed", "rad/s",
-        "speed of the load at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
+        "speed of the load at the start", '"0 rad/s"', default=0.0, follows="initial_speed",
+        at_output="value")
     initial_motor_speed: Number = parameter("start.initial_motor_speed", "rad/s",
         "speed of the motor at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
 
     permissible_torque: MaybeNumber = parameter("limits.shaft_torque", "N*m",
-        "permissible peak of the shaft torque", '"130 N*m"', "above 0", default=None)
+        "permissible peak of the shaft torque at the motor shaft", '"130 N*m"', "above 0", default=None,
+        at_output="limit")
+    permissible_output_torque: MaybeNumber = parameter("limits.output_torque", "N*m",
+        "permissible peak of the torque at the output of the gear", '"1.6 kN*m"', "above 0", default=None,
+        at_output="here")
     permissible_start_time: MaybeNumber = parameter("limits.start_time", "s",
         "longest permissible start time", '"1.5 s"', "above 0", default=None)
     starts_per_hour: MaybeNumber = parameter("limits.starts_per_hour", "1",
@@ -196,7 +206,8 @@ class Drive(ParameterSet):
     fatigue_slope: MaybeNumber = parameter("limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6",
         "above 0", default=None)
     fatigue_torque: MaybeSeries = parameter("limits.fatigue.torque", "N*m",
-        "torque of the points of the S-N curve", '"90 N*m"', "above 0", default=None, many=True)
+        "torque of the points of the S-N curve", '"90 N*m"', "above 0", default=None, many=True,
+        at_output="limit")
     fatigue_cycles: MaybeSeries = parameter("limits.fatigue.cycles", "1",
         "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True)
     # fmt: on
@@ -223,6 +234,22 @@ class Drive(ParameterSet):
             at_rest = "unknown" if anywhere and not moves else "mid-gap"
             found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else at_rest
         return found
+
+    @classmethod
+    def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
+        ratio, efficiency = (given.get(f"gear_{key}") for key in ("ratio", "efficiency"))
+        if ratio is None:
+            return NO_GEAR
+        found = []
+        for name, value in (
+            ("gear_ratio", ratio),
+            ("gear_efficiency", 1.0 if efficiency is None else efficiency),
+        ):
+            try:
+                found.append(read_value(cls.PARAMETERS[name], value, batch=cls.BATCH))
+            except RefusedError:
+                found.append(1.0)  # it is refused under its own name
+        return Gear(*found)
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         derived = self._derived(values)
@@ -407,6 +434,42 @@ class Drive(ParameterSet):
                 yield f"{name} = {show(value)} {self.PARAMETERS[name].unit}: {reason}; set it to 0."
 
     @property
+    def gear(self) -> Gear | None:
+        """The gear, between the motor shaft, at which everything counts, and the output; None without ratio.
+
+        >>> Drive.load("crane-4amtkf").replace(gear_ratio=38.1, gear_efficiency="95 %").gear
+        Gear(ratio=38.1, efficiency=0.95)
+        """
+        return None if self.gear_ratio is None else Gear(self.gear_ratio, self.gear_efficiency)
+
+    @property
+    def at_output(self) -> dict[str, Any]:
+        """The values of the drive that may be given at the output, in SI *there*, by name; {} without a gear.
+
+        Of limits without losses, the safe side.
+
+        >>> geared = Drive.load("crane-4amtkf").replace(gear_ratio=38.1, gear_efficiency=0.95)
+        >>> sheet = geared.replace(gap="9 arcmin at output", stiffness="35 kN*m/rad at output")
+        >>> round(sheet.stiffness, 3), [round(sheet.at_output[name], 9) for name in ("stiffness", "gap")]
+        (25.38, [35000.0, 0.002617994])
+        """
+        if (gear := self.gear) is None:
+            return {}
+        found = dict[str, Any]()
+        for name, p in PARAMETERS.items():
+            value, through = getattr(self, name), gear.lossless if p.at_output == "limit" else gear
+            if p.at_output == "here":
+                found[name] = value
+            elif p.at_output and not isinstance(value, str) and value is not None:
+                several = isinstance(value, tuple)
+                found[name] = (
+                    tuple(through.to_output(np.array(value), p.unit).tolist())
+                    if several
+                    else through.to_output(value, p.unit)
+                )
+        return {name: value for name, value in found.items() if value is not None}
+
+    @property
     def Omega(self) -> float:
         """Elastic frequency in contact, undamped: `sqrt(c (J1 + J2)/(J1 J2))`, rad/s, [G](8)."""
         Omega: float = elastic_frequency(self.J1, self.J2, self.c)
@@ -518,7 +581,7 @@ class Drive(ParameterSet):
     @property
     def permissible_torques(self) -> Vector:
         """What the shaft permits, N m, as an array; NaN where nothing is given."""
-        most = self.permissible_torque
+        most = self.limits.shaft_torque
         return np.array([math.nan if most is None else most])
 
     @property

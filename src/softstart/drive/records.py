@@ -52,7 +52,7 @@ class Columns(Drive):
     @property
     def permissible_torques(self) -> Matrix:
         """A row for each drive."""
-        most = self.permissible_torque
+        most = self.limits.shaft_torque
         return each_of(self, math.nan if most is None else most)[:, None]
 
 

@@ -181,7 +181,7 @@ def plan_experiments(
     bench = Bench(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
     experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
-        torque, travel = drive.permissible_torque or max(one.peak for one in experiments), math.inf
+        torque, travel = drive.limits.shaft_torque or max(one.peak for one in experiments), math.inf
         if max_torque is not None:
             torque = _between("max_torque", max_torque, "N*m")
         if max_travel is not None:

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from softstart.errors import InputError
 from softstart.input.documents import Table, changed, placed
+from softstart.input.gear import NO_GEAR, Gear
 from softstart.input.parameters import (
     REQUIRED,
     Limit,
@@ -136,8 +137,9 @@ class ParameterSet:
         """
         parameters = self.PARAMETERS
         values, found = read_values(
-            given, parameters, wording, batch=self.BATCH, known=known, several=self.SEVERAL
-        )
+            given, parameters, wording, batch=self.BATCH, known=known, several=self.SEVERAL,
+            gear=self._gear_in(given),
+        )  # fmt: skip
         wrong = [*mistakes, *found]
         for name in [one for one in given if one not in parameters]:
             free = [p for p in parameters.values() if p.name not in given]
@@ -163,6 +165,11 @@ class ParameterSet:
             sentences = [before + sentence for sentence in self.contradictions()]
         if sentences:
             raise InputError(sentences)
+
+    @classmethod
+    def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
+        """The gear among the values given, through which those "... at output" go, or why there is none."""
+        return NO_GEAR
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         """Sentences on values that contradict one another, of those that are right in themselves."""

@@ -10,11 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "bare", "meant_by", "read_value",
-    "read_values", "sentences_of", "without_unit",
+    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "at_motor", "bare", "meant_by",
+    "read_value", "read_values", "sentences_of", "without_unit",
 ]  # fmt: skip
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
@@ -59,6 +60,9 @@ class Parameter:
     unit and `choices` is a quantity or one of these words. A `many` parameter is a list of numbers, an
     `infinite` one may be infinity. `example` is what to type. `table` is that of the file, "" above the first
     one; `name` is the keyword in Python, by default the key; `formerly` is an older path, read as well.
+    `at_output` says whether the value may be written "at output" of the gear: as one that losses change
+    ("value"), as a limit, which is brought over without losses, or as one that is "here" anyway; one with a
+    "side" has the gear beside it.
     """
 
     key: str
@@ -76,6 +80,7 @@ class Parameter:
     name: str = ""
     formerly: str = ""
     positional: bool = False
+    at_output: Literal["", "value", "limit", "here", "side"] = ""
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -205,11 +210,12 @@ def read_values(
     batch: bool = False,
     known: Mapping[str, Any] = {},
     several: str = "",
+    gear: Gear | str = NO_GEAR,
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """The values of `parameters` (by the names used in `given`), and what is wrong or missing.
 
     `known` holds values that were read before. None stands for "not given" where that is the default.
-    `several` is the reason why a list is refused.
+    `several` is the reason why a list is refused, `gear` what "... at output" goes through.
     """
     values: dict[str, Any] = {}
     mistakes: list[Mistake] = []
@@ -218,7 +224,7 @@ def read_values(
             values[name] = known[name]
         elif name in given and not (given[name] is None and parameter.default is None):
             try:
-                values[name] = read_value(parameter, given[name], batch=batch, several=several)
+                values[name] = read_value(parameter, given[name], batch=batch, several=several, gear=gear)
             except RefusedError as refusal:
                 mistakes.append(Mistake(wording.refused(parameter, given[name], refusal)))
         elif parameter.default is REQUIRED:
@@ -258,10 +264,18 @@ def without_unit(
     return found
 
 
-def read_value(parameter: Parameter, value: object, *, batch: bool = False, several: str = "") -> Any:
+def read_value(
+    parameter: Parameter,
+    value: object,
+    *,
+    batch: bool = False,
+    several: str = "",
+    gear: Gear | str = NO_GEAR,
+) -> Any:
     """One value in SI, as text, or one of the choices; raises `RefusedError` with reason and remedy.
 
     A `batch` lets arrays of any shape through; otherwise `several` is the reason why they are refused.
+    `gear` is that through which a value "... at output" is brought to the motor shaft, or why there is none.
 
     >>> read_value(Parameter("gap", "rad", "total gap", '"0.5 rad"', "0 or more"), "500 mrad")
     0.5
@@ -274,7 +288,7 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
         return _read_choice(p, value)
     if not p.unit:
         return _read_text(p, value)
-    number = parse(value, p.unit, infinite=p.infinite)
+    number = parse(at_motor(p, value, gear), p.unit, infinite=p.infinite)
     if p.many:
         number = np.atleast_1d(number)
         if number.ndim > 1:
@@ -294,6 +308,26 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False, seve
             return tuple(number.tolist())
         number.setflags(write=False)
     return number
+
+
+def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
+    """The value with "... at output" brought to the motor shaft, a number in SI; any other as it is.
+
+    `gear` may be the reason why there is none. Raises `RefusedError` where that counts, and for a parameter
+    that is not behind the gear.
+    """
+    if isinstance(value, list | tuple) and any(isinstance(one, str) for one in value):
+        alike(value)
+        return [at_motor(p, one, gear) for one in value]
+    found = BEHIND.fullmatch(value) if isinstance(value, str) else None
+    if found is None or p.at_output == "here":
+        return value if found is None else found[1]
+    if not p.at_output:
+        raise RefusedError(f'the {p.meaning} does not take "at output"; leave it out')
+    if p.at_output == "side" or isinstance(gear, str):
+        raise RefusedError(OWN_SIDE if p.at_output == "side" else str(gear))
+    number = parse(found[1], p.unit, infinite=p.infinite)
+    return (gear.lossless if p.at_output == "limit" else gear).to_motor(number, p.unit)
 
 
 def _refuse(number: Value, allowed: Any, reason: str) -> None:

@@ -26,6 +26,7 @@ TITLES = {
     "output": "Behind the gearbox",
     "rope": "Rope",
     "shaft": "Damping",
+    "limits": "Permissible torque",
 }
 
 

@@ -16,7 +16,7 @@ log = logging.getLogger("softstart.page")
 LONGEST = 300  # characters of an exception
 LONGEST_NAME = 60  # characters of a name in a sentence
 NAMED = 3  # parameters named in a sentence
-WORDS = ("name", "source", "assumed", "units", "gear_ratio")  # they change no result
+WORDS = ("name", "source", "assumed", "units", "gear_ratio", "gear_efficiency")  # they change no result
 
 
 OWN_MISTAKE = "This did not work, and that is a mistake in softstart, not in your input ({})."

@@ -16,6 +16,8 @@ from markupsafe import Markup, escape
 
 from softstart.drive import doubts
 from softstart.errors import listed
+from softstart.input.gear import Gear
+from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, figures, limit
 from softstart.reporting.resolution import rated_torque
@@ -33,6 +35,7 @@ from softstart.views.numbers import (
     at_output,
     digits,
     fixed,
+    gear_in_words,
     percent,
     printed,
     short,
@@ -182,7 +185,7 @@ def document(report: Report) -> str:
         "no_lives": report.lives if asked and not lasts else "",
         "project": report.project, "sections": [(key, title) for key, title in sections.items() if title],
         "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS,
-        "geared": drive.gear_ratio is not None,
+        "geared": drive.gear is not None, "gear_in_words": gear_in_words(drive),
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
         "doubts": doubts.doubts(drive), "units": units_of(drive), "most_torque": report.most_torque,
         "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
@@ -192,7 +195,7 @@ def document(report: Report) -> str:
         "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "figures": figures, "starts": starts,
         "chains": chains, "lives": lives,
-        "output": "|#at the output, N m" if drive.gear_ratio else "", "strategies": strategies,
+        "output": "|#at the output, N m" if drive.gear else "", "strategies": strategies,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
         "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
         "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
@@ -209,10 +212,10 @@ def inverters() -> dict[str, Any]:
 
 def strategies(report: Report) -> Table:
     """The figures of all strategies, the gentlest first."""
-    rows, ratio = report.ordered, report.drive.gear_ratio
-    output = starts.Figure("at the\noutput\nN m", lambda row: float(ratio) * row.run.peak_torque)
+    rows, gear = report.ordered, report.drive.gear
+    output = starts.Figure("at the\noutput\nN m", lambda row: gear.to_output(row.run.peak_torque, "N*m"))
     shown = (
-        *starts.GENTLE, *([output] if ratio else []), *(starts.INTERVALS if rows[0].intervals else []),
+        *starts.GENTLE, *([output] if gear else []), *(starts.INTERVALS if rows[0].intervals else []),
         starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],
     )  # fmt: skip
     # a digit more than a terminal holds
@@ -228,13 +231,17 @@ def functions(report: Report) -> list[tuple[str, str]]:
     return [(key, name) for key, name in FUNCTIONS.items() if key not in left_out]
 
 
+def there_of(gear: Gear | None, parameter: Parameter, numbers: list[float]) -> str:
+    """Values of a parameter, as they are seen, at the output of the gear; "" where they have none there."""
+    through = gear and (gear.lossless if parameter.at_output == "limit" else gear)
+    if through is None or through.factor(parameter.unit) is None:
+        return ""
+    return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)
+
+
 def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
-    project, units, geared = (
-        report.project,
-        units_of(report.drive),
-        report.drive.gear_ratio is not None,
-    )
+    project, units, gear = report.project, units_of(report.drive), report.drive.gear
     rows, absent = list[list[str]](), list[str]()
     for path, (parameter, value) in report.drive.by_path().items():
         source, si = project.source_of(path), parameter.unit
@@ -247,7 +254,9 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         values = value if isinstance(value, tuple) else (value,)
         numbers = [float(units.shown(v, si)) for v in values if isinstance(v, float)]
         if numbers:
-            text, there = ", ".join(map(short, numbers)), at_output(report.drive, numbers[0], si)
+            text, there = ", ".join(map(short, numbers)), there_of(gear, parameter, numbers)
+            if parameter.at_output == "here":  # and the motor shaft is the other one
+                text, there = short(gear.lossless.to_motor(numbers[0], si)), text
         if path == "limits.life":
             hours = value / 3600.0
             text, of, other = digits(hours / fatigue.HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
@@ -258,7 +267,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         elif numbers and si == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
         cells = [parameter.meaning, parameter.symbol, text, of if numbers else "", other]
-        cells += [f"{there} {of}" if there else ""] if geared else []
+        cells += [f"{there} {of}" if there else ""] if gear else []
         rows.append([*cells, source or "not stated"] if project.sources else cells)
-    heads = "parameter|symbol|#value|unit|#that is" + ("|#at the output shaft" if geared else "")
+    heads = "parameter|symbol|#value|unit|#that is" + ("|#at the output shaft" if gear else "")
     return heads + ("|source" if project.sources else ""), rows, absent

@@ -63,11 +63,20 @@ class Case:
 
 @dataclass(frozen=True)
 class Margin:
-    """A limit and the worst value beside it; `case` says where that is, "" on the drive as it is."""
+    """A limit and the worst figure beside it; `case` says where that is, "" on the drive as it is.
+
+    `figure` is that of the start; `value` is what the limit bounds: of a torque at the output the ratio times
+    the figure.
+    """
 
     of: Limit
-    value: float
+    figure: float
     case: str
+
+    @property
+    def value(self) -> float:
+        """What is bounded, in the unit of the limit."""
+        return float(self.of.scale * self.figure)
 
     @property
     def name(self) -> str:
@@ -87,7 +96,7 @@ class Margin:
     @property
     def share(self) -> float:
         """What is left, as a share of the limit: below 0 where it is exceeded, NaN where the start fails."""
-        return float(self.of.share_left(self.value))
+        return float(self.of.share_left(self.figure))
 
     @property
     def kept(self) -> bool:

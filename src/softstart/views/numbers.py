@@ -16,11 +16,6 @@ NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
 RPM = 30.0 / math.pi  # of one rad/s
 UNITS = {"kg*m^2": "kg m\N{SUPERSCRIPT TWO}", "1": ""}  # as report and page print them
 UNIT_BEHIND = r"(?<!,) (?=(N m|N m s|kg m2|rad|rad/s|s|ms|Hz|J|%|deg|mm|N|kN)$)"  # a heading
-AT_OUTPUT = {  # exponent of the gear ratio that brings a value from the motor shaft to the output shaft
-    **dict.fromkeys(("N*m", "N*m/s"), 1),
-    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), 2),
-    **dict.fromkeys(("rad", "rad/s"), -1),
-}
 
 
 class Column(NamedTuple):
@@ -197,18 +192,34 @@ def units_of(machine: Any) -> Units:
 
 
 def at_output(machine: Any, value: float, unit: str = "N*m") -> str:
-    """A value of the motor shaft at the output shaft of the gear, without losses; "" where it has none there.
+    """A value of the motor shaft at the output of the gear, see `Drive.gear`; "" where it has none there.
 
-    Torque times i, inertia, stiffness and damping times i^2, angle and speed divided by i; the `unit` is that
-    of the parameter, the value may be in another one of its kind.
+    The `unit` is that of the parameter; the value may be in another one of its kind.
 
     >>> from softstart import Drive
-    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0)
-    >>> at_output(crane, 169.7), at_output(crane, 0.20083, "kg*m^2")
-    ('6449', '290.0')
+    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0, gear_efficiency=0.95)
+    >>> at_output(crane, 169.7), at_output(crane, 290.0 / 38.0**2 / 0.95, "kg*m^2")
+    ('6126', '290.0')
     """
-    ratio, power = machine.gear_ratio, AT_OUTPUT.get(unit)
-    return "" if ratio is None or power is None else digits(float(ratio) ** power * value)
+    gear = machine.gear
+    none = gear is None or gear.factor(unit) is None
+    return "" if none else digits(float(gear.to_output(value, unit)))
+
+
+def gear_in_words(machine: Any) -> str:
+    """How values are brought to the output of the gear of a machine, in a sentence; "" without one.
+
+    >>> from softstart import Drive
+    >>> gear_in_words(Drive.load("crane-4amtkf").replace(gear_ratio=38.0, gear_efficiency=0.95))
+    'At the output: torques times i eta, inertias, stiffness and damping times i^2 eta, angles and ...'
+    """
+    if (gear := machine.gear) is None:
+        return ""
+    return (
+        "At the output: torques times i eta, inertias, stiffness and damping times i^2 eta, angles and "
+        f"speeds over i; i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}. A limit is "
+        "brought over with eta = 1, the safe side."
+    )
 
 
 def decimals_of(step: float) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from softstart.errors import InputError
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
-from softstart.views.numbers import Column, Table, at_output, column_of, label, short
+from softstart.views.numbers import Column, Table, at_output, column_of, gear_in_words, label, short
 from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
 
@@ -218,14 +218,13 @@ def notes(tuning: Tuning) -> list[str]:
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
         optimum = "the cell's drive, its motor without lag, dead time and noise; terminal reached"
         found.append(f"Optimum: {optimum}.")
-    if drive.gear_ratio is not None:
+    if drive.gear is not None:
         gaps, inertias = (
             " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
             for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
         )
         found.append(
-            f"At the output shaft, ratio {short(float(drive.gear_ratio))}, without losses: gaps {gaps} rad, "
-            f"load inertias {inertias} kg m2; a torque there is the ratio times that at the motor."
+            f"Gaps at the output: {gaps} rad, load inertias there: {inertias} kg m2. {gear_in_words(drive)}"
         )
     return [*found, *([f"{tuning.starts:,} starts."] if tuning.starts else [])]
 

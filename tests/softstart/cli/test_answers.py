@@ -185,7 +185,7 @@ SHOWN = {
     ],
     ANCHOR: ["method closed-form", "0.909247", "gap between them"],
     QUICK_TUNE + " --set gear.ratio=10": [
-        "ratio 10, without losses: gaps 0.05000 to 0.2000 rad, load inertias 7.000 to 17.50",
+        "Gaps at the output: 0.05000 to 0.2000 rad, load inertias there: 7.000 to 17.50 kg m2",
     ],
     "sweep --controller ramp --axis shaft.gap=0.5,2 --workers 1": ["Over all starts", "2 starts;"],
     "balance --speed 4500rpm": ["VAZ-11113", "bore 82 mm", "Assumed: cylinders.bore", "fixed-h-e"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import sys
 
 import pytest
@@ -12,7 +13,7 @@ from softstart import DataSheet, Drive
 ANSWERS = [
     "gantry", "", "travel", "3", "1430", "0.0119", "0.0066", "", "2.2", "", "2.6", "2 ms", "1500", "0",
     "31.5", "0.94", "25 N*m/arcmin", "15", "55", "900",
-    "", "12 t", "0.1575", "", "1.2", "", "", "",
+    "", "12 t", "0.1575", "", "1.2", "", "", "", "1.6 kN*m", "",
 ]  # fmt: skip
 POWER = "rated power in kW, as 3 [by rated torque]: "
 SLEWING = {
@@ -44,6 +45,7 @@ def test_answers_make_a_drive_that_every_command_takes(run, typed, place):
     assert "diameter on which the coupling" not in err  # there is no play
     drive = Drive.load("mine.toml")
     assert (drive.name, drive.load_kind) == ("gantry", "reactive")
+    assert drive.limits.output_torque == 1600.0
     assert run("simulate", "mine.toml", "--controller", "ramp", "--json").code == 0
     assert "this is the file of a drive already" in run("init", "mine.toml").err
     before = (place / "mine.toml").read_text()
@@ -96,7 +98,7 @@ def test_the_template_is_a_sheet_that_can_be_filled_in(run, place, as_json):
 def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
     """Prompt, --set, data sheet given to a command, and form."""
     typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
-          "", "290", "900", "", "")  # fmt: skip
+          "", "290", "900", "", "", "", "")  # fmt: skip
     assert run("init", "--ask", "--out", "asked.toml").code == 0
     settings = [word for path, text in (SLEWING | UNITS).items() for word in ("--set", f"{path}={text}")]
     assert run("init", *settings, "--out", "set.toml").code == 0
@@ -116,7 +118,8 @@ def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
         client.delete()
     for name in ("asked", "set", "sheet", "form"):
         drive = Drive.load(f"{name}.toml")
-        assert (drive.J2, drive.c, drive.gap, drive.Mc) == (0.20083, 761.77, 0.08843, 23.684)
+        by_hand = 290 / 38**2, 1.1e6 / 38**2, math.radians(8 / 60) * 38, 900 / 38
+        assert (drive.J2, drive.c, drive.gap, drive.Mc) == pytest.approx(by_hand, rel=1e-12)
         assert drive.assumed == "damping ratio 0.02"
 
 
@@ -125,7 +128,7 @@ def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     more = ("--set", "load.inertia=580", "--set", "gear.backlash=16 arcmin", "--set", "load_torque=20")
     code, out, err = run("simulate", "sheet.toml", "--controller", "direct", *more)
     assert (code, "is a data sheet" in err) == (0, True)
-    assert "J2 = 0.40166 kg m2, Mc = 20 N m" in out
+    assert "J2 = 0.401662 kg m2, Mc = 20 N m" in out
     assert "gap = 0.17686 rad" in out
     assert "assumed: damping ratio 0.02" in out
     assert "assumed:" not in run("simulate", "sheet.toml", "--controller", "direct", "--set", "damping=1").out

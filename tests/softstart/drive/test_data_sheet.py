@@ -153,7 +153,7 @@ def test_what_nobody_gave_is_marked():
     ]  # fmt: skip
     assert sheet.drive.source == "data sheets and assumed values"
     marked = {line.split(" = ")[0] for line in sheet.drive_toml().splitlines() if ", assumed" in line}
-    assert marked == {"starting_torque", "inertia", "torque", "gap", "damping"}
+    assert marked == {"starting_torque", "efficiency", "inertia", "torque", "gap", "damping"}
 
 
 def test_a_file_and_back(tmp_path):

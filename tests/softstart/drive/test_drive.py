@@ -62,7 +62,7 @@ def test_equality_and_hash():
 def test_the_example_of_each_parameter_is_valid(parameter):
     # a life needs the starts per hour, a point of an S-N curve torque, cycles and slope
     table = [p for p in PARAMETERS.values() if p.table == parameter.table in INFORMATIVE_TABLES]
-    crane = CRANE.replace(rated_power=None)
+    crane = CRANE.replace(rated_power=None, gear_ratio=20)  # without one nothing is at the output
     changed = crane.with_settings([f"{p.path}={p.example}" for p in table or [parameter]])
     assert Drive.from_toml(changed.to_toml()) == changed
 

@@ -1,0 +1,81 @@
+"""The output of a gear: one rule that brings its values to the motor shaft and back, and "... at output"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from softstart.quantities import RefusedError
+
+__all__ = ["BEHIND", "NO_GEAR", "OWN_SIDE", "Gear", "alike"]
+
+BEHIND = re.compile(r"(.*\S)\s+at\s+(?:the\s+)?output(?:\s+shaft)?\s*", re.IGNORECASE)  # "9 arcmin at output"
+_MULTIPLE = re.compile(r".*(x|J1)\s*", re.IGNORECASE)
+NO_GEAR = 'without gear.ratio nothing is "at output"; give it, or write the value at the motor shaft'
+OWN_SIDE = (
+    'a shaft of a chain has its values on the side of its gear that `side` names; leave out "at output", '
+    'and write side = "before" or "after"'
+)
+# exponents of the ratio i and of the efficiency eta in what a value at the output is over that at the motor
+POWERS = {
+    **dict.fromkeys(("N*m", "N*m/s"), (1, 1)),
+    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), (2, 1)),
+    **dict.fromkeys(("rad", "rad/s"), (-1, 0)),
+}
+
+
+class Gear(NamedTuple):
+    """What lies between motor shaft and output: the ratio i (turns of the motor for one of the output), eta.
+
+    A torque M at the output is M/(i eta) at the motor shaft; an inertia, a stiffness and a damping are
+    divided by i^2 eta, an angle and a speed multiplied by i. The efficiency is that while the motor drives.
+
+    >>> gear = Gear(40.0, 0.8)
+    >>> gear.to_motor(1600.0, "N*m"), gear.to_motor(0.01, "rad"), gear.to_output(25.0, "N*m/rad")
+    (50.0, 0.4, 32000.0)
+    """
+
+    ratio: float
+    efficiency: float = 1.0
+
+    def factor(self, unit: str) -> Any:
+        """What a value of this SI unit at the output is over the same at the motor shaft; None: no such."""
+        of_ratio, of_efficiency = POWERS.get(unit, (0, 0))
+        return self.ratio**of_ratio * self.efficiency**of_efficiency if of_ratio else None
+
+    def to_motor(self, value: Any, unit: str) -> Any:
+        """A value at the output, in its SI unit, at the motor shaft."""
+        turns = POWERS[unit] == (-1, 0)
+        return value * self.ratio if turns else value / self.factor(unit)
+
+    def to_output(self, value: Any, unit: str) -> Any:
+        """A value at the motor shaft, in its SI unit, at the output."""
+        turns = POWERS[unit] == (-1, 0)
+        return value / self.ratio if turns else value * self.factor(unit)
+
+    @property
+    def lossless(self) -> Gear:
+        """The gear with an efficiency of 1, by which limits are brought over: the safe side.
+
+        What the output permits, M, is M/i at the motor shaft: losses would permit more there.
+        """
+        return Gear(self.ratio)
+
+
+def alike(values: Sequence[object]) -> None:
+    """Raise `RefusedError` where "at output" stands behind some values of a list alone.
+
+    0 and multiples, as "2x", are the same at both shafts.
+
+    >>> alike(["1x", "9 arcmin at output", 0])
+    >>> alike(["4.5 arcmin", "9 arcmin at output"])
+    Traceback (most recent call last):
+    softstart.quantities.RefusedError: "at output" stands behind some of the values only; write it behind ...
+    """
+    either = [one for one in map(str, values) if re.search(r"[1-9]", one) and not _MULTIPLE.fullmatch(one)]
+    if len({BEHIND.fullmatch(one) is not None for one in either}) > 1:
+        raise RefusedError(
+            '"at output" stands behind some of the values only; write it behind each that is there, and '
+            "bring the others there too"
+        )
