@@ -129,9 +129,9 @@ def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
     )  # fmt: skip
     output, ratio = get("permissible_output_torque", "gear_ratio")
     yield (
-        "permissible_output_torque", "load_torque", abs(Mc) * ratio >= output,
-        "at constant speed {other} at the motor shaft is more than that at the output already; give the "
-        "permissible peak there",
+        "permissible_output_torque", "load_torque", np.maximum(abs(torque), Mc) * ratio >= output,
+        "at constant speed the output already carries more: {other} at the motor shaft, and the friction of "
+        "the load, times the gear ratio; give the permissible peak, at the output",
     )  # fmt: skip
     yield (
         "permissible_torque", "load_friction", (abs(torque) < permitted) & (Mc >= permitted),

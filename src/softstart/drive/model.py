@@ -168,7 +168,8 @@ class Drive(ParameterSet):
     load_kind: LoadKind = parameter("load.kind", "", "kind of the load torque", '"active"', default="active",
         choices=get_args(LoadKind))
     load_friction: Number = parameter("load.friction", "N*m",
-        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=0.0)
+        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=0.0,
+        at_output="value")
     load_viscous_friction: Number = parameter("load.viscous_friction", "N*m*s/rad",
         "viscous friction of the load at the motor shaft", '"0.02 N*m*s/rad"', "0 or more", default=0.0,
         symbol="b2", at_output="value")
