@@ -401,6 +401,15 @@ class Units(NamedTuple):
             found.setdefault(key, written.pop() or si if len(written) == 1 else si)
         return cls(**found)
 
+    @property
+    def text(self) -> str:
+        """What `read` reads back to these units.
+
+        >>> Units.read("mm on 80 mm, rpm").text
+        'mm on 0.08 m, rpm'
+        """
+        return f"{self.angle}{f' on {self.diameter!r} m' if self.diameter else ''}, {self.speed}"
+
     def of(self, si: str) -> str:
         """The unit in which a quantity of this SI unit is seen."""
         return {"rad": self.angle, "rad/s": self.speed}.get(si, si)

@@ -154,3 +154,9 @@ def test_frames_of_junk(own: Any) -> None:
             tab.close()
             tab = Tab(own.url)
     tab.close()
+    # what has come through has changed nothing for a tab that is opened now, and no more than one job
+    with closing(Tab(own.url)) as later:
+        frame = later.answer(later.act(what="select", name="ramp"))
+    crane = Drive.load("crane-4amtkf")
+    assert (frame["drive"], frame["steps"], frame["mistakes"]) == (crane.name, [1, 0], {})
+    assert frame["figure"]["k_dyn"] == simulate(crane, "ramp").k_dyn

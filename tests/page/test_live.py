@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 import pytest
-from tests.page.conftest import answered, at_rest, choose, comes_to, opened, settled, wait_for_rows
+from tests.page.conftest import (
+    INSTRUMENT,
+    answered,
+    at_rest,
+    choose,
+    comes_to,
+    drawn,
+    opened,
+    settled,
+    wait_for_rows,
+)  # fmt: skip
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
@@ -123,6 +134,74 @@ def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):
     page.wait_for_function(
         "(gap) => document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value < gap", arg=gap
     )
+
+
+def test_a_press_on_the_map_means_what_its_axis_says_after_values_in_other_units(page):
+    """5.7 deg typed on a page in rad: it stays in rad, and a press sets what the read-out of the map said."""
+    at_rest(page)
+    enter(page, "shaft.gap", "5.7 deg")
+    shows(page, "shaft.gap", "5.7 deg")
+    row = page.locator('[data-path="shaft.gap"]')
+    box = page.locator(".map canvas").bounding_box()
+    for units, size in ((None, 1.0), ("deg, rpm", math.pi / 180), ("mm on 80 mm, rpm", 1e-3 / 0.04)):
+        if units:
+            page.locator("#field-units").fill(units)
+            page.locator("#field-units").press("Enter")
+            comes_to(row.locator(".unit").inner_text, units.split()[0].strip(","))
+        for share in (0.4, 0.6):  # before and after the map is drawn anew
+            page.mouse.move(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+            said = page.locator(".map .said")
+            page.wait_for_function("document.querySelector('.map .said').textContent !== ''")
+            drawn(page)
+            number, unit = said.inner_text().split()[1:3]
+            assert unit == row.locator(".unit").text_content()  # hidden beside "5.7 deg"
+            page.mouse.down()
+            page.mouse.up()
+            answered(page)
+            gap = float(settled(page, "document.getElementById('field-shaft-gap').value"))
+            assert gap == pytest.approx(float(number), rel=1e-3)
+            here = page.evaluate(f"{INSTRUMENT}.state.here[0]")
+            assert here == pytest.approx(float(number) * size, rel=1e-3)
+            at_rest(page)
+
+
+@pytest.mark.parametrize("finger", ["tap", "swipe"])
+def test_a_finger_scrolls_over_the_pictures_and_a_tap_goes_there(visit, finger):
+    """On a tablet the pictures fill the width: a swipe over them moves the page, not the drive."""
+    page = visit(768, 1024, has_touch=True)
+    at_rest(page)
+    page.locator(".map canvas").scroll_into_view_if_needed()
+    box = page.locator(".map canvas").bounding_box()
+    x, y = box["x"] + 0.62 * box["width"], box["y"] + 0.5 * box["height"]
+    places = "[...document.querySelectorAll('*')].reduce((sum, one) => sum + one.scrollTop, 0)"
+    if finger == "tap":
+        page.touchscreen.tap(x, y)
+        page.wait_for_function("document.getElementById('field-shaft-gap').value != '0.5'")
+        return
+    before = page.evaluate(places)
+    line = page.context.new_cdp_session(page)
+    for step in range(11):  # downwards, towards the top of the page
+        kind, at = "touchMove" if step else "touchStart", {"x": x, "y": y + 20 * step}
+        line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+    line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait_for_function(f"(before) => {places} < before - 50", arg=before)
+    answered(page)
+    assert field(page, "shaft.gap").input_value() == "0.5"
+
+
+def test_limits_open_in_sight_and_stay_open(page):
+    summary = page.locator("details:has(summary:text('Limits')) summary")
+    summary.click()
+    page.wait_for_function("""() => {
+      const folds = [...document.querySelectorAll(".controls details")];
+      const fold = folds.find((one) => one.textContent.startsWith("Limits"));
+      const [seen, part] = [fold.closest(".controls"), fold].map((one) => one.getBoundingClientRect());
+      return fold.open && part.bottom <= Math.min(seen.bottom, window.innerHeight) + 1;
+    }""")
+    page.locator("#field-units").fill("deg, rpm")
+    page.locator("#field-units").press("Enter")
+    comes_to(page.locator('[data-path="shaft.gap"] .unit').inner_text, "deg")
+    assert page.locator("details:has(summary:text('Limits'))").get_attribute("open") is not None
 
 
 def test_a_mistake_stands_beside_its_field_and_the_state_stays(page):

@@ -127,8 +127,7 @@ class Controls:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
 
     def _jump(self, gap: float, inertia: float) -> None:
-        units = self._screen.units
-        self._session.move(units.rounded(units.size("rad") * gap, "rad", NODE_DIGITS), inertia)
+        self._session.move(self._screen.units.rounded(gap, "rad", NODE_DIGITS), inertia)
         self._screen.mistakes.clear()
 
     def _hello(self, kept: object, link: object) -> None:

@@ -163,8 +163,8 @@ class Exports:
         session = self._session
         strategies = dict(session.controllers)
         name, self._text = self._named("report", suffix=".html"), ""
-        command = command_text(session.machine, strategies, "report", f"--out={name}")
-        work = tasks.report, session.machine, list(strategies.values()), command
+        command = command_text(session.seen, strategies, "report", f"--out={name}")
+        work = tasks.report, session.seen, list(strategies.values()), command
         self._view.begin("report", *work, subject=name)
 
     def _done(self, text: str) -> None:

@@ -22,7 +22,7 @@ from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.run import Run
-from softstart.views.numbers import unit, units_of
+from softstart.views.numbers import unit
 from softstart.views.starts import position_notes
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
@@ -82,12 +82,8 @@ class Screen:
 
     @property
     def units(self) -> Units:
-        """The units of the machine, else those in which it was loaded: a gap of 0 has none of its own."""
-        own, loaded = units_of(self.session.machine), units_of(self.session.origin)
-        speed = own.speed if own.speed != Units().speed else loaded.speed
-        if self.session.machine.units or own.angle != Units().angle:
-            return own._replace(speed=own.speed if self.session.machine.units else speed)
-        return loaded._replace(speed=speed)
+        """Those of the session."""
+        return self.session.units
 
     @property
     def version(self) -> int:
@@ -143,7 +139,9 @@ class Screen:
             "rows": [row(session, found)],
             "reference": self._reference(),
             "mapped": self.axes is not None,
-            "here": (units.shown(gap, "rad"), inertia),
+            # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
+            "here": (gap, inertia),
+            "angle": (units.of("rad"), units.size("rad")),
             "map_is_old": not self._map_is_right(),
         }
         for part, known in (("groups", self._machine), ("strategy", self._own)):
@@ -295,8 +293,7 @@ class Screen:
         inertias = (machine.gap_and_inertia[1],) * len(axes.inertias) if self.kept else axes.inertias
         symbols, labels = machines.map_words(machine)
         return {
-            "gaps": [self.units.shown(gap, "rad") for gap in axes.gaps],
-            "unit": self.units.of("rad"),
+            "gaps": list(axes.gaps),
             "inertias": list(axes.inertias),
             "strategy": self.session.selected,
             "of": str(hash(self._map_machine(axes))),
@@ -358,8 +355,13 @@ def machine_fields(session: Session, known: Mapping[str, Entry], units: Units) -
             # no damping is a damping ratio of 0
             value, first = (0.0 if one.scale and v is None else v for v in (now[path][1], before[path][1]))
             text = written_value(value, one, units)
+            typed = session.typed.get((path, value), "")
+            if (
+                " " in text and " " in typed
+            ):  # with a unit of its own: that which was typed, 36 arcmin or 0.6 deg
+                text = typed
             if path == "units":
-                text = text or f"{units.angle}, {units.speed}"  # as the machine was given
+                text = text or units.text  # as the machine was given
             shown[path] = field(one, text, value, [("as loaded", first)], units)
     return shown
 
@@ -429,7 +431,7 @@ def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
         for one in (machines.parameters_of(controller) if type(other) is type(controller) else ())
         if (value := getattr(controller, one.name)) != getattr(other, one.name)
     ]
-    return kept.label, *words, differences(kept.drive, session.machine)
+    return kept.label, *words, differences(kept.drive, session.seen)
 
 
 # traces -------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
+from softstart.page.sentences import WORDS
 from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable
 
@@ -333,13 +334,16 @@ def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
 def placeless(machine: Machine, axes: Axes, origin: Machine) -> tuple[Any, ...]:
     """What a map depends on: the values of the machine at one place of it, wherever in it the machine stands.
 
+    Not its name and its units, which change no result.
+
     >>> chain = Chain.load("crane-4-mass")
     >>> axes = axes_about(chain)
     >>> placeless(chain.moved(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
     there = machine.moved(axes.gaps[-1], axes.inertias[0], origin).by_path()
-    return tuple(rounded(one, SAME) if isinstance(one, float) else one for _, one in there.values())
+    values = [value for parameter, value in there.values() if parameter.name not in WORDS]
+    return tuple(rounded(one, SAME) if isinstance(one, float) else one for one in values)
 
 
 def k_dyn_row(

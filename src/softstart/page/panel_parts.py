@@ -206,7 +206,7 @@ class StaleNote:
         if self._drive is None or self._session.version == self._seen:
             return
         self._seen = self._session.version
-        sentence = changed_since(self._drive, self._session.machine)
+        sentence = changed_since(self._drive, self._session.seen)
         self._label.set_text(sentence)
         self._label.set_visibility(bool(sentence))
 

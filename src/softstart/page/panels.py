@@ -44,7 +44,7 @@ class OptimumPanel(TaskPanel):
         """The gentlest start."""
         text = str(self.time.value).strip()
         StartTime.of(text, "Start time")
-        return "optimal start", tasks.gentlest, self.session.machine, text, self.end.value
+        return "optimal start", tasks.gentlest, self.session.seen, text, self.end.value
 
 
 class LimitPanel(TaskPanel):
@@ -63,7 +63,7 @@ class LimitPanel(TaskPanel):
     def question(self) -> tuple[Any, ...]:
         """The curve."""
         controllers = list(self.session.controllers.values())
-        return "best profile over start time", tasks.curve, self.session.machine, controllers, self.end.value
+        return "best profile over start time", tasks.curve, self.session.seen, controllers, self.end.value
 
 
 class ChecksPanel(TaskPanel):
@@ -78,7 +78,7 @@ class ChecksPanel(TaskPanel):
     def question(self) -> tuple[Any, ...]:
         """All checks."""
         session = self.session
-        return "positions, limits and life", tasks.checked, session.machine, dict(session.controllers)
+        return "positions, limits and life", tasks.checked, session.seen, dict(session.controllers)
 
 
 class TuningPanel(TaskPanel):
@@ -106,7 +106,7 @@ class TuningPanel(TaskPanel):
 
     def question(self) -> tuple[Any, ...]:
         """The tuning."""
-        drive, name = self.session.machine, str(self.controller.value)
+        drive, name = self.session.seen, str(self.controller.value)
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
         return f"tuning of {name}", tasks.tuning, drive, name, *grid, *more
@@ -189,5 +189,5 @@ class LogPanel(TaskPanel):
         """The identification."""
         content, name = self.file
         columns = tasks.columns_of(str(self.columns.value or ""))
-        guess, kind = self.session.machine, str(self.torque_is.value)
+        guess, kind = self.session.seen, str(self.torque_is.value)
         return f"drive from {clipped(name)}", tasks.identified, content, name, guess, kind, columns

@@ -19,10 +19,11 @@ from softstart.controller.finding import changed_controller, make_controller, re
 from softstart.errors import InputError, SimulationError
 from softstart.page.machines import STRATEGY, changed, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
-from softstart.quantities import nearest
+from softstart.quantities import Units, nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import simulate
+from softstart.views.numbers import units_of
 from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
@@ -129,6 +130,7 @@ class Session:
         self._gesture = ("", -math.inf)  # what was changed last, and when
         self.name = secrets.token_urlsafe(9)
         self.version = 0  # how often anything was changed
+        self.typed: dict[tuple[str, Any], str] = {}  # texts by path and by the value that they gave
         self._listeners: list[Callable[[], None]] = []
         # what was computed last, by label, and for what; `ready` and `row` tell whether it still holds
         self._results: dict[str, tuple[Machine, Controller, Strategy]] = {}
@@ -147,6 +149,25 @@ class Session:
     def origin(self) -> Machine:
         """The drive or chain as it was loaded: ranges of sliders and maps are about it."""
         return self.bench.origin
+
+    @property
+    def units(self) -> Units:
+        """Those of angles and speeds: as the machine names them, else as its values had them when loaded.
+
+        A value that is typed in another unit changes them for no other field.
+
+        >>> session = Session("hoist-15kw")
+        >>> session.set("shaft.gap", "100 mrad")
+        >>> session.units.angle, session.seen.units
+        ('deg', 'deg, rpm')
+        """
+        return units_of(self.origin, self.machine.units)
+
+    @property
+    def seen(self) -> Machine:
+        """The machine in these units, for what is computed and written elsewhere, as reports and tabs."""
+        same = units_of(self.machine) == self.units
+        return self.machine if same else changed(self.machine, {"units": self.units.text})
 
     @property
     def controllers(self) -> Mapping[str, Controller]:
@@ -216,6 +237,9 @@ class Session:
         settings = {path: value if isinstance(value, str) else repr(float(value))
                     for path, value in changes.items()}  # fmt: skip
         self._put(gesture, drive=single(changed(self.machine, settings)))
+        if texts := {path: text for path, text in changes.items() if isinstance(text, str)}:
+            values = self.machine.by_path()
+            self.typed |= {(path, values[path][1]): text for path, text in texts.items() if path in values}
 
     def move(self, gap: float, load_inertia: float) -> None:
         """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""

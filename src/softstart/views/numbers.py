@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from softstart.quantities import Units
@@ -180,15 +181,20 @@ def unit(written: str) -> str:
     return UNITS.get(written, written.replace("*", " "))
 
 
-def units_of(machine: Any) -> Units:
+def units_of(machine: Any, named: str | None = None) -> Units:
     """The units in which angles and speeds of a machine are seen: those that it names, else as it has them.
+
+    `named`: instead of those that it names.
 
     >>> from softstart import Drive
     >>> units_of(Drive.load("hoist-15kw")), units_of(Drive.load("servo-axis-small")).angle
     (Units(angle='deg', speed='rpm', diameter=0.0), ...)
     """
-    speeds = [] if machine.target_speed is None else [float(machine.target_speed)]
-    return Units.read(machine.units, machine.own_gaps, speeds)
+    speeds = () if machine.target_speed is None else (float(machine.target_speed),)
+    return _read(machine.units if named is None else named, machine.own_gaps, speeds)
+
+
+_read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame
 
 
 def at_output(machine: Any, value: float, unit: str = "N*m") -> str:

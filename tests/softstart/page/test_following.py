@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from softstart import simulate
@@ -20,9 +20,11 @@ from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
-from softstart.page.machines import STEPS, entries
+from softstart.page.machines import STEPS, axes_about, entries
+from softstart.page.panels import grid_of
 from softstart.page.session import Session
 from softstart.quantities import parse
+from softstart.views.numbers import units_of
 
 
 class Line:
@@ -158,7 +160,7 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
     shown = screen.first()["fields"]["shaft.gap"]
-    assert (shown["text"], shown["position"]) == ("4", 21)
+    assert (shown["text"], shown["position"]) == ("4 deg", 21)  # the page stays in rad
     controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
     assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")
     controls.take({"what": "leave", "path": "shaft.gap"})  # Escape: the drive keeps every digit
@@ -230,7 +232,7 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     assert float(frame["fields"][gap]["text"]) == pytest.approx(math.degrees(first), rel=1e-5)
     assert session.machine.by_path()[gap][1] == first  # only what is typed changes
     assert frame["traces"]["direct"]["units"]["angle"] == "deg"
-    assert frame["here"][0] == pytest.approx(math.degrees(loaded.gap_and_inertia[0]), rel=1e-12)
+    assert (frame["here"][0], frame["angle"][0]) == (loaded.gap_and_inertia[0], "deg")
 
     controls.take({"what": "edit", "path": gap, "text": "4"})
     assert session.machine.by_path()[gap][1] == parse("4 deg", "rad")
@@ -240,13 +242,142 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     assert f'"{text} deg"' in session.machine.to_toml()
     assert f"{gap}={text}deg" in command_text(session.machine, {"direct": make_controller("direct")})
     assert links.bench_of(links.link_of(session), session.bench).drive == session.machine
-    controls.take({"what": "jump", "gap": 30.0, "inertia": loaded.gap_and_inertia[1]})
-    assert screen.first()["here"][0] == pytest.approx(30.0, rel=1e-6)
+    controls.take({"what": "jump", "gap": math.radians(30.0), "inertia": loaded.gap_and_inertia[1]})
+    assert screen.first()["here"][0] == pytest.approx(math.radians(30.0), rel=1e-6)
     controls.take({"what": "edit", "path": "units", "text": "mm on 80 mm"})
     controls.take({"what": "edit", "path": gap, "text": "0.3"})
     assert session.machine.by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
     assert 'write for example "deg, rpm"' in screen.mistakes["units"]
+
+
+class Reader:
+    """Who reads the page: what the browser has of all frames so far, and what he takes a number for.
+
+    The sizes of the units are written here once more, by hand.
+    """
+
+    def __init__(self, machine: str) -> None:
+        self.sizes = {
+            "rad": 1.0,
+            "deg": math.pi / 180,
+            "arcmin": math.pi / 10800,
+            "rad/s": 1.0,
+            "rpm": math.pi / 30,
+        }
+        self.session = Session(machine, controllers=["direct"])
+        self.controls, self.screen = controls_of(self.session)
+        self.screen.axes = axes_about(self.session.origin, 5, 2)
+        self.labels: dict[str, str] = {}
+        self.seen: dict[str, Any] = {}
+        self.arc = 0.04  # m, half the diameter of the circle on which angles in mm are arcs
+        self.look()
+        self.head = next(frame for frame in self.screen.at_rest() if frame and "map" in frame)["map"]
+
+    def do(self, what: str, **arguments: Any) -> None:
+        self.controls.take({"what": what, **arguments})
+        assert not self.screen.mistakes
+        self.look()
+
+    def look(self) -> None:
+        self.seen = self.screen.first()
+        for group in self.seen.get("groups", ()):
+            self.labels |= {row["path"]: row["unit"] for row in group["rows"]}
+
+    def si(self, number: str, unit: str) -> float:
+        return float(number) * (1e-3 / self.arc if unit == "mm" else self.sizes[unit])
+
+    def read(self, path: str) -> float:
+        """The value of a field, by the unit behind its number, else by that which stands beside the field."""
+        number, _, unit = self.seen["fields"][path]["text"].partition(" ")
+        return self.si(number, unit or self.labels[path])
+
+
+ANGLES, SPEEDS = ("rad", "deg", "arcmin", "mm on 80 mm"), ("rad/s", "rpm")
+ACTS = st.one_of(
+    st.tuples(st.just("units"), st.sampled_from(ANGLES), st.sampled_from(SPEEDS)),
+    st.tuples(st.just("gap"), st.integers(1, 99), st.sampled_from(["", " rad", " deg", " arcmin"])),
+    st.tuples(st.just("speed"), st.integers(50, 99), st.sampled_from(["", " rad/s", "0 rpm"])),
+    st.tuples(st.just("click"), st.floats(0.0, 1.0), st.just("")),
+    st.tuples(st.sampled_from(["slide", "undo", "redo"]), st.just(300), st.just("")),
+)
+
+
+@pytest.mark.parametrize(
+    ("machine", "gap"),
+    [("crane-4amtkf", "shaft.gap"), pytest.param("crane-4-mass", "shaft[2].gap", marks=pytest.mark.slow)],
+)
+@settings(max_examples=4, deadline=None)
+@example(acts=[("gap", 6, " deg"), ("click", 0.5, ""), ("speed", 60, " rad/s")])
+@given(acts=st.lists(ACTS, min_size=2, max_size=8))
+def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine, gap, acts):
+    """After any changes of units and values in any unit: the number beside a unit is the value of the drive.
+
+    The head of the map is that of the beginning: a click must not depend on which frame drew the axis.
+    """
+    reader = Reader(machine)
+    session = reader.session
+    for act, value, unit in acts:
+        before = session.machine.gap_and_inertia[0]
+        if act == "units":
+            reader.do("edit", path="units", text=f"{value}, {unit}")
+            assert session.machine.gap_and_inertia[0] == before
+            assert (reader.labels[gap], reader.labels["start.target_speed"]) == (
+                value[:2] if "mm" in value else value,
+                unit,
+            )
+        elif act == "gap":
+            units = dict(reader.labels)
+            reader.do("edit", path=gap, text=f"{value}{unit}")
+            assert reader.labels == units  # nothing else changes its unit
+            typed = reader.si(str(value), unit.strip() or units[gap])
+            assert session.machine.by_path()[gap][1] == pytest.approx(typed, rel=1e-8)
+        elif act == "speed":
+            units = dict(reader.labels)
+            reader.do("edit", path="start.target_speed", text=f"{value}{unit}")
+            assert reader.labels == units
+        elif act == "click":
+            gaps = reader.head["gaps"]
+            node = gaps[round(value * (len(gaps) - 1))]
+            name, size = reader.seen["angle"]
+            said = f"{node / size:.6g}"  # what the read-out of the map shows
+            reader.do("jump", gap=node, inertia=reader.head["inertias"][0])
+            assert session.machine.gap_and_inertia[0] == pytest.approx(
+                reader.si(said, name), rel=1e-5, abs=1e-12
+            )
+        else:
+            reader.do(act, **({"path": gap, "position": value} if act == "slide" else {}))
+        for path in (gap, "start.target_speed"):
+            assert reader.read(path) == pytest.approx(session.machine.by_path()[path][1], rel=1e-5)
+        seen, drive = reader.seen, session.machine
+        assert seen["here"] == drive.gap_and_inertia
+        assert seen["angle"][0] == reader.labels[gap]
+        assert seen["figure"]["speed_unit"] == reader.labels["start.target_speed"]
+        trace = seen["traces"]["direct"]
+        assert (trace["units"]["angle"], trace["units"]["speed"]) == (
+            seen["angle"][0],
+            seen["figure"]["speed_unit"],
+        )
+        shown = reader.si(str(trace["target"]), trace["units"]["speed"])
+        assert shown == pytest.approx(drive.target_speed, rel=1e-9)
+        if drive.gap_and_inertia[0] > 0.0:  # else there is nothing to tune
+            assert grid_of(session.seen, "0.2", "1x")[0] == [
+                pytest.approx(reader.si("0.2", seen["angle"][0]), rel=1e-8)
+            ]
+        assert units_of(session.seen) == reader.screen.units  # those of a report and of a tab
+
+
+def test_a_value_is_shown_in_the_unit_in_which_it_was_typed_and_no_other_field_is():
+    """36 arcmin stay 36 arcmin, not 0.6 deg; in a page that is in deg they are 0.6."""
+    reader = Reader("crane-4amtkf")
+    reader.do("edit", path="shaft.gap", text="36 arcmin")
+    assert (reader.seen["fields"]["shaft.gap"]["text"], reader.labels["shaft.gap"]) == ("36 arcmin", "rad")
+    reader.do("edit", path="units", text="deg")
+    assert (reader.seen["fields"]["shaft.gap"]["text"], reader.labels["shaft.gap"]) == ("0.6", "deg")
+    reader.do("undo")
+    reader.do("slide", path="shaft.gap", position=300)
+    reader.do("undo")
+    assert reader.seen["fields"]["shaft.gap"]["text"] == "36 arcmin"
 
 
 def test_parameters_of_the_selected_strategy_are_fields():

@@ -5,7 +5,7 @@ const STEPS = 600;
 
 export class Controls {
   constructor(place, own, head, say) {
-    Object.assign(this, { say, own, head, rows: new Map(), groups: place.appendChild(element("div")) });
+    Object.assign(this, { say, own, head, rows: new Map(), open: new Set(), groups: place.appendChild(element("div")) });
   }
 
   // the fields of another machine, the first group in the head of the page; or of another strategy
@@ -23,8 +23,14 @@ export class Controls {
 
   box({ title, rows, folded }) {
     const lines = rows.flatMap((row) => this.row(row));
-    if (folded) return element("details", {}, element("summary", {}, title), element("fieldset", {}, ...lines));
+    if (folded) return element("details", { open: this.open.has(title), ontoggle: ({ target }) => this.fold(title, target) }, element("summary", {}, title), element("fieldset", {}, ...lines));
     return element("fieldset", {}, element("legend", {}, title), ...lines);
+  }
+
+  // what is unfolded comes into sight, and stays unfolded when its fields are built anew
+  fold(title, place) {
+    if (place.open && !this.open.has(title)) place.scrollIntoView({ block: "nearest" });
+    this.open[place.open ? "add" : "delete"](title);
   }
 
   row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {

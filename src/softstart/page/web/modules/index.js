@@ -72,9 +72,9 @@ export class Instrument {
     }
     if (order) {
       for (const known of [state.rows, state.traces]) for (const name of known.keys()) if (!order.includes(name)) known.delete(name);
-      const { shown, added, changed, selected, stamp, here } = frame;
+      const { shown, added, changed, selected, stamp, here, angle } = frame;
       const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
-      Object.assign(state, { order, shown, added, changed, selected, stamp, here, fields, reference });
+      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference });
       this.plotted = false;
       this.steps.show(frame.steps);
       this.controls.build(frame);

@@ -55,7 +55,7 @@ export class GapMap {
       "aria-label": "Map of K dyn over gap and load inertia: arrow keys go to the neighbouring drive",
       onpointerdown: (event) => this.press(event),
       onpointermove: (event) => this.point(event),
-      onpointerup: () => (this.pressed = false),
+      onpointerup: (event) => this.release(event),
       onpointercancel: () => (this.pressed = false),
       onpointerleave: () => put(this.said, ""),
       onkeydown: (event) => this.walk(event),
@@ -134,7 +134,15 @@ export class GapMap {
     if (!node) return;
     this.pressed = true;
     this.canvas.setPointerCapture(event.pointerId);
-    this.go(node);
+    // a finger may be about to scroll: it goes there when it is lifted, or moves across
+    if (event.pointerType === "touch") this.aim = { asked: -1, node, x: event.offsetX, y: event.offsetY };
+    else this.go(node);
+  }
+
+  release(event) {
+    const node = this.pressed && this.aim.asked < 0 && this.node(event.offsetX, event.offsetY);
+    this.pressed = false;
+    if (node) this.go(node);
   }
 
   go([column, row]) {
@@ -146,10 +154,13 @@ export class GapMap {
     const node = this.node(event.offsetX, event.offsetY);
     if (!node) return put(this.said, "");
     const [column, row] = node;
-    if (this.pressed && String(node) !== String(this.aim.node)) this.go(node);
-    const { gaps, inertias, symbols, unit } = this.head;
+    const { asked, x, y } = this.aim ?? {};
+    const scrolls = asked < 0 && Math.abs(event.offsetY - y) >= Math.abs(event.offsetX - x);
+    if (this.pressed && !scrolls && String(node) !== String(this.aim.node)) this.go(node);
+    const { gaps, inertias, symbols } = this.head;
+    const [unit, size] = this.state.angle;
     const other = this.against ? ` (${this.pinned.head.strategy}: ${fixed(this.against[row][column], 3)})` : "";
-    put(this.said, `${symbols[0]} ${significant(gaps[column], 4)} ${unit}   ${symbols[1]} ${significant(inertias[row], 4)} kg m\u00b2   K ${fixed(this.rows[row]?.[column], 3)}${other}`);
+    put(this.said, `${symbols[0]} ${significant(gaps[column] / size, 4)} ${unit}   ${symbols[1]} ${significant(inertias[row], 4)} kg m\u00b2   K ${fixed(this.rows[row]?.[column], 3)}${other}`);
   }
 
   walk(event) {
@@ -163,8 +174,9 @@ export class GapMap {
 
   draw(state) {
     this.state = state;
-    if (!this.head || (this.picture && String(state.here) === this.drawn)) return;
-    this.drawn = String(state.here);
+    if (String(state.angle) !== this.seen) this.picture = null; // nodes and messages are in rad, labels are not
+    if (!this.head || !state.angle || (this.picture && String(state.here) === this.drawn)) return;
+    [this.drawn, this.seen] = [String(state.here), String(state.angle)];
     const sheet = sharp(this.canvas, this.theme.colours.paper);
     if (!sheet) return;
     this.box = { w: sheet.width - LEFT - RIGHT, h: sheet.height - TOP - BOTTOM };
@@ -232,11 +244,12 @@ export class GapMap {
   }
 
   scales(pen, scale) {
-    const { gaps, inertias, labels, unit } = this.head;
+    const { gaps, inertias, labels } = this.head;
+    const [unit, size] = this.state.angle;
     const { quiet, line } = this.theme.colours;
     const { w, h } = this.box;
-    const marks = ticks(gaps[0], gaps.at(-1), Math.round(w / 60));
-    for (const mark of marks) write(pen, label(mark, marks.digits), this.place(mark, inertias[0])[0], TOP + h + 14, quiet, "center");
+    const marks = ticks(gaps[0] / size, gaps.at(-1) / size, Math.round(w / 60));
+    for (const mark of marks) write(pen, label(mark, marks.digits), this.place(mark * size, inertias[0])[0], TOP + h + 14, quiet, "center");
     write(pen, `${labels[0]}, ${unit}`, LEFT + w / 2, TOP + h + 29, quiet, "center");
     const step = Math.max(1, Math.round(inertias.length / Math.max(2, h / 34)));
     for (let row = 0; row < inertias.length; row += step) write(pen, significant(inertias[row], 3), LEFT - 6, this.place(gaps[0], inertias[row])[1], quiet, "right", "middle");
