@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
 from tests.softstart.optimal.drives import (
     CRANE,
     HELD,
@@ -189,6 +191,35 @@ def test_the_earliest_pull_is_that_of_full_torque(drive: Drive) -> None:
     kind = "load starts" if drive.load_kind == "reactive" else "gap closed"
     first = next(event.time for event in simulate(drive, "direct").events if event.kind == kind)
     assert earliest_pull(Problem(drive, 1.0)) == pytest.approx(first, rel=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.3, 1.0])
+def test_the_bound_of_a_damped_contact_is_tight(damping: float) -> None:
+    """By hand: pulse and coast close the gap at speed v after t_c; T then swings up to its peak P(v), so
+
+    P(v) (t - t_c) = J2 target + Mc t at the bound. T is coasted on by matrix exponentials. The grid of
+    instants on which the bound takes P may cost it a thousandth, not more.
+    """
+    J1, J2, Mc, time, both = 0.035, 0.175, 7.16, 0.32, 1.0 / 0.035 + 1.0 / 0.175
+    rates = np.array([[0.0, 1.0, 0.0], [-368.465 * both, -damping * both, Mc / J2], [0.0, 0.0, 0.0]])
+    step, push, pull = expm(rates * 2e-5), 62.0 / J1, Mc / J2
+
+    T = np.array([[368.465, damping, 0.0] @ np.linalg.matrix_power(step, k) for k in range(1500)])
+
+    def peak(v: float) -> float:
+        return float((T @ [0.0, v, 1.0]).max())
+
+    def missing(v: float) -> float:
+        pulse = 0.5 * (v**2 - 2.0 * pull * 0.25) / push
+        t1 = math.sqrt(2.0 * pulse / (push + pull))
+        w = (push + pull) * t1
+        t_c = t1 + (v - w) / pull
+        return peak(v) * (time - t_c) - J2 * 60.0 - Mc * time
+
+    v = brentq(missing, 1.01 * math.sqrt(2.0 * pull * 0.25), math.sqrt(2.0 * (push + pull) * 0.25))
+    problem = Problem(CRANE.replace(damping=damping), time)
+    bound = momentum_bound(problem).k_dyn * problem.base_torque
+    assert 0.999 * peak(v) < bound <= peak(v) * (1.0 + 1e-6)
 
 
 def test_a_damped_contact_has_to_be_gentle() -> None:
