@@ -71,6 +71,20 @@ def test_gains_at_the_nodes_between_them_and_outside():
     assert SCHEDULE.gains_at(9.0, 1e-3) == {"time": TIMES[2, 0], "initial": TORQUES[2, 0]}
 
 
+@pytest.mark.parametrize(("gap", "inertia"), [(0.6, 0.1), (1.25, 0.16), (3.0, 0.1), (0.6, 1.0)])
+def test_gains_between_nodes_are_bilinear_in_the_value_or_its_logarithm(gap, inertia):
+    """Each corner counts by the rectangle opposite to it; beyond the grid its edge counts."""
+    x, y = min(gap, 2.0), min(inertia, 0.175)
+    row, (left, right) = (0 if x < 1.0 else 1), INERTIAS
+    top, bottom = GAPS[row : row + 2]
+    corners = [(bottom - x) * (right - y), (bottom - x) * (y - left), (x - top) * (right - y)]
+    weights = np.array([*corners, (x - top) * (y - left)]) / ((bottom - top) * (right - left))
+    found = SCHEDULE.gains_at(gap, inertia)
+    assert found["initial"] == pytest.approx(weights @ TORQUES[row : row + 2].ravel(), rel=1e-12)
+    exact = math.exp(weights @ np.log(TIMES[row : row + 2].ravel()))
+    assert found["time"] == pytest.approx(exact, rel=1e-12)
+
+
 def test_a_schedule_goes_by_what_is_declared():
     worn = CRANE.replace(gap=2.0)
     told, unknown = simulate(worn, SCHEDULE), simulate(worn, SCHEDULE, fitted_to=CRANE.replace(gap=0.5))

@@ -283,6 +283,11 @@ def test_the_least_heat_is_momentum_by_cauchy_and_schwarz() -> None:
         mean = (drive.J1 + drive.J2) * 60.0 / 0.3 + drive.Mc
         exact = mean**2 * 0.3 / drive.Ms**2
         assert least_heat(Problem(drive, 0.3, minimise="heat")) == pytest.approx(exact, rel=1e-9)
+    # (H + Mc t)^2/t is least at t = H/Mc: 4 H Mc, however much more time there is
+    H = 0.21 * 60.0
+    for time in (1.0, 2.0, 10.0):
+        found = least_heat(Problem(CRANE, time * H / 7.16, minimise="heat"))
+        assert found == pytest.approx(4.0 * H * 7.16 / 62.0**2, rel=1e-9)
     friction = Problem(CRANE.replace(load_kind="reactive"), 0.3, minimise="heat", k_dyn=1.0)
     moves = 0.175 * 60.0 / (friction.base_torque - 7.16)  # no sooner than at the largest T
     impulse = 0.21 * 60.0 + 7.16 * moves
