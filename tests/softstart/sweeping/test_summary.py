@@ -26,6 +26,7 @@ def test_spreads_are_exact_in_any_pieces(values, size):
         return
     assert (found["min"], found["max"]) == (good.min(), good.max())
     for name, share in SHARES.items():
+        assert share == int(name[1:]) / 100
         assert found[name] == np.quantile(good, share, method="inverted_cdf")
 
 
