@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from softstart.errors import DamagedWarning, InputError, listed
-from softstart.stopping import at_stop
+from softstart.stopping import STOPPING, at_stop
 
 Record = dict[str, Any]
 SMALLEST = 512  # bytes of an SQLite file
@@ -119,7 +119,8 @@ class Target(NamedTuple):
 class Records:
     """Finished parts in an SQLite file. Use it in a `with`; without a target nothing is kept on disk.
 
-    The fields `keys` identify a part. A file in which nothing was kept is removed at the end.
+    The fields `keys` identify a part. A file in which nothing was kept is removed at the end, unless other
+    files belong to it (`stay`).
 
     >>> with Records(None, {"drive": "crane"}, ["cell", "restart"]) as kept:
     ...     kept.add({"cell": 3, "restart": 0, "cost": 1.1})
@@ -132,7 +133,7 @@ class Records:
         self._inputs = json.dumps(inputs, sort_keys=True)
         self._parts: dict[str, Record] = {}
         self._base: sqlite3.Connection | None = None
-        self._open = ExitStack()
+        self._open, self._stays = ExitStack(), False
 
     def __enter__(self) -> Self:
         if self.target is not None:
@@ -159,6 +160,12 @@ class Records:
     def find(self, *part: Any) -> Record | None:
         """The record of a part, or None if it is not finished."""
         return self._parts.get(json.dumps(part))
+
+    def stay(self, stays: bool) -> None:
+        """Whether the file remains even if nothing is kept: it says to whom the files beside it belong."""
+        self._stays = stays
+        if STOPPING.is_set():  # `_close` may have read it already
+            raise KeyboardInterrupt
 
     def parts(self) -> list[Record]:
         """All records."""
@@ -211,7 +218,7 @@ class Records:
     def _close(self, made: Sequence[Path]) -> None:
         if self._base is not None:
             self._base.close()
-        if made and not self._parts:
+        if made and not self._parts and not self._stays:
             made[0].unlink(missing_ok=True)
             with suppress(OSError):
                 for folder in made[1:]:

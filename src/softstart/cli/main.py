@@ -138,7 +138,7 @@ def _fail(sentences: Sequence[str], code: int) -> int:
 
 
 def _stop_on_signals() -> threading.Thread:
-    """Let Ctrl-C and TERM end the process, whatever its main thread is doing.
+    """Let Ctrl-C, TERM and HUP end the process, whatever its main thread is doing.
 
     Python runs its own handlers between two instructions of Python: not as long as compiled code runs, and in
     callbacks of libraries their exceptions are lost. The number of a signal is put into a socket at once,
@@ -157,7 +157,8 @@ def _stop_on_signals() -> threading.Thread:
                 pass
             stop_now(INTERRUPTED)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # the last one when a terminal closes; Windows has none
+        number = getattr(signal, name, signal.SIGINT)
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
     watcher = threading.Thread(target=watch, daemon=True)

@@ -11,10 +11,11 @@ from __future__ import annotations
 import filecmp
 import hashlib
 import math
+import shutil
 import warnings
 import zlib
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -117,6 +118,7 @@ class Store:
             if self._target is None:
                 self._arrays = {str(name): np.array(one) for name, one in self._empty.data_vars.items()}
             else:
+                stack.callback(self._clear)
                 stack.callback(self._sweep_up)
                 stack.enter_context(at_stop(self._sweep_up))
                 with self._target.errors():
@@ -127,6 +129,39 @@ class Store:
     def __exit__(self, *error: object) -> None:
         self._exit.close()
 
+    def _clear(self) -> None:
+        """If no chunk is finished: as if it had not begun. A stopped process leaves all to the next one."""
+        if self.path is not None and not self._list.parts():
+            (self.path / "zarr.json").unlink(missing_ok=True)
+            for folder in (self.path / str(name) for name in self._empty.variables):
+                shutil.rmtree(folder / "c", ignore_errors=True)
+                (folder / "zarr.json").unlink(missing_ok=True)
+                with suppress(OSError):  # that of the list is not empty
+                    folder.rmdir()
+            self._list.stay(False)
+
+    def _check_place(self, name: Path) -> None:
+        """Raise InputError where a folder that is not empty stands in the place of a file of the sweep."""
+        assert self.path is not None
+        assert self._target is not None
+        place = self.path / name
+        if place.is_dir() and not place.is_symlink() and any(place.iterdir()):
+            reason = "is a folder, where a file of the sweep is to go; move it away"
+            raise self._target.error(f"{name.as_posix()} in it {reason}.")
+
+    def _make_way(self, name: Path) -> None:
+        """Remove what stands where a file of the sweep is to go and is none, as a link or an empty folder."""
+        assert self.path is not None
+        self._check_place(name)
+        for parent in (self.path / one for one in [*name.parents][-2::-1]):  # not the folder itself
+            if not parent.is_dir():
+                parent.unlink(missing_ok=True)
+        place = self.path / name
+        if place.is_dir() and not place.is_symlink():
+            place.rmdir()
+        else:
+            place.unlink(missing_ok=True)
+
     def keep(self, index: Sequence[int], block: Block) -> None:
         """Take in a finished chunk and list it."""
         place = self.plan.place(index)
@@ -135,7 +170,7 @@ class Store:
                 stack.enter_context(self._target.errors())
             for name, values in block.items():
                 if self.path is not None:  # Zarr reads a chunk at the edge before it writes it
-                    (self.path / _file(name, index)).unlink(missing_ok=True)
+                    self._make_way(_file(name, index))
                 self._arrays[name][place] = values.reshape([part.stop - part.start for part in place])
         self._list.add({"part": list(index), "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
 
@@ -158,6 +193,10 @@ class Store:
             names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
             damaged = [name for name in names if not _same(folder / name, fresh / name)]
             for name in damaged:
+                self._check_place(name)
+            self._list.stay(True)
+            for name in damaged:
+                self._make_way(name)
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (fresh / name).replace(folder / name)
         opened = dict(zarr.open_group(folder, mode="r+").arrays())
@@ -166,6 +205,8 @@ class Store:
             index = tuple(record["part"])
             if changed := self._changed(index, record["checksums"]):
                 damaged.append(changed)
+                for name in record["checksums"]:
+                    self._check_place(_file(name, index))
             else:
                 self.finished.add(index)
         if self._list.parts():

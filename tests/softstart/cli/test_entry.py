@@ -184,7 +184,7 @@ def test_a_stop_that_becomes_another_error_in_a_library_ends_the_command() -> No
     assert (done.returncode, done.stdout, done.stderr) == (130, "", INTERRUPTED)
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_what_does_not_stop_is_ended_with_all_that_it_has_begun(tmp_path, monkeypatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
     done = ended(STUCK, name)

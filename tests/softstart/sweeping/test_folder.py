@@ -6,6 +6,8 @@ import os
 import random
 import shutil
 import signal
+import subprocess
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -119,6 +121,8 @@ def replaced(make):
         ("k_dyn/c/0/0", lambda path: shutil.rmtree(path.parent)),
         ("status/c/0/0", Path.unlink),
         ("status/c/0/0", replaced(os.mkfifo)),
+        ("status/c/0/0", replaced(os.mkdir)),
+        ("k_dyn/c/0", lambda path: (shutil.rmtree(path), path.write_text("a file"))),
         ("status/c/0/0", replaced(lambda path: path.symlink_to(path.name))),
     ],
 )
@@ -142,10 +146,72 @@ def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, n
     }
 
 
-@pytest.mark.parametrize("name", ["zarr.json", "k_dyn/zarr.json", "gap/c/0"])
-def test_damaged_descriptions_are_mended(pristine, tmp_path, name):
+@pytest.mark.parametrize("name", ["k_dyn/c/0/0", "status/c/1/0", "k_dyn/zarr.json"])
+def test_a_full_folder_in_the_place_of_a_file_is_refused_before_anything_is_said_or_changed(
+    pristine, tmp_path, name
+):
     folder = Path(shutil.copytree(pristine, tmp_path / "a"))
-    flip(folder / name)
+    replaced(os.mkdir)(folder / name)
+    (folder / name / "letter.txt").write_text("dear")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match=f"{name} in it is a folder, .* move it away"):
+        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    shutil.move(folder / name, tmp_path / "moved")
+    with pytest.warns(DamagedWarning, match=f"{name} is damaged"):
+        again = sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    assert again.identical(xarray.open_zarr(pristine, chunks=None))
+
+
+@pytest.mark.parametrize("made", [(), ("a",)])
+def test_one_that_ends_before_its_first_chunk_leaves_nothing(tmp_path, made):
+    """Then another sweep may use the folder; what was there before it stays."""
+    for name in made:
+        (tmp_path / name).mkdir()
+
+    def fail(now):
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        sweep(CRANE, "ramp", GRID, to=tmp_path / "a", progress=fail, **OPTIONS)
+    assert [path.name for path in tmp_path.rglob("*")] == list(made)
+    found = sweep(CRANE, "direct", {"gap": [0.5, 2.0]}, to=tmp_path / "a", workers=1)
+    assert found.status.values.tolist() == [0, 0]
+
+
+KILLED = """
+import os, signal, sys
+from softstart import sweep
+from softstart.stopping import stop_now
+from softstart.sweeping import store
+
+begin = store.Store._open
+def opened(self, folder):
+    begin(self, folder)
+    {how}
+store.Store._open = opened
+sweep("crane-4amtkf", "ramp", {grid}, to={to!r}, workers=1, chunk=2)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["stop_now(130)", "os.kill(os.getpid(), signal.SIGKILL)"])
+def test_stopped_before_its_first_chunk_it_goes_on(tmp_path, how):
+    to = str(tmp_path / "a")
+    program = KILLED.format(how=how, grid=GRID, to=to)
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode in (130, -signal.SIGKILL)
+    assert xarray.open_zarr(to).status.values.tolist() == [[-1, -1]] * 3
+    with pytest.raises(InputError, match="another controller"):
+        sweep(CRANE, "direct", GRID, to=to, **OPTIONS)
+    found = sweep(CRANE, "ramp", GRID, to=to, **OPTIONS)
+    assert found.drop_attrs().identical(sweep(CRANE, "ramp", GRID, **OPTIONS).drop_attrs())
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "k_dyn/zarr.json", "gap/c/0"])
+@pytest.mark.parametrize("damage", ["flip", "folder"])
+def test_damaged_descriptions_are_mended(pristine, tmp_path, name, damage):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    (flip if damage == "flip" else replaced(os.mkdir))(folder / name)
     told = []
     with pytest.warns(DamagedWarning, match=f"{name} is damaged"):
         sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
