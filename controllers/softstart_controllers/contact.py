@@ -20,7 +20,7 @@ from typing import Any
 from softstart.controller import parameter
 from softstart.controller.compiled import Vector, compiled, inner, record
 from softstart.drive import Drive
-from softstart_controllers.sampled import encoder_count, mean_torque, pulling_load
+from softstart_controllers.sampled import encoder_count, mean_torque
 from softstart_controllers.shaft_filter import (
     FREE,
     SHAFT,
@@ -55,11 +55,14 @@ NOTHING, CONTACT, OPENED, PUSHED = 0, 1, 2, 3  # what a sample may show
 
 
 class Parameters:
-    """What `watching` gives; a = 1/J1 and b = 1/J2, with the variance of what is thought of them."""
+    """What `watching` gives; a = 1/J1 and b = 1/J2, with the variance of what is thought of them.
+
+    Mc and Mb are the load torque in forward and in backward motion (`load_acceleration`).
+    """
 
     period: float
     Mc: float
-    reactive: float
+    Mb: float
     load_speed: float
     c: float
     d: float
@@ -206,24 +209,24 @@ def time_since_contact(
 @inner
 def state_after_contact(
     angle: float, s: float, speed: float, w2: float, b: float, drift: float, u: float, a: float, c: float,
-    d: float, Mc: float, reactive: float,
+    d: float, Mc: float, Mb: float, pull: float,
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """phi1, w1, z, w2 and b now, s after contact.
 
     Without the contact the motor would have this angle and speed, and the load w2 - b drift now: the load
-    torque has taken that impulse from it. From the contact on all go under the motor torque u.
+    torque, at last `pull`, has taken that impulse from it. From the contact on all go under the motor
+    torque u.
     """
-    rolling = Mc * s if drift != 0.0 else 0.0
-    way, w1, z, load = move(
-        speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, reactive
-    )
+    rolling = pull * s if drift != 0.0 else 0.0
+    way, w1, z, load = move(speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, Mb)
     return angle - s * (speed - 0.5 * a * u * s) + way, w1, z, load, b
 
 
 @compiled
 def begin_shaft(
     x: Shaft, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
-    drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, reactive: float,
+    drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, Mb: float,
+    pull: float,
 ) -> None:  # fmt: skip
     """Begin the filter of the shaft, a time s after contact, from the free motor now.
 
@@ -245,10 +248,10 @@ def begin_shaft(
         if step <= 0.0:
             continue
         up = state_after_contact(
-            m.angle, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, a, c, d, Mc, reactive
+            m.angle, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, a, c, d, Mc, Mb, pull
         )
         down = state_after_contact(
-            m.angle, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, a, c, d, Mc, reactive
+            m.angle, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, a, c, d, Mc, Mb, pull
         )
         for k in range(N):
             x.F[0, k] = (up[k] - down[k]) / (2.0 * step)
@@ -260,7 +263,7 @@ def begin_shaft(
                 x.P[0, k] += m.p01 * x.F[0, k]
                 x.P[k, 0] += m.p01 * x.F[0, k]
     x.phi1, x.w1, x.z, x.w2, x.b = state_after_contact(
-        m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, reactive
+        m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, Mb, pull
     )
 
 
@@ -304,13 +307,22 @@ def margin(p: Parameters, m: State) -> float:
 
 
 @inner
+def falling(p: Parameters) -> float:
+    """Torque in N m that moves a load at rest while the gap is open: 0 where friction holds it."""
+    return max(p.Mb, 0.0) + min(p.Mc, 0.0)
+
+
+@compiled
 def drift_since(p: Parameters, m: State, t: float) -> float:
     """Impulse in N m s by which the load torque has slowed a load that it can move: w2 falls by it/J2."""
-    if p.reactive == 0.0:
-        return p.Mc * (t - m.load_time)
+    time = t - m.load_time
     if m.load_speed > 0.0:
-        return min(p.Mc * (t - m.load_time), m.load_speed / m.b)
-    return 0.0
+        lost = p.Mc * time
+        most = m.load_speed / m.b  # then it stands still
+        if p.Mb == p.Mc or lost <= most:
+            return lost
+        return most + falling(p) * (time - most / p.Mc)
+    return falling(p) * time
 
 
 @inner
@@ -329,7 +341,7 @@ def follow(p: Parameters, m: State, angle: float, mean: float, early: float, dou
         p.c,
         p.d,
         p.Mc,
-        p.reactive,
+        p.Mb,
         speed * speed + doubt,
         twist * twist,
         load * load,
@@ -348,6 +360,8 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     a, b = m.free.inverse, m.b
     drift = drift_since(p, m, t)
     w2 = m.load_speed - b * drift
+    falls = falling(p)
+    pull = falls if falls != 0.0 and w2 <= 0.0 else p.Mc
     V = m.now.speed - w2
     u = 0.0
     slope = 0.0
@@ -355,7 +369,7 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
         recent = min(kept, 4)
         for i in range(kept - recent, kept):
             u += m.means[i] / recent
-        slope = a * u + (b * p.Mc if drift != 0.0 else 0.0)
+        slope = a * u + (b * pull if drift != 0.0 else 0.0)
     s = time_since_contact(behind, V, slope, a, p.c, p.d, kept * h)
     again = max(0, min(math.floor(s / h) - 1, kept - 1))
     free_after(p, m, kept - again)
@@ -363,7 +377,7 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     doubt = TIME_DEVIATION * s + 0.1 * h
     begin_shaft(
         m.shaft, m.now, s - again * h, doubt * doubt, u, m.load_speed, m.load_variance,
-        drift - p.Mc * back, b, m.b_variance, a, p.c, p.d, p.Mc, p.reactive,
+        drift - pull * back, b, m.b_variance, a, p.c, p.d, p.Mc, p.Mb, pull,
     )  # fmt: skip
     first = kept - again
     shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
@@ -478,7 +492,7 @@ def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float
                 left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
                 mean = demand + (u - demand) * (1.0 - left) * p.lag / length
                 u = demand + (u - demand) * left
-            _, w1, z, w2 = move(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.reactive)
+            _, w1, z, w2 = move(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.Mb)
         length = p.period
     return w1, z, w2, u
 
@@ -528,7 +542,7 @@ def watching(
     return {
         "period": period,
         "Mc": drive.Mc,
-        "reactive": drive.Mc > 0.0 and drive.load_kind == "reactive",
+        "Mb": drive.backward_torque,
         "load_speed": drive.initial_load_speed,
         "c": drive.c,
         "d": drive.d,
@@ -569,7 +583,7 @@ def hanging(drive: Drive) -> tuple[float, float, float]:
     """
     if drive.start_position != "hanging":
         return 0.0, 0.0, 0.0
-    T = pulling_load(drive)
+    T = max(drive.active_torque, 0.0)
     if drive.brake != "none" and isinstance(drive.release, str):
         return T / drive.c, T, 0.0
     return T / drive.c, 0.0, drive.release_time

@@ -114,12 +114,12 @@ def pulse(p: Parameters, m: State, b: float, u: float) -> float:
 def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
     """Torque in N m of the next sample in contact, from the state that the shaft will have when it acts."""
     near, shaft, Ms = p.watch, m.watch.shaft, p.Ms
-    h, c, d, Mc, reactive = near.period, near.c, near.d, near.Mc, near.reactive
+    h, c, d, Mc, Mb = near.period, near.c, near.d, near.Mc, near.Mb
     a, b = m.watch.free.inverse, shaft.b
     w1, z, w2 = shaft.w1, shaft.z, shaft.w2
     steps = int(m.delay / h) + 1
     for _ in range(steps):
-        _, w1, z, w2 = move(w1, z, w2, b, u, m.delay / steps, a, c, d, Mc, reactive)
+        _, w1, z, w2 = move(w1, z, w2, b, u, m.delay / steps, a, c, d, Mc, Mb)
     rate = w1 - w2
     ratio = b / a
     square = c * (a + b)
@@ -133,7 +133,7 @@ def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
                 m.push = 0.0
             if push > 0.0:
                 return push
-        _, x1, _, x2 = move(w1, z, w2, b, 0.0, h, a, c, d, Mc, reactive)
+        _, x1, _, x2 = move(w1, z, w2, b, 0.0, h, a, c, d, Mc, Mb)
         return min(max((x2 - x1) / (a * h), 0.0), Ms)
     full = full_load(p, ratio)
     least = p.hold_share * full
@@ -268,11 +268,9 @@ class PulseCoastHold(CompiledController):
     coast_speed: float | None = parameter(
         "rad/s",
         "speed relative to the load to which the pulse brings the motor",
-        "0.8 Ms/sqrt(c J1) with a reactive load, 0.7 Ms/sqrt(c J1) with an active one",
+        "0.8 Ms/sqrt(c J1) with a load that friction holds at rest, else 0.7 Ms/sqrt(c J1)",
         value=lambda drive, p: (
-            (SHARE_ACTIVE if drive.load_kind == "active" else SHARE_REACTIVE)
-            * drive.Ms
-            / math.sqrt(drive.c * drive.J1)
+            (SHARE_REACTIVE if drive.rests else SHARE_ACTIVE) * drive.Ms / math.sqrt(drive.c * drive.J1)
         ),
         rule="above 0",
         multiples=(0.4, 1.6),

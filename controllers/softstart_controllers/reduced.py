@@ -119,20 +119,20 @@ def load_drift(drive: Drive) -> float:
     40.91
     """
     w2 = drive.initial_load_speed
-    rolling = 1.0 if drive.load_kind == "active" or w2 > 0.0 else -1.0 if w2 < 0.0 else 0.0
-    return rolling * drive.Mc / drive.J2
+    pull = drive.Mc if w2 > 0.0 else drive.backward_torque if w2 < 0.0 else drive.falling_torque
+    return pull / drive.J2
 
 
 def stage_2_duration(drive: Drive, torque: Any) -> float:
-    """Length of stage 2 in s under the reduced torque: [G](15), for a stuck reactive load the exact one.
+    """Length of stage 2 in s under the reduced torque: [G](15), for a load that friction holds the exact one.
 
-    Where friction keeps the gap of a reactive load closed for good, [G](15) is taken all the same.
+    Where friction then keeps the gap closed for good, [G](15) is taken all the same.
 
     >>> round(stage_2_duration(Drive.load("crane-4amtkf"), 15.5), 4)
     0.0328
     """
     dw12 = closing_speed(drive, torque)
-    if drive.load_kind == "reactive" and drive.initial_load_speed == 0.0:
+    if drive.rests and drive.initial_load_speed == 0.0:
         contact = (torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12, "reactive")
         stuck = float(formulas.contact_stage(*contact).duration)
         if math.isfinite(stuck):

@@ -95,16 +95,19 @@ def free_update(m: Free, angle: float, variance: float) -> None:
 
 
 @compiled
-def load_acceleration(T: float, w2: float, b: float, Mc: float, reactive: float) -> float:
-    """w2' under the shaft torque T, b = 1/J2; a reactive load at rest stays there while T <= Mc.
+def load_acceleration(T: float, w2: float, b: float, Mc: float, Mb: float) -> float:
+    """w2' under the shaft torque T, b = 1/J2; at rest the load stays there while Mb <= T <= Mc.
 
-    >>> load_acceleration(5.0, 0.0, 2.0, 7.0, 0.0), load_acceleration(5.0, 0.0, 2.0, 7.0, 1.0)
+    Mc and Mb are its torque in forward and in backward motion: equal without friction, opposite where all of
+    it is friction.
+
+    >>> load_acceleration(5.0, 0.0, 2.0, 7.0, 7.0), load_acceleration(5.0, 0.0, 2.0, 7.0, -7.0)
     (-4.0, 0.0)
     """
-    if reactive == 0.0 or w2 > 0.0:
+    if w2 > 0.0 or Mb == Mc:
         return b * (T - Mc)
-    if w2 < 0.0:
-        return b * (T + Mc)
+    if w2 < 0.0 or Mb > T:
+        return b * (T - Mb)
     return b * max(T - Mc, 0.0)
 
 
@@ -121,7 +124,7 @@ def shaft(z: float, rate: float, c: float, d: float) -> float:
 @compiled
 def move(
     w1: float, z: float, w2: float, b: float, u: float, h: float, a: float, c: float, d: float, Mc: float,
-    reactive: float,
+    Mb: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Way of the motor, w1, z and w2 a time h later under the constant motor torque u (Runge-Kutta, order 4).
 
@@ -133,18 +136,18 @@ def move(
     """
     half = 0.5 * h
     T = shaft(z, w1 - w2, c, d)
-    f1, g1, r1 = a * (u - T), load_acceleration(T, w2, b, Mc, reactive), w1 - w2
+    f1, g1, r1 = a * (u - T), load_acceleration(T, w2, b, Mc, Mb), w1 - w2
     x, y, way = w1 + half * f1, w2 + half * g1, z + half * r1
     T = shaft(way, x - y, c, d)
-    f2, g2, r2 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    f2, g2, r2 = a * (u - T), load_acceleration(T, y, b, Mc, Mb), x - y
     x, y, way = w1 + half * f2, w2 + half * g2, z + half * r2
     T = shaft(way, x - y, c, d)
-    f3, g3, r3 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    f3, g3, r3 = a * (u - T), load_acceleration(T, y, b, Mc, Mb), x - y
     x, y, way = w1 + h * f3, w2 + h * g3, z + h * r3
     T = shaft(way, x - y, c, d)
-    f4, g4, r4 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    f4, g4, r4 = a * (u - T), load_acceleration(T, y, b, Mc, Mb), x - y
     after = w2 + h / 6.0 * (g1 + 2.0 * (g2 + g3) + g4)
-    if reactive != 0.0 and w2 > 0.0 and after < 0.0:  # friction stops it
+    if Mb != Mc and w2 > 0.0 and after < 0.0:  # friction stops it
         after = 0.0
     return (
         h * w1 + h * h / 6.0 * (f1 + f2 + f3),
@@ -157,7 +160,7 @@ def move(
 @compiled
 def shaft_predict(
     x: Shaft, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
-    reactive: float, speed_noise: float, twist_noise: float, load_noise: float,
+    Mb: float, speed_noise: float, twist_noise: float, load_noise: float,
 ) -> None:  # fmt: skip
     """The shaft in contact h later, by `move`; the covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
 
@@ -168,13 +171,13 @@ def shaft_predict(
     The noises are the variances that the sample adds to w1, z and w2.
     """
     b = x.b
-    _, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, 0.5 * h, a, c, d, Mc, reactive)
+    _, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, 0.5 * h, a, c, d, Mc, Mb)
     T = shaft(z, w1 - w2, c, d)
     in_contact = 1.0 if T > 0.0 else 0.0
-    moves = 0.0 if reactive != 0.0 and w2 == 0.0 and Mc >= T else 1.0
+    moves = 0.0 if Mb != Mc and w2 == 0.0 and Mb <= T <= Mc else 1.0
     on_w1 = -h * a * in_contact
     on_w2 = h * b * in_contact * moves
-    by_b = h * load_acceleration(T, w2, 1.0, Mc, reactive) * moves
+    by_b = h * load_acceleration(T, w2, 1.0, Mc, Mb) * moves
     for j in range(N):  # F = 1 + h A (1 + h A/2 (1 + h A/3)), a column at a time
         f0 = f1 = f2 = f3 = 0.0
         f4 = 1.0 if j == 4 else 0.0
@@ -211,7 +214,7 @@ def shaft_predict(
     x.P[1, 1] += speed_noise
     x.P[2, 2] += twist_noise
     x.P[3, 3] += load_noise
-    way, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, reactive)
+    way, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, Mb)
     x.phi1 += way + a * early * h * h
     x.w1 = w1
     x.z = z + a * early * h * h

@@ -53,7 +53,7 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
     w1, z, w2, u = ahead(near, y.landing.watch, u)
     if y.landing.watch.held != 0.0:  # by the brake, under the torque that holds the load
         return p.landing.low_torque
-    if near.reactive != 0.0 and w2 == 0.0 and c * z + d * w1 <= near.Mc:
+    if near.Mb != near.Mc and w2 == 0.0 and c * z + d * w1 <= near.Mc:
         return p.landing.low_torque  # until the load breaks away
     share, load = a / (a + b), near.Mc * b / (a + b)
     Omega = math.sqrt(c * (a + b))

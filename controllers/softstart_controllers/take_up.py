@@ -14,7 +14,6 @@ from softstart_controllers.sampled import (
     mean_torque,
     patience_parameter,
     period_parameter,
-    pulling_load,
 )
 from softstart_controllers.shaft_observer import GAINS, Gains, observer, predict
 
@@ -317,7 +316,7 @@ class TakeUp(CompiledController):
             "load_share": 1.0 / drive.J2,
             "load_speed": drive.initial_load_speed,
             "slowest": SLOWEST * p.take_up_speed,
-            "falling": p.slowing * pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0,
+            "falling": p.slowing * max(drive.falling_torque, 0.0) / drive.J2,
             "contact": p.contact_share * drive.J1 * p.take_up_speed,
             "leak": math.exp(-p.period / p.contact_time),
             "Ms": drive.Ms,

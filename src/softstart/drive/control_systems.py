@@ -94,9 +94,9 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     """The whole drive: input `demand` (N m), outputs `phi1, w1, phi2, w2, u, T` in SI.
 
     States `phi1, w1, phi2, w2`, then `reference` (the demand behind the rate limit) if `torque_rate` is
-    finite and `u` if there is a `torque_lag`. `params` holds J1, J2, c, d, gap, Mc, b1 and b2, to be
-    overridden in a simulation. Give it `initial_state(drive)`, and a `max_step` below the shortest stage to
-    the solver, or it may step over a contact.
+    finite and `u` if there is a `torque_lag`. `params` holds J1, J2, c, d, gap, Mc (the load torque of its
+    kind), load_friction, b1 and b2, to be overridden in a simulation. Give it `initial_state(drive)`, and a
+    `max_step` below the shortest stage to the solver, or it may step over a contact.
 
     >>> from softstart.drive import Drive
     >>> whole_drive(Drive.load("servo-axis-small")).state_labels
@@ -108,12 +108,12 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     actuator = _actuator(drive, states)
     smoothing = _SMOOTHING * drive.elastic_period
     stuck = _STUCK * drive.target_speed
-    reactive, drag = drive.load_kind == "reactive", drive.motor_friction
+    active, drag = drive.load_kind == "active", drive.motor_friction
     law = drive.contact_law
 
-    def rate(torque: float, speed: float, friction: float, inertia: float, *, sticks: bool) -> float:
+    def rate(torque: float, speed: float, friction: float, inertia: float) -> float:
         direction = 1.0
-        if sticks:
+        if friction > 0.0:
             if abs(speed) <= stuck and abs(torque) <= friction:
                 return -speed / smoothing
             direction = math.copysign(1.0, speed if abs(speed) > stuck else torque)
@@ -125,8 +125,10 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     def update(t: float, x: Vector, inputs: Vector, params: dict[str, float]) -> Vector:
         T = torque(x, params)
         u, internal = actuator(x, inputs[0])
-        w2_rate = rate(T - params["b2"] * x[3], x[3], params["Mc"], params["J2"], sticks=reactive)
-        w1_rate = rate(u - T - params["b1"] * x[1], x[1], drag, params["J1"], sticks=drag > 0.0)
+        pull, hold = (params["Mc"], 0.0) if active else (0.0, params["Mc"])
+        hold += params["load_friction"]
+        w2_rate = rate(T - params["b2"] * x[3] - pull, x[3], hold, params["J2"])
+        w1_rate = rate(u - T - params["b1"] * x[1], x[1], drag, params["J1"])
         return np.array([x[1], w1_rate, x[3], w2_rate, *internal])
 
     def output(t: float, x: Vector, inputs: Vector, params: dict[str, float]) -> Vector:
@@ -139,7 +141,8 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
         outputs=["phi1", "w1", "phi2", "w2", "u", "T"],
         states=states,
         name=_system_name(drive),
-        params={symbol: float(getattr(drive, symbol)) for symbol in ("J1", "J2", "c", "d", "gap", "Mc")}
+        params={symbol: float(getattr(drive, symbol)) for symbol in ("J1", "J2", "c", "d", "gap")}
+        | {"Mc": float(drive.load_torque), "load_friction": float(drive.load_friction)}
         | {"b1": drive.motor_viscous_friction, "b2": drive.load_viscous_friction},
     )
     return system

@@ -384,6 +384,16 @@ class Drive(ParameterSet):
         return self.load_friction + (0.0 if self.load_kind == "active" else self.load_torque)
 
     @property
+    def backward_torque(self) -> float:
+        """The load torque in backward motion, N m: the active torque less the friction.
+
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> [crane.replace(load_kind=one).backward_torque for one in ("active", "reactive")]
+        [7.16, -7.16]
+        """
+        return self.active_torque - self.reactive_torque
+
+    @property
     def falling_torque(self) -> float:
         """With what torque the load leaves its rest while the gap is open, N m: 0 where friction holds it.
 

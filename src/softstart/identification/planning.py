@@ -119,7 +119,7 @@ def plan_experiments(
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
     interval that a fit would have (Fisher information), of a log of the motor's angle from an unknown
-    position in the gap where the load is reactive.
+    position in the gap where friction holds the load.
 
     The planned torque has at least nine levels, and the duration of the best standard experiment that keeps
     the limits. From the best of 40 random torques the levels are improved by linear approximations (COBYLA),
@@ -269,11 +269,12 @@ def standard_levels(drive: Drive) -> dict[str, tuple[Vector, Vector]]:
         "start": ([2.0], [level]),
         "two levels": ([1.0, 1.0], [level, lower]),
     }
-    if drive.load_kind == "reactive":
+    if drive.rests:
         table["two levels, then reverse"] = ([1.0, 1.0, 2.0], [level, lower, back])
         table["reversed three times"] = ([1.0, 1.0, 2.0, 2.0, 2.0], [level, lower, back, -back, back])
         if Mc > 0.0:
-            table["shaking"] = ([1.0] * 4, [0.8 * Mc, -0.8 * Mc, 0.8 * Mc, -0.8 * Mc])
+            forth, back = 0.8 * Mc, 0.8 * float(drive.backward_torque)
+            table["shaking"] = ([1.0] * 4, [forth, back, forth, back])
     return {name: (part * np.array(parts), np.array(levels)) for name, (parts, levels) in table.items()}
 
 
@@ -382,10 +383,11 @@ class Bench:
     def loads(self, profile: TorqueProfile, end: float, places: Vector) -> Matrix:
         """From each position peak of the shaft torque, travel of the load, and changes of the contact.
 
-        The travel is seen at events and samples: exact for a reactive load, which turns at events only.
+        The travel is seen at events and samples: exact for a load that friction holds, as it turns at events
+        only.
         """
         times = np.union1d(profile.time[profile.time < end], end)
-        if self.drive.load_kind != "reactive":
+        if not self.drive.rests:
             times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
         model = LogModel.of(Log.planned(times, profile.at(times)), _at_rest(self.drive))
         starts = [{POSITION: place} if position_is_unknown(self.drive) else {} for place in places.tolist()]

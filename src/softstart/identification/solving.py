@@ -67,7 +67,8 @@ def identify(
     drive : Drive, Chain or str
         The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
         dominant gap the two masses that stand for it are found. The
-        position in the gap is free for each log where the load is reactive or the drive says "unknown".
+        position in the gap is free for each log where friction holds the load or the drive says "unknown".
+        A `load_friction` besides the load torque is kept as it is.
     free : iterable of str, optional
         What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping, load
         torque, with a torque demand the lag, and each friction that the guess has; a name after a plus, as

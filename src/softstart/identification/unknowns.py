@@ -148,7 +148,8 @@ def unknowns_of(
             middle, end, sign = math.log(abs(value)), math.log(reach), math.copysign(1.0, value)
             found.append(Unknown(name, "logarithm", middle, middle - end, middle + end, sign))
         else:
-            most = MOST_LOAD * float(drive.Ms) / abs(value) if name == "load_torque" else reach
+            room = MOST_LOAD * float(drive.Ms) - float(drive.load_friction)  # which is kept as it is
+            most = max(room / abs(value), 1.0) if name == "load_torque" else reach
             found.append(Unknown(name, "power", 1.0, reach**-power, min(reach, most) ** power, value, power))
     half = math.sqrt(0.5)
     found += [Unknown(POSITION, "position", half, 0.0, 1.0, log=i) for i, one in enumerate(moving) if one]
@@ -170,7 +171,7 @@ def values_of(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, flo
 
 def position_is_unknown(drive: Drive) -> bool:
     """Whether a log may begin anywhere in the gap."""
-    return (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
+    return (drive.start_position == "unknown" or drive.rests) and float(drive.gap) > 0.0
 
 
 def usual(drive: Drive, *, lag: bool) -> list[str]:

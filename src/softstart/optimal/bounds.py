@@ -6,6 +6,8 @@ instant at which the shaft can drive the load. The least P falls with t_f, so t_
     active load            J2 (target - w2(0)) + Mc t_f <= P (t_f - t_c)
     reactive load          J2 target <= (P - Mc) (t_f - t_c), from its last standstill on; a load that moves
                            at first may never stop, then less is needed, J2 (target - what is left of w2)
+    active with friction   the line of the reactive load, and that of the active one with Mb for Mc: the load
+                           takes Mc = active + friction forward, Mb = active - friction backward, no less ever
     load mass of a chain   the same with J_L, M_L and n P, n the shafts beside it
 
 Number of contacts, damping, contact law, lag, rate, curve and smoothing of the torque do not enter: the
@@ -102,11 +104,12 @@ def _of_pair(problem: Problem) -> float:
     if left <= 0.0:
         return math.inf
     w2 = drive.initial_load_speed
-    if reactive(problem):  # standing still at last, or never: J2 w2 is then what is left of it at the contact
+    plain = float((drive.J2 * (problem.target - w2) + drive.backward_torque * time) / left)
+    if drive.reactive_torque > 0.0:
+        # standing still at last, or never: J2 w2 is then what is left of it at the contact
         w2 = max(w2 - drive.Mc / drive.J2 * (time - left), 0.0)
-        plain = float(drive.Mc + drive.J2 * (problem.target - w2) / left)
-    else:
-        plain = float((drive.J2 * (problem.target - w2) + drive.Mc * time) / left)
+        moving = float(drive.Mc + drive.J2 * (problem.target - w2) / left)
+        plain = moving if reactive(problem.drive) else max(plain, moving)
     if off_course(problem):
         return plain
     starts = PulseCoastHold.of(problem)
@@ -184,7 +187,8 @@ def earliest_pull(problem: Problem) -> float:
     >>> round(earliest_pull(Problem(Drive.load("crane-4amtkf"), 0.5)), 5)
     0.01661
     """
-    drive, held, starts = problem.drive, reactive(problem), PulseCoastHold.of(problem)
+    # (a load that falls against friction is slowed by less than the pull of Mc: its contact is later)
+    drive, held, starts = problem.drive, reactive(problem.drive), PulseCoastHold.of(problem)
     if falls_back(problem) or (held and starts.w2 < 0.0):  # the motor may bounce off the other flank first
         if held or (drive.contact_law == "dead-zone" and drive.d > 0.0):
             return 0.0
@@ -236,8 +240,9 @@ def least_heat(problem: Problem) -> float:
         integral u dt = H + L,    so that    integral u^2 dt >= (H + L)^2/t    at every end t.
 
     An active load takes L = Mc t: least at t = H/Mc, or at t_f before that. A reactive one takes Mc while it
-    moves, no less than J2 (target - w2(0))/(P - Mc) s if no T is above P. Where only the load is to reach its
-    speed, or a brake takes part of the impulse, H + L is not known, and the bound is 0.
+    moves, no less than J2 (target - w2(0))/(P - Mc) s if no T is above P. One that falls against friction
+    takes L >= Mb t. Where only the load is to reach its speed, a brake takes part of the impulse, or friction
+    holds an active load, H + L is not known, and the bound is 0.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -249,17 +254,17 @@ def least_heat(problem: Problem) -> float:
     held = parts(machine)[0].machine.release_at > 0.0
     if problem.terminal == "reached" or time is None or drive is None or held:
         return 0.0
-    J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
+    J1, J2, Mc, Mb = map(float, (drive.J1, drive.J2, drive.Mc, drive.backward_torque))
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
     gained = J1 * (problem.target - w1) + J2 * (problem.target - w2)
-    if reactive(problem):
+    if reactive(drive):
         peak = math.inf if problem.k_dyn is None else problem.k_dyn * problem.base_torque
-        if w2 < 0.0 or peak <= Mc:
+        if w2 < 0.0 or peak <= Mc or drive.active_torque != 0.0:
             return 0.0
         impulse = gained + Mc * J2 * (problem.target - w2) / (peak - Mc)
     else:
-        time = min(time, gained / Mc) if Mc > 0.0 else time
-        impulse = gained + Mc * time
+        time = min(time, gained / Mb) if Mb > 0.0 else time
+        impulse = gained + Mb * time
     return float(max(impulse, 0.0) ** 2 / time / drive.Ms**2) * (1.0 - ROUNDING)
 
 
@@ -285,16 +290,17 @@ def _shortest(problem: Problem, machine: Any) -> float:
         return first  # the brake may carry more than the motor can
     J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
-    left, U, aim = pair.highest_torque - Mc, _largest(pair), (J1 + J2) * pair.target
+    least = Mc if reactive(pair.drive) else float(drive.backward_torque)  # that the load takes while it moves
+    left, U, aim = pair.highest_torque - least, _largest(pair), (J1 + J2) * pair.target
     overlap = max(abs(float(drive.theta0)) - 0.5 * float(drive.gap), 0.0)
     missing = aim - J1 * w1 - J2 * w2
     if pair.terminal == "reached":
         swing, A = math.hypot(w1 - w2, float(drive.Omega) * overlap), U / J1 + Mc / J2
         # breaking away on either flank adds to the swing
-        return first if reactive(pair) else max(first, (missing - J1 * swing) / (left + J1 * A))
+        return first if reactive(pair.drive) else max(first, (missing - J1 * swing) / (left + J1 * A))
     moving = missing / left  # the load never stands still
     energy = 0.5 * (J1 * w1**2 + J2 * w2**2 + float(drive.c) * overlap**2)
     stopping = (aim - math.sqrt(2.0 * J1 * energy)) / U
-    if not reactive(pair):
+    if not reactive(pair.drive):
         return max(first, moving)
     return max(first, min(stopping, moving) if w2 > 0.0 else stopping)

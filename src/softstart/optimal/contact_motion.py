@@ -18,7 +18,14 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, falls_back, first_true, reactive
+from softstart.optimal.pulse_coast_hold import (
+    PulseCoastHold,
+    fall_time,
+    falls_back,
+    falls_rubbing,
+    first_true,
+    reactive,
+)
 
 ENTRY_CELLS = 3000
 
@@ -117,13 +124,14 @@ class Entries:
 
 def no_ideal(problem: Problem) -> str:
     """Why the start is no linear problem from its contact on; empty if it is one."""
-    drive, sticks, damped = problem.drive, reactive(problem), problem.drive.d > 0.0
+    drive, sticks, damped = problem.drive, reactive(problem.drive), problem.drive.d > 0.0
     little = drive.Mc < 2e-4 * problem.highest_torque  # so small a load torque at a steady end counts as none
     preload = drive.c * max(drive.theta0 - 0.5 * drive.gap, 0.0)
     return falls_back(problem) or first_true({
         "the damped modelica law is not linear in contact": drive.contact_law == "modelica" and damped,
         "a damped shaft ends without torque only after it did not push":
             problem.terminal == "steady" and damped and little,
+        "friction stops the load between falling and rising": falls_rubbing(problem.drive),
         "a damped shaft moves a reactive load at an overlap that depends on the speed": sticks and damped,
         "a reactive load that moves before the contact":
             sticks and bool(drive.initial_load_speed or drive.initial_motor_speed),
@@ -138,7 +146,7 @@ def entries(problem: Problem, end: float, near: float | None = None) -> Entries:
     >>> round(float(cells.te[0]), 5), round(float(cells.fastest[0]), 2)
     (0.01661, 30.1)
     """
-    return _through_standstill(problem, end) if reactive(problem) else _through_gap(problem, end, near)
+    return _through_standstill(problem, end) if reactive(problem.drive) else _through_gap(problem, end, near)
 
 
 def _through_gap(problem: Problem, end: float, near: float | None) -> Entries:

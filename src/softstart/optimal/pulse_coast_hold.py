@@ -206,9 +206,14 @@ def _swing_time(z: float, v: float, z1: float, v1: float, mean: float, omega: fl
     return max(math.atan2(v / omega, z - mean) - math.atan2(v1 / omega, z1 - mean), 0.0) / omega
 
 
-def reactive(problem: Problem) -> bool:
-    """Whether the load torque holds a load at rest."""
-    return bool(problem.drive.load_kind == "reactive" and problem.drive.Mc > 0.0)
+def reactive(drive: Drive) -> bool:
+    """Whether friction holds the load at rest: while T >= 0 it is a reactive one, whatever its parts."""
+    return bool(drive.reactive_torque > 0.0 and drive.rests)
+
+
+def falls_rubbing(drive: Drive) -> bool:
+    """Whether the load falls through the gap against friction, which stops it once more after the contact."""
+    return bool(drive.reactive_torque > 0.0 and not drive.rests)
 
 
 def first_true(reasons: Mapping[str, bool]) -> str:
@@ -230,7 +235,8 @@ def off_course(problem: Problem) -> str:
     """Why the speed limit does not hold even for an undamped shaft; empty if it does."""
     held = {
         "a brake holds the motor at first": problem.drive.brake != "none",
-        "the load is reactive": reactive(problem),
+        "the load is reactive, friction holds it at rest": reactive(problem.drive),
+        "friction stops the load between falling and rising": falls_rubbing(problem.drive),
     }
     return first_true(held) or falls_back(problem)
 

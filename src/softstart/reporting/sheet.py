@@ -29,11 +29,17 @@ ALL_CORNERS = 9  # rounded values up to which every combination of half steps is
 NEIGHBOURS = 3  # rounded values up to which every combination of steps beside them is tried
 _DATA = {
     "motor_inertia": "J1", "load_inertia": "J2", "stiffness": "c", "damping": "d", "gap": "the gap",
-    "starting_torque": "Ms", "load_torque": "Mc", "torque_lag": "the torque lag",
+    "starting_torque": "Ms", "load_torque": "Mc", "load_friction": "the friction of the load",
+    "torque_lag": "the torque lag",
     "torque_rate": "the torque rate", "torque_noise": "the noise of the torque",
     "computing_delay": "the dead time",
 }  # fmt: skip
-_LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
+_LEFT_OUT_AT_0 = (
+    "damping",
+    "load_friction",
+    "torque_noise",
+    "computing_delay",
+)  # data that such a drive simply has not
 _PROBE = 1e-3  # relative
 EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
 GEAR_COUNTS, GEAR_CYCLE = 4000.0, 3.3e-3  # DCS 500B: counts of the nominal torque, cycle at 50 Hz in s

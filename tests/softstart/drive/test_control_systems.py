@@ -48,14 +48,26 @@ def test_states_of_the_whole_drive():
 
 
 @pytest.mark.parametrize(
-    ("kind", "lag", "law"),
-    [("active", 0.0, "modelica"), ("reactive", 0.0, "dead-zone"), ("reactive", 0.004, "no-pull")],
-)
-def test_a_short_start_is_that_of_the_integrator(kind, lag, law):
-    drive = CRANE.replace(load_kind=kind, torque_lag=lag, damping=0.3, contact_law=law)
+    ("kind", "lag", "law", "friction"),
+    [
+        ("active", 0.0, "modelica", 0.0), ("reactive", 0.0, "dead-zone", 0.0),
+        ("reactive", 0.004, "no-pull", 0.0), ("active", 0.0, "no-pull", 3.0),
+    ],
+)  # fmt: skip
+def test_a_short_start_is_that_of_the_integrator(kind, lag, law, friction):
+    drive = CRANE.replace(
+        load_kind=kind, torque_lag=lag, damping=0.3, contact_law=law, load_friction=friction
+    )
     t, out = start(drive, 0.045, 62.0, points=46)
     values = {"J1": 0.035, "J2": 0.175, "c": 368.465, "d": 0.3, "gap": 0.5, "Mc": 7.16, "kind": kind}
-    values |= {"law": law, "theta0": 0.0, "w1_0": 0.0, "w2_0": 0.0, "torque_pieces": [(0.0, 62.0)]}
+    values |= {
+        "load_friction": friction,
+        "law": law,
+        "theta0": 0.0,
+        "w1_0": 0.0,
+        "w2_0": 0.0,
+        "torque_pieces": [(0.0, 62.0)],
+    }
     exact = [integrate(**values, lag=lag, rate=np.inf, u0=0.0, t_end=until) for until in t[1:]]
     for name in ("w1", "w2", "T"):
         expected = np.array([getattr(one, name) for one in exact])

@@ -80,6 +80,18 @@ def moving_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
     return Drive(**(given | fixed))
 
 
+def with_both_parts(rng: np.random.Generator, drive: Drive) -> Drive:
+    """The same load torque against forward motion, of which a part, or more than all of it, is active.
+
+    With a share below a half friction holds the load at rest; with one below 0 the active part drives.
+    """
+    share, Mc = float(rng.choice([-0.4, 0.2, 0.5, 0.7, 0.95])), float(drive.Mc)
+    where = {} if share > 0.5 or drive.start_position != "hanging" else {"start_position": "mid-gap"}
+    return drive.replace(
+        load_kind="active", load_torque=share * Mc, load_friction=(1.0 - share) * Mc, **where
+    )
+
+
 def placed_drive(rng: np.random.Generator) -> Drive:
     """A drive at rest at a random named position, a third of them behind a brake."""
     drive = moving_drive(rng, initial_load_speed=0.0, initial_motor_speed=0.0)

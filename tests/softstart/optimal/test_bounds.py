@@ -19,6 +19,7 @@ from tests.softstart.optimal.drives import (
     played,
     random_torque,
     three_masses,
+    with_both_parts,
     without_gaps,
 )
 
@@ -41,16 +42,21 @@ def slack(machine: Any, k_dyn: float, start_time: float, terminal: Any = "reache
     return k_dyn / bound.k_dyn - 1.0 if bound.k_dyn > 0.0 else 0.0
 
 
-@pytest.mark.parametrize("kind", ["moving", "braking", "placed"])
+@pytest.mark.parametrize("kind", ["moving", "braking", "placed", "parts"])
 def test_no_torque_at_all_gets_below(kind: str) -> None:
-    """Masses that move at first, friction, a motor that brakes; every position, free or behind a brake."""
-    rng = np.random.default_rng({"moving": 5, "braking": 6, "placed": 21}[kind])
+    """Masses that move at first, friction, a motor that brakes; every position, free or behind a brake.
+
+    Of both parts of a load torque any share is active: the load is held at rest, or falls.
+    """
+    rng = np.random.default_rng({"moving": 5, "braking": 6, "placed": 21, "parts": 47}[kind])
     closest, starts, several, rubs, released = math.inf, 0, 0, 0, 0
     for _ in range(350):
         drive = placed_drive(rng) if kind == "placed" else moving_drive(rng)
-        if kind == "braking":
+        if kind == "parts":
+            drive = with_both_parts(rng, placed_drive(rng) if rng.random() < 0.4 else drive)
+        if kind == "braking" or (kind == "parts" and rng.random() < 0.3):
             drive = drive.replace(minimum_torque=-drive.Ms * rng.uniform(0.05, 1.0))
-        if kind != "placed" and rng.random() < 0.25:
+        if kind in ("moving", "braking") and rng.random() < 0.25:
             share = 0.2 * (drive.Ms - drive.Mc)
             rough = {
                 "motor_friction": share * rng.random(),
@@ -73,7 +79,7 @@ def test_no_torque_at_all_gets_below(kind: str) -> None:
     assert closest >= -1e-9
     assert starts > 170
     assert several > 60
-    assert released > 40 if kind == "placed" else rubs > 60
+    assert {"placed": released > 40, "parts": released > 15}.get(kind, rubs > 60)
 
 
 def test_no_gentle_torque_gets_below() -> None:
@@ -249,12 +255,14 @@ def test_shortest_times() -> None:
     assert momentum_shortest_time(Problem(CRANE, 0.3, "reached")) < run.start_time
 
 
-def test_synchronous_starts_respect_the_shortest_time() -> None:
+@pytest.mark.parametrize("parts", [1, 2])
+def test_synchronous_starts_respect_the_shortest_time(parts: int) -> None:
     """Any start is synchronous whenever the twist turns: its speed is what the motor can have brought."""
     rng = np.random.default_rng(11)
     looked_at = 0
     for _ in range(60):
         drive = moving_drive(rng, torque_lag=0.0)
+        drive = with_both_parts(rng, drive) if parts == 2 else drive
         torque = random_torque(rng, drive)
         try:
             run = played(drive, torque, torque.end + 3 * drive.elastic_period)
@@ -304,3 +312,28 @@ def test_no_start_has_less_heat() -> None:
     assert least_heat(Problem(CRANE, 0.3, "reached", "heat")) == 0.0
     assert least_heat(Problem(HELD.replace(release=0.05), 0.4, minimise="heat")) == 0.0
     assert least_heat(Problem(damped_crane(), 0.4, minimise="heat")) == 0.0
+    belt = CRANE.replace(load_torque=6.0, load_friction=2.0)
+    best = optimize(belt, LONG)
+    bound = least_heat(Problem(belt, LONG, minimise="heat", k_dyn=best.k_dyn))
+    mean = 0.21 * 60.0 / LONG + 4.0  # it takes 6 - 2 N m at the least
+    assert best.heat > bound == pytest.approx(mean**2 * LONG / 62.0**2, rel=1e-9)
+    assert least_heat(Problem(belt.replace(load_friction=6.0), 0.4, minimise="heat", k_dyn=1.0)) == 0.0
+
+
+def test_the_bounds_of_a_load_with_both_parts() -> None:
+    """Between those of the parts alone, equal to them in the limits; held at rest it is a reactive load."""
+    for time in (LONG, 0.4):
+        of = {
+            share: momentum_bound(
+                Problem(
+                    CRANE.replace(load_torque=share * 7.16, load_friction=(1.0 - share) * 7.16, damping=1.0),
+                    time,
+                )
+            ).k_dyn
+            for share in (0.0, 0.3, 0.5, 0.7, 1.0 - 1e-12)
+        }
+        reactive = momentum_bound(Problem(CRANE.replace(load_kind="reactive", damping=1.0), time)).k_dyn
+        assert [of[share] for share in (0.0, 0.3, 0.5)] == pytest.approx([reactive] * 3, rel=1e-12)
+        braked = CRANE.replace(damping=1.0, minimum_torque=-1e-9)  # the plain line, without a gentle contact
+        assert of[1.0 - 1e-12] == pytest.approx(momentum_bound(Problem(braked, time)).k_dyn, rel=1e-6)
+        assert reactive <= of[0.7] * (1.0 + 1e-3)

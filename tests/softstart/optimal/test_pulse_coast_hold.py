@@ -75,6 +75,8 @@ def test_no_hold_beyond_the_motor() -> None:
     [
         ({"damping": 0.5}, {}, "damped"),
         ({"load_kind": "reactive"}, {}, "reactive"),
+        ({"load_friction": 8.0}, {}, "friction holds it at rest"),
+        ({"load_friction": 2.0}, {}, "between falling and rising"),
         ({"torque_lag": 0.002}, {}, "lags"),
         ({"torque_rate": 500.0}, {}, "rate"),
         ({"minimum_torque": -10.0}, {}, "brake"),
