@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from tests.softstart.test_identification import GUESS, NAMES, REVERSE, TRUTH
 
 from softstart import InputError, Log, identify
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
+from softstart.identification.solving import _check_step
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +73,27 @@ def test_columns_have_factors_signs_and_units_of_their_own(log: Log, tmp_path: P
             Log.load(path, columns=names | changed)
 
 
+# ---- what the encoder tells -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("unit", "size"), [("turn", 2.0 * math.pi), ("deg", math.pi / 180.0)])
+def test_steps_of_the_encoder_in_another_unit_are_noticed(log: Log, unit: str, size: float) -> None:
+    """Turns or degrees that are called rad."""
+    wrong = Log(log.time, log.torque, angle=log.values / size, torque_is="demand")
+    with pytest.raises(InputError, match=rf"counts of 1024 encoder lines in {unit}; .*angle=NAME\[{unit}\]"):
+        _check_step(wrong, 1024.0)
+    for lines in (0.0, 1000.0, 4096.0):  # none, or another one
+        _check_step(wrong, lines)
+    _check_step(log, 1024.0)
+
+
+def test_steps_of_a_speed_in_another_unit_are_noticed() -> None:
+    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
+    wrong = Log(speed.time, speed.torque, speed=speed.values * 30.0 / math.pi, torque_is="demand")
+    with pytest.raises(InputError, match=r"counts of 1024 encoder lines in rpm; .*speed=NAME\[rpm\]"):
+        _check_step(wrong, 1024.0)
+
+
 # ---- files of inverters, scopes and spreadsheets -----------------------------------------------------------
 
 FILES = {  # heading, row, decimal mark, encoding, what the columns are called
@@ -81,6 +106,65 @@ FILES = {  # heading, row, decimal mark, encoding, what the columns are called
         "utf-16", {"time": "Time [ms]", "torque": "Torque ref. [Nm]", "angle": "Position [rev]"},
     ),
 }  # fmt: skip
+
+
+LAYOUTS = {  # what stands above the numbers, a row, decimal mark, columns
+    "date line": (
+        "Drive recorder, axis X\n2024-05-01 10:00:12\nsamples: 351\n\ntime [ms],torque [N*m],angle [rad]",
+        "{ms},{torque},{angle}", ".", {},
+    ),
+    "names, then words": (
+        "time [ms];torque [N*m];angle [rad]\nof axis X; 2 channels\n", "{ms};{torque};{angle}", ",", {},
+    ),
+    "units below": ("time,torque,angle\ns,Nm,rad", "{s},{torque},{angle}", ".", {}),
+    "units above": ("(ms);(Nm);(deg)\ntime;torque;angle", "{ms};{torque};{deg}", ",", {}),
+    "units in names": ("t/ms;torque in Nm;angle_deg", "{ms};{torque};{deg}", ",", {}),
+    "behind a mark": ("# time [ms] , torque [N*m] , angle [rad]", "{ms},{torque},{angle}", ".", {}),
+    "scope": (
+        "Name\tStart of travel drive\nFile\tC:\\start.csv\n"
+        "Starttime of export\t133964386997165000\tMontag, 1. Januar 2024\t10:00:00.000\n\n"
+        "Name\tActTorque\tName\tActPos\nSymbolComment\tActTorque\tSymbolComment\tActPos\n"
+        "SampleTime[ms]\t4\tSampleTime[ms]\t4\nNetID\t5.1.2.3.1.1\tNetID\t5.1.2.3.1.1\n"
+        "BitMask\t0xff\tBitMask\t0xff\n", "{ms}\t{torque}\t{ms}\t{deg}", ".",
+        {"torque": "ActTorque[N*m]", "angle": "ActPos[deg]"},
+    ),
+    "scope with units": (
+        "Name;MyScope\nSampleTime[ms];4\n\nName;ActTorque;;Name;ActPos\nData-Type;REAL32;;Data-Type;REAL64\n"
+        "Unit;%;;Unit;deg\nOffset;0;;Offset;0\n", "{ms};{percent};;{ms};{deg}", ",",
+        {"torque": "ActTorque[% of 12 N*m]", "angle": "ActPos"},
+    ),
+    "per mille": ("time [ms];M [‰ of 12 Nm];angle [rad]", "{ms};{permille};{angle}", ",", {"torque": "M"}),
+    "per mille, asked": ("time [ms];M [‰];angle [rad]", "{ms};{permille};{angle}", ",",
+        {"torque": "M[per mille of 12 Nm]"}),
+    "time of day": ("time,torque [Nm],angle [rad]", "{clock},{torque},{angle}", ".", {}),
+    "date and time": ("time;torque [Nm];angle [rad]", "2024-05-01 {clock};{torque};{angle}", ",", {}),
+    "counts": ("time [ms];torque [Nm];angle [counts]", "{ms};{torque};{counts}", ",",
+        {"angle": "1/1000000*angle[turn]"}),
+    "no unit of time": ("time;torque [Nm];angle [rad]", "{ms};{torque};{angle}", ",", {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", LAYOUTS)
+def test_headings_clocks_and_shares_are_read(log: Log, kind: str, tmp_path: Path) -> None:
+    """The same signals in each file, from a quarter second before midnight on."""
+    above, row, point, columns = LAYOUTS[kind]
+    rows = []
+    for t, u, a in zip(log.time, log.torque, log.values, strict=True):
+        day = 86399.75 + t
+        minutes, seconds = divmod(day % 86400.0, 60.0)
+        clock = f"{int(minutes // 60):02}:{int(minutes % 60):02}:{seconds:09.6f}"
+        cells = {
+            "s": f"{t:.6f}", "ms": f"{1e3 * t:.3f}", "torque": f"{u:.9f}", "angle": f"{a:.9f}",
+            "clock": clock, "deg": f"{math.degrees(a):.9f}", "percent": f"{u / 0.12:.9f}",
+            "permille": f"{u / 0.012:.9f}", "counts": f"{1e6 * a / (2.0 * math.pi):.0f}",
+        }  # fmt: skip
+        rows.append(row.format(**{key: cell.replace(".", point) for key, cell in cells.items()}))
+    path = tmp_path / "trace.csv"
+    path.write_text("\n".join([above, *rows, "EOF"]), encoding="utf-8")
+    read = Log.load(path, columns=columns)
+    assert read.time - read.time[0] == pytest.approx(log.time, abs=1e-9)
+    assert read.torque == pytest.approx(log.torque, abs=1e-7)
+    assert read.values - read.values[0] == pytest.approx(log.values - log.values[0], abs=4e-6)
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -102,14 +186,133 @@ def test_a_file_is_read_by_the_names_of_its_columns(log: Log, kind: str, tmp_pat
     assert read.values == pytest.approx(log.values, abs=1e-7)
 
 
+# ---- units ----------------------------------------------------------------------------------------------
+
+SIZES = {  # of each unit in SI, by hand
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "torque": {"N*m": 1.0, "kN*m": 1e3, "Ncm": 1e-2, "lbf*ft": 1.3558179483314, "% of 35 Nm": 0.35,
+               "‰ of 35 N*m": 0.035},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "turn": 2.0 * math.pi, "mrad": 1e-3},
+    "speed": {"rad/s": 1.0, "rpm": math.pi / 30.0, "1/min": math.pi / 30.0, "deg/s": math.pi / 180.0,
+              "turn/s": 2.0 * math.pi},
+}  # fmt: skip
+TIME = np.arange(40) * 4e-3
+TORQUE, SPEED = np.linspace(20.0, 40.0, 40), 900.0 * TIME**1.1
+SIGNALS = {"time": TIME, "torque": TORQUE, "angle": 900.0 / 2.1 * TIME**2.1, "speed": SPEED}
+
+
+def written(path: Path, columns: dict[str, tuple[str, float]]) -> Path:
+    """A file with these signals, each under a heading and in a unit of this size."""
+    rows = zip(*(SIGNALS[key] / size for key, (_, size) in columns.items()), strict=True)
+    heading = ";".join(name for name, _ in columns.values())
+    lines = [";".join(f"{value:.17g}" for value in row) for row in rows]
+    path.write_text("\n".join([heading, *lines]), encoding="utf-8")
+    return path
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.sampled_from(["angle", "speed"]), st.data(), st.booleans())
+def test_the_unit_of_each_signal_does_not_matter(kind: str, data: st.DataObject, asked: bool) -> None:
+    """Whether the heading or the command names it; the other motion stands beside, in a unit of its own."""
+    other = "speed" if kind == "angle" else "angle"
+    keys = ("time", "torque", kind, other)
+    units = {key: data.draw(st.sampled_from(sorted(SIZES[key])), label=key) for key in keys}
+    named = {key: "beside" if key == other else f"{key}_1" for key in keys}
+    in_file = {key: named[key] if asked and key != other else f"{named[key]} [{units[key]}]" for key in keys}
+    columns = {key: named[key] + (f"[{units[key]}]" if asked else "") for key in keys[:3]}
+    with tempfile.TemporaryDirectory() as folder:
+        path = written(Path(folder, "a.csv"), {key: (in_file[key], SIZES[key][units[key]]) for key in keys})
+        read = Log.load(path, columns=columns)
+    assert read.kind == kind
+    assert read.time == pytest.approx(TIME, rel=1e-12)
+    assert read.torque == pytest.approx(TORQUE, rel=1e-12)
+    assert read.values == pytest.approx(SIGNALS[kind], rel=1e-12, abs=1e-12)
+    assert read.notes == ()
+
+
+@pytest.mark.parametrize("kind", ["angle", "speed"])
+def test_a_motion_without_a_unit_is_a_question(kind: str, tmp_path: Path) -> None:
+    path = written(
+        tmp_path / "a.csv", {"time": ("t", 1.0), "torque": ("torque [Nm]", 1.0), kind: (kind, 1.0)}
+    )
+    unit = {"angle": "turn", "speed": "rpm"}[kind]
+    with pytest.raises(InputError, match=rf'"{kind}", the {kind}, has no unit.*"{kind}={kind}\[{unit}\]"'):
+        Log.load(path)
+    read = Log.load(path, columns={kind: f"{kind}[{unit}]"})
+    assert read.values == pytest.approx(SIZES[kind][unit] * SIGNALS[kind], rel=1e-12)
+    assert read.notes == ('"t" has no unit and was taken for a time in s',)
+
+
+@pytest.mark.parametrize("unit", ["rad", "deg", "turn"])
+def test_the_unit_of_an_angle_is_told_by_its_derivative(unit: str, tmp_path: Path) -> None:
+    """A column of the speed, by any name, whose unit is stated."""
+    size = SIZES["angle"][unit]
+    columns = {
+        "time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0), "angle": ("angle", size),
+        "speed": ("n_act [rpm]", math.pi / 30.0),
+    }  # fmt: skip
+    read = Log.load(written(tmp_path / "a.csv", columns))
+    assert read.values == pytest.approx(SIGNALS["angle"], rel=1e-12, abs=1e-12)
+    assert f'"angle" has no unit; it is in {unit}, as the column "n_act [rpm]" tells' in read.notes
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "rpm", "deg/s"])
+def test_the_unit_of_a_speed_is_told_by_its_integral(unit: str, tmp_path: Path) -> None:
+    columns = {
+        "time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0), "speed": ("speed", SIZES["speed"][unit]),
+        "angle": ("pos [deg]", math.pi / 180.0),
+    }  # fmt: skip
+    read = Log.load(written(tmp_path / "a.csv", columns))
+    assert read.values == pytest.approx(SPEED, rel=1e-12, abs=1e-12)
+    assert f'"speed" has no unit; it is in {unit}, as the column "pos [deg]" tells' in read.notes
+
+
+def test_two_units_without_a_name_and_units_that_contradict_are_questions(tmp_path: Path) -> None:
+    path, rpm = tmp_path / "a.csv", math.pi / 30.0
+    columns = {"time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0)}
+    two = columns | {"angle": ("angle", 2.0 * math.pi), "speed": ("n_act", rpm)}
+    with pytest.raises(InputError, match=r'column "n_act" beside it fits angle in turn with n_act in rpm'):
+        Log.load(written(path, two))
+    counts = columns | {"angle": ("angle", 2.0 * math.pi / 4096.0), "speed": ("n_act [rpm]", rpm)}
+    with pytest.raises(InputError, match=r'one of it is 0.00153\d* rad, by the column "n_act \[rpm\]"'):
+        Log.load(written(path, counts))
+    # turns called rad, and rpm called rad/s
+    for wrong, right in (
+        ({"angle": ("angle [rad]", 2.0 * math.pi), "speed": ("n_act [rpm]", rpm)}, r"angle=angle\[turn\]"),
+        ({"speed": ("speed [rad/s]", rpm), "angle": ("pos [deg]", math.pi / 180.0)}, r"speed=speed\[rpm\]"),
+    ):
+        with pytest.raises(InputError, match=rf"cannot both be right.*{right}"):
+            Log.load(written(path, columns | wrong))
+    # a column beside it that belongs behind a gear is none
+    geared = columns | {"angle": ("angle [rad]", 1.0), "speed": ("n_load [rpm]", 38.1 * rpm)}
+    assert Log.load(written(path, geared)).values == pytest.approx(SIGNALS["angle"], rel=1e-12, abs=1e-12)
+
+
+def test_a_torque_without_a_unit_is_taken_for_newton_metres_and_that_is_said(tmp_path: Path) -> None:
+    path = written(
+        tmp_path / "a.csv", {"time": ("t [s]", 1.0), "torque": ("M", 1.0), "angle": ("angle [rad]", 1.0)}
+    )
+    (note,) = Log.load(path, columns={"torque": "M"}).notes
+    assert "taken for a torque in N m, which no motion can check" in note
+    assert '"torque=M[% of 35 N*m]"' in note
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("\0\0", "this is not a text file; export the signals as CSV"),
         ("s;torque;angle\n0;1;2\n1;1;2", "none is called time; write --columns .time=NAME .ms."),
-        ("time;torque [%];angle\n0;1;2\n1;1;2", r"torque \[%\].*of %, as .torque=1.2\*NAME \[N\*m\]"),
+        ("time;torque [%];angle\n0;1;2\n1;1;2", r"torque \[%\].*of %, as .torque=NAME \[% of 35 N\*m\]"),
         ("time,torque,speed [%]\n0,1,2\n1,1,2", r"speed \[%\].*is no unit.*speed=NAME \[rad/s\]"),
         ("time,torque,speed,angle\n0,1,1,2\n1,1,1,2", "they name both of angle and speed"),
+        (
+            "time,torque,angle [counts]\n0,1,1\n1,1,2",
+            r"angle=1/4096\*NAME \[turn\]. with the counts of a turn",
+        ),
+        ("time,torque,angle\n10:00:00,1,1\n10:00:0x,1,2", "this is no time of day"),
+        ("torque\nnone", "no line of its first 400 has numbers in two columns"),
+        ("0;1;2\n1;1;2", "no line above the numbers names the columns"),
+        ("Name;torque;Name;n\n0;1;0;2\n1;1;1.5;2", "samples at other times than the first channel"),
     ],
 )
 def test_what_is_no_log_is_told_what_to_write(tmp_path: Path, text: str, sentence: str) -> None:

@@ -63,8 +63,8 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
 @click.option("--columns", metavar="SIGNAL=NAME,...",
     callback=reading(lambda text, option: options.read_params(text.split(","), option, "speed=n_act")),
     help="Names of the columns in the log, for example time=t,torque=1.2*iq[N*m],speed=-n_act[rpm]; a minus "
-    "inverts the sign, a factor makes a torque of a current or of %, a unit in brackets replaces that of the "
-    "log.")  # fmt: skip
+    "inverts the sign, a factor makes a torque of a current or an angle of counts (1/4096*pos[turn]), a "
+    "unit in brackets replaces that of the log ([% of 35 N*m] for a torque in %).")  # fmt: skip
 @click.option(
     "--torque-is", metavar="measured|demand", type=click.Choice(["measured", "demand"]), default="measured",
     help="Meaning of the torque in the log. Default: measured.",
@@ -83,9 +83,9 @@ def identify(
 ) -> Answer:  # fmt: skip
     """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
-    LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with units in the first
-    line, "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs of the same drive are
-    fitted together.
+    LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with names and units
+    above the numbers, "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs of the same
+    drive are fitted together.
     """
     read = [softstart.Log.load(one, columns=columns, torque_is=torque_is) for one in logs]
     with working("fitting the drive to the logs ...") as progress:

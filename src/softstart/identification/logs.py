@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,20 +15,13 @@ from scipy.integrate import cumulative_trapezoid
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import read_text, write_whole
-from softstart.quantities import RefusedError, nearest, parse, show
+from softstart.identification.log_files import SIGNALS, read_log
+from softstart.input.files import write_whole
+from softstart.quantities import show
 
 Kind = Literal["angle", "speed"]
 TorqueIs = Literal["demand", "measured"]
 
-COLUMNS: Final = {
-    "time": Wanted(("time", "t"), "s"),
-    "torque": Wanted(("torque", "u", "demand"), "N*m"),
-    "angle": Wanted(("angle", "phi", "position"), "rad"),
-    "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
-}
-FORM: Final = "time [ms];torque [N*m];speed [rpm]"
 FEWEST: Final = 30  # samples
 MOST_ROWS: Final = 1000  # samples of angle or speed that the fit looks at
 LEAST_COUNT: Final = 1e-5  # of the largest difference: a smaller step is rounding
@@ -151,7 +142,11 @@ class Log:
     ) -> Log:
         """A log from a CSV file whose heading names the columns, as `time [ms];torque [N*m];speed [rpm]`.
 
-        The heading is the last line above the numbers; what stands above it is passed over.
+        The heading is the line of names above the numbers, and a line of units below it if there is one; or
+        a block with a line for each property of the channels, as scopes write it. What stands above or
+        between is passed over. Times may be times of day. A motion without a unit is refused, unless a column
+        beside it tells the unit; a torque without one is taken for N m, a time for s, ms or us, and the notes
+        say so.
 
         Parameters
         ----------
@@ -160,16 +155,18 @@ class Log:
         columns : mapping, optional
             What the file calls time, torque, angle and speed, as `-n_act [rpm]`: a minus turns the sign, and
             a unit in brackets takes the place of that of the file. A factor before the name makes a torque of
-            a current, or of a share in %: `1.2*iq [N*m]`.
+            a current, or an angle of counts: `1.2*iq [N*m]`, `1/4096*pos [turn]`. A share has its whole in
+            the brackets: `M_act [% of 35 N*m]`.
         torque_is : {"measured", "demand"}
             As for `Log`.
         """
-        found = _read_columns(os.fspath(path), _asked_columns(columns or {}))
-        return cls(torque_is=torque_is, name=Path(path).name, **found)
+        values, notes = read_log(os.fspath(path), columns or {})
+        log = cls(torque_is=torque_is, name=Path(path).name, **values)
+        return log.changed(notes=(*notes, *log.notes))
 
     def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
         """Write the log to a CSV file that `load` reads; `about` goes into a comment above it."""
-        heading = f"time [s],torque [N*m],{self.kind} [{COLUMNS[self.kind].unit}]"
+        heading = f"time [s],torque [N*m],{self.kind} [{SIGNALS[self.kind].unit}]"
         lines = [*(f"# {line}" for line in about.splitlines()), heading]
         rows = zip(self.time.tolist(), self.torque.tolist(), self.values.tolist(), strict=True)
         lines += [f"{t:.9g},{u:.9g},{'' if math.isnan(value) else f'{value:.12g}'}" for t, u, value in rows]
@@ -411,88 +408,3 @@ def _count(steps: Vector) -> float:
     multiples = np.round(steps / count)
     count = float(np.sum(steps) / np.sum(multiples))
     return count if float(np.max(np.abs(steps / count - multiples))) < 0.05 else 0.0
-
-
-# ---- the file -------------------------------------------------------------------------------------------
-
-
-def _asked_columns(columns: Mapping[str, str]) -> dict[str, tuple[str, float, str]]:
-    """Name, factor and unit of the columns as people write them.
-
-    >>> _asked_columns({"speed": "-n_act [rpm]", "torque": "0.12 * M"})
-    {'speed': ('n_act', -1.0, 'rpm'), 'torque': ('M', 0.12, '')}
-    """
-    found = {}
-    for key, text in columns.items():
-        part = re.fullmatch(r"\s*(-?)\s*(?:(\d*\.?\d+)\s*\*)?\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
-        if key not in COLUMNS or part is None:
-            near = nearest(key, COLUMNS) if key not in COLUMNS else key
-            remedy = f"did you mean {near}=NAME?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act."
-            raise InputError(f"columns: {key} = {show(text)}: {remedy}")
-        minus, factor, name, unit = part.groups("")
-        found[key] = name, float(f"{minus}{factor or 1}"), unit
-    return found
-
-
-def _read_columns(where: str, asked: Mapping[str, tuple[str, float, str]]) -> dict[str, Vector]:
-    """Time, torque, and angle or speed of a file in SI."""
-    try:
-        text = read_text(Path(where), also="cp1252")
-        if "\0" in text:
-            raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
-        lines = text.splitlines()
-        rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
-        first = next((i for i in rows if re.match(r"\s*[+-]?[.,]?[0-9]", lines[i])), 0)
-        head = max((i for i in rows if i < first), default=None)
-        if head is None:
-            raise RefusedError(f"no line above the numbers names the columns; write it there, as {FORM}")
-        lines[:head] = ["#"] * head
-        mark = next((one for one in ";\t" if any(one in line for line in lines)), ",")
-        cells = next(csv.reader([lines[head]], delimiter=mark, skipinitialspace=True))
-        parts = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?\s*", cell, re.DOTALL) for cell in cells]
-        names, units = ([part[i] or "" if part else "" for part in parts] for i in (1, 2))
-        heading, factors = [""] * len(cells), {}
-        for key, i in _places(names, asked).items():
-            _, factor, unit = asked.get(key, ("", 1.0, ""))
-            heading[i], factors[key] = key, factor * _in_si(unit or units[i], key, cells[i])
-    except RefusedError as refusal:
-        raise InputError(f"log = {where}: {refusal.reason}.") from None
-    lines[head] = mark.join(heading)
-    wanted = [Wanted((key,), COLUMNS[key].unit) for key in factors]
-    columns = read_columns("\n".join(lines), f"log = {where}", wanted, headed="names", missing=True).values
-    return {key: factor * column for (key, factor), column in zip(factors.items(), columns, strict=True)}
-
-
-def _places(names: Sequence[str], asked: Mapping[str, tuple[str, float, str]]) -> dict[str, int]:
-    """In which column each signal stands."""
-    found: dict[str, list[int]] = {}
-    for key, one in COLUMNS.items():
-        known = [name.lower() for name in ([asked[key][0]] if key in asked else one.names)]
-        found[key] = [i for i, name in enumerate(names) if name.lower() in known]
-    motions = [key for key in ("angle", "speed") if key in asked]
-    motions = motions or [key for key in ("angle", "speed") if found[key]]
-    wanted, wrong = ("time", "torque", *motions), list[str]()
-    for key in wanted:
-        if len(found[key]) != 1:
-            many = f"{len(found[key])} are" if found[key] else "none is"
-            wrong.append(f"{many} called {asked[key][0] if key in asked else key}")
-    if len(motions) != 1:
-        wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
-    if wrong:
-        raise RefusedError(
-            f"there are the columns {', '.join(filter(None, names))}; {' and '.join(wrong)}; write --columns "
-            '"time=NAME [ms],torque=NAME,speed=NAME [rpm]" with names of this file'
-        )
-    return {key: found[key][0] for key in wanted}
-
-
-def _in_si(unit: str, key: str, cell: str) -> float:
-    """One of this unit in SI."""
-    try:
-        return float(parse(f"1 {unit.strip()}", COLUMNS[key].unit))
-    except RefusedError as refusal:
-        named = f'"{key}=NAME [{COLUMNS[key].unit}]"'
-        of_other = '; of a current in A, or of %, as "torque=1.2*NAME [N*m]"' if key == "torque" else ""
-        raise RefusedError(
-            f"{show(cell)}: {refusal.reason}; or name the unit that is meant, as --columns {named}{of_other}"
-        ) from None

@@ -16,6 +16,7 @@ from softstart.chain.model import Chain, load_machine
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, listed
 from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Sizes, Spot, agreeing
+from softstart.identification.log_files import MOTIONS, SIGNALS
 from softstart.identification.logs import TURN, Log
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.result import AT_LIMIT, Estimate, Identification
@@ -29,7 +30,7 @@ from softstart.identification.unknowns import (
     values_of,
 )
 from softstart.parallel import on_one_thread
-from softstart.quantities import show
+from softstart.quantities import show, to_si
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps of a chain, at the motor shaft
@@ -41,6 +42,7 @@ CHANCE, INDEPENDENT = 1e-5, 1e-4  # that errors alone leave such a slow torque, 
 WAVES: Final = 20  # torques that change slowly, of which none must be left
 LAGS: Final = 20  # samples over which what is left must not be correlated
 DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
+STEP_ALIKE: Final = 1e-3  # error of the step of an encoder by log and lines
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
 
@@ -112,6 +114,7 @@ def identify(
     asked, moving = _free(free, drive, read)
     for one in read:
         _check_inertia(one, drive)
+        _check_step(one, float(drive.encoder_lines))
     base = drive if moving else drive.design_drive
     base = base.replace(**({"start_position": "mid-gap"} if moving else {"initial_speed": 0.0}))
     unknowns = unknowns_of(asked, drive, read, [moving for _ in read])
@@ -234,6 +237,22 @@ def _check_inertia(log: Log, drive: Drive) -> None:
         "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms], or "
         'given as --columns "time=NAME [ms]".'
     )
+
+
+def _check_step(log: Log, lines: float) -> None:
+    """Refuse a log whose steps are those of the encoder in another unit than the log says."""
+    period = float(np.median(np.diff(log.time))) if log.kind == "speed" else 1.0
+    counts = log.count * period * 4.0 * lines / TURN
+    si = SIGNALS[log.kind].unit
+    for unit in MOTIONS[log.kind]:
+        # 1 if the numbers are in this unit and were read in SI
+        share = counts * float(to_si(f"1 {unit}", si))
+        if abs(share - 1.0) < STEP_ALIKE and abs(counts - 1.0) > STEP_ALIKE:
+            raise InputError(
+                f"{log.name}: the {log.kind} goes in steps of {log.count:.4g} {si}, which are the counts of "
+                f'{lines:g} encoder lines in {unit}; write --columns "{log.kind}=NAME[{unit}]", or --set '
+                "motor.encoder_lines=0 if the log is of another encoder."
+            )
 
 
 def _untold(fitter: Fitter, best: Point) -> bool:

@@ -12,12 +12,15 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.quantities import RefusedError, parse, show, with_points
+from softstart.quantities import RefusedError, parse, read_unit, show, with_points
 
 _NUMBER = re.compile(r"[+-]?[.,]?[0-9]|[+-]?(inf|nan)\b", re.IGNORECASE)
 Heading = Literal["any", "names"]
+SHARES = ("%", "‰")  # of a torque that a file does not name
 
-__all__ = ["Columns", "Wanted", "read_columns"]
+__all__ = ["Columns", "Wanted", "are_units", "read_columns", "read_numbers", "rows_of", "split_heading"]
+
+Row = tuple[int, list[str]]  # the number of a line, and its cells
 
 
 class Wanted(NamedTuple):
@@ -41,10 +44,10 @@ def read_columns(
 
     Semicolons, tabs or commas divide columns; between semicolons and tabs, or in quotes, numbers may have
     decimal commas. Blank lines and lines that begin with # are passed over. A first line without numbers
-    names the columns, with units as `torque [kN*m]`; if there are no more columns than wanted, other names
-    will do, in this order. Without it there are exactly the columns wanted, in SI. `headed`: it must be there
-    and give "names". `missing`: an empty cell, or "nan", is NaN. What can be read in
-    two ways is refused.
+    names the columns, with units as `torque [kN*m]`, or in the line below it; if there are no more columns
+    than wanted, other names will do, in this order. Without it there are exactly the columns wanted, in SI.
+    `headed`: it must be there and give "names". `missing`: an empty cell, or "nan", is NaN. What can be read
+    in two ways is refused.
 
     >>> time, torque = Wanted(("time", "t"), "s"), Wanted(("torque", "u"), "N*m")
     >>> read_columns("t [ms];u [N*m]\\n0;1,5\\n9;2,5", "here", [time, torque])
@@ -54,26 +57,58 @@ def read_columns(
     softstart.errors.InputError: here: line 1, "0,0,10,5", has 4 values instead of 2, time and torque; with
     decimal commas divide the values by semicolons, as 0,5;10,5, or write decimal points.
     """
-    rows, separator = _rows(text, where)
-    names = " and ".join(one.names[0] for one in wanted)
+    numbered = enumerate(text.splitlines(), start=1)
+    lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    mark = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines)), ",")
+    rows = rows_of(lines, mark, where)
     heading = [cell.strip() for cell in rows[0][1]] if rows else []
-    first = show(separator.join(heading))
+    first = show(mark.join(heading))
+    units = [""] * len(wanted)
     if rows and not any(map(_NUMBER.match, heading)):
         rows = rows[1:]
+        heading, units = map(list, zip(*map(split_heading, heading), strict=True))
+        if rows and len(rows[0][1]) == len(heading) and not any(units) and are_units(rows[0][1]):
+            units = [split_heading(f"[{cell.strip('[]() ')}]")[1] for cell in rows[0][1]]
+            rows = rows[1:]
     else:
         heading = [""] * len(wanted)
     try:
-        places, units = _places(heading, wanted, headed)
+        places = _places(heading, units, wanted, headed)
     except RefusedError as refusal:
         raise InputError(f"{where}: its first line is {first}: {refusal.reason}.") from None
     if not rows:
+        names = " and ".join(one.names[0] for one in wanted)
         raise InputError(f"{where}: there are no numbers in it; write a line for each {names}.")
+    table = Table(rows, len(heading), mark)
+    return read_numbers(table, where, wanted, places, [units[place] for place in places], missing=missing)
+
+
+class Table(NamedTuple):
+    """Lines of cells: each has this number of them, divided by this mark."""
+
+    rows: list[Row]
+    width: int
+    mark: str
+
+
+def read_numbers(
+    table: Table,
+    where: str,
+    wanted: Sequence[Wanted],
+    places: Sequence[int],
+    units: Sequence[str],
+    *,
+    missing: bool,
+) -> Columns:
+    """The columns at these places, which have these units, in SI."""
+    rows, width, mark = table
+    names = " and ".join(one.names[0] for one in wanted)
     refused = []
     for number, row in rows:
-        if len(row) != len(heading):
-            shown, count = show(separator.join(row)), f"{len(row)} value{'s' * (len(row) > 1)}"
-            reason = f"line {number}, {shown}, has {count} instead of {len(heading)}, {names}"
-            if separator == "," and len(row) > len(heading):
+        if len(row) != width:
+            shown, count = show(mark.join(row)), f"{len(row)} value{'s' * (len(row) > 1)}"
+            reason = f"line {number}, {shown}, has {count} instead of {width}, {names}"
+            if mark == "," and len(row) > width:
                 reason += "; with decimal commas divide the values by semicolons, as 0,5;10,5, or write "
                 reason += "decimal points"
             refused.append(reason)
@@ -99,24 +134,42 @@ def read_columns(
     return Columns([number for number, _ in rows], values)
 
 
-def _rows(text: str, where: str) -> tuple[list[tuple[int, list[str]]], str]:
-    """The cells of each line that counts, with its number, and what divides them."""
-    numbered = enumerate(text.splitlines(), start=1)
-    lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
-    mark = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines)), ",")
+def split_heading(cell: str) -> tuple[str, str]:
+    """Name and unit of a column.
+
+    >>> split_heading("torque [N*m]"), split_heading("t (ms)"), split_heading("n")
+    (('torque', 'N*m'), ('t', 'ms'), ('n', ''))
+    """
+    part = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?\s*", cell, re.DOTALL)
+    return (part[1], part[2] or "") if part else ("", "")
+
+
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether a line is one of units, below that of the names.
+
+    >>> are_units(["s", "Nm", "[rad/s]", "%"]), are_units(["t", "torque"]), are_units(["1", "1"])
+    (True, False, False)
+    """
+    units = [cell.strip("[]() ") for cell in cells]
+    known = (one in ("", "-", *SHARES) or not isinstance(read_unit(one), str) for one in units)
+    return any(units) and not any(map(_NUMBER.match, units)) and all(known)
+
+
+def rows_of(lines: Sequence[tuple[int, str]], mark: str, where: str) -> list[Row]:
+    """The cells of numbered lines, divided by a mark."""
     try:
         rows = [(n, next(csv.reader([line], delimiter=mark, skipinitialspace=True))) for n, line in lines]
     except csv.Error as error:
         raise InputError(f"{where}: it cannot be read as columns of numbers ({error}).") from None
     if all(len(row) > 1 and not row[-1].strip() for _, row in rows):  # a mark at the end of each line
         rows = [(n, row[:-1]) for n, row in rows]
-    return rows, mark
+    return rows
 
 
-def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -> tuple[list[int], list[str]]:
-    """Which columns are wanted, and the unit that each heading gives."""
-    parts = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", cell, re.DOTALL) for cell in heading]
-    names, units = ([part[i] or "" if part else "" for part in parts] for i in (1, 2))
+def _places(
+    names: Sequence[str], units: Sequence[str], wanted: Sequence[Wanted], headed: Heading
+) -> list[int]:
+    """Which columns are wanted; their units are checked."""
     found: dict[int, int] = {}  # the column of each one wanted
     for k, one in enumerate(wanted):
         here = [i for i, name in enumerate(names) if name in one.names] or [
@@ -125,7 +178,7 @@ def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -
         if len(here) > 1:
             raise RefusedError(f"it names {one.names[0]} twice; keep one of the two columns")
         found.update((k, i) for i in here)
-    if headed == "any" and len(heading) == len(wanted):  # other names, in the order wanted
+    if headed == "any" and len(names) == len(wanted):  # other names, in the order wanted
         free = iter(sorted(set(range(len(wanted))) - set(found.values())))
         found |= {k: next(free) for k in range(len(wanted)) if k not in found}
     places = [found[k] for k in sorted(found)]
@@ -136,4 +189,4 @@ def _places(heading: Sequence[str], wanted: Sequence[Wanted], headed: Heading) -
             parse(f"1 {units[place]}", one.unit)
         except RefusedError as refusal:
             raise RefusedError(f"unit of {one.names[0]} = {show(units[place])}: {refusal.reason}") from None
-    return places, [units[place] for place in places]
+    return places

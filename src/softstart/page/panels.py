@@ -161,8 +161,9 @@ class LogPanel(TaskPanel):
 
     name = "log"
     about = (
-        "A CSV file of a start from standstill: time, torque, and angle or speed of the motor, with "
-        "units in its first line. The drive on this page is the first guess and may be off by a factor "
+        "A CSV file of a start from standstill: time, torque, and angle or speed of the motor, with names "
+        "and units above the numbers, or as you write them below (counts: angle=1/4096*pos[turn]; a torque "
+        "in %: torque=M[% of 35 N*m]). The drive on this page is the first guess and may be off by a factor "
         "of 3. A chain with one dominant gap is identified as two masses. The drive of the page changes "
         "only when you press Use this drive."
     )
