@@ -25,7 +25,7 @@ SHEETS = {
     "hoist": {**MOTOR, **GEAR, "load.mass": "3000 kg", "load.radius": "0.1 m", "load.reeving": 2},
     "travel": {**MOTOR, **GEAR, **MASS},
     "belt": {**MOTOR, **GEAR, **MASS},
-    "rotor": {**MOTOR, **GEAR, "load.inertia": "290 kg*m^2", "load.torque": "900 N*m"},
+    "rotor": {**MOTOR, **GEAR, "load.inertia": "290 kg*m^2", "load.friction": "900 N*m"},
 }
 COMMANDS = {
     "compare": "compare {}",

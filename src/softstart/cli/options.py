@@ -104,10 +104,12 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
     settings = [one for one in settings if one not in own]
     found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))
     print(
-        f'"{name}" is a data sheet, read as the drive that follows from it; "softstart init {name} '
-        '--out FILE" writes that drive.',
+        f'"{name}" is a data sheet, read as the drive that follows from it ({found.motion}); "softstart init '
+        f'{name} --out FILE" writes that drive.',
         file=sys.stderr,
     )
+    for doubt in found.doubts_of_motion:
+        print(f"softstart: doubt: {doubt}", file=sys.stderr)
     drive = found.drive.with_settings(settings) if settings else found.drive
     given = read_settings(settings, Drive.PARAMETERS)[0]
     return drive if "assumed" in given else drive.replace(assumed=found.assumed_still(given))

@@ -7,72 +7,84 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self, get_args
+from typing import Any, ClassVar, NamedTuple, Self, get_args
 
+from softstart.drive.checks import GRAVITY
+from softstart.drive.data_sheet_words import (
+    ABOUT,
+    INSTEAD,
+    NEEDED,
+    ROPE,
+    STIFFNESSES,
+    USUAL,
+    Machine,
+    converted,
+)  # fmt: skip
+from softstart.drive.doubts import doubts, doubts_of_motion
 from softstart.drive.model import Drive
 from softstart.errors import InputError
 from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import text_of
 from softstart.input.gear import Gear
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
-from softstart.input.parameters import Mistake, Parameter, Wording, bare, read_value, without_unit
+from softstart.input.parameters import Mistake, Parameter, Wording, bare, without_unit
 from softstart.quantities import Units, shortest
 
-__all__ = [
-    "ABOUT", "INSTEAD", "MACHINES", "TYPICAL", "USUAL", "DataSheet", "Machine", "echo", "if_empty", "typed",
-]  # fmt: skip
+__all__ = ["DataSheet"]
 
-Machine = Literal["hoist", "travel", "belt", "rotor"]
-MACHINES: Mapping[str, str] = {
-    "hoist": "a load on ropes",
-    "travel": "a crane, trolley or vehicle on wheels",
-    "belt": "a belt conveyor",
-    "rotor": "slewing gear, fan, rotary table: anything that turns about the output axis",
-}
-
-GRAVITY = 9.80665  # m/s^2
+# elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
+# K_dyn is the higher one, and results are compared with those of the soft end
+BAND = (3.0, 30.0)
 STEEL = 79.3e9  # N/m^2, shear modulus
 RESISTANCE = {"travel": 0.008, "belt": 0.02}  # share of the weight
 METAL = 0.46  # metallic cross-section of a rope over its diameter squared, EN 12385: class 6x36, steel core
 
-# what is filled in where a number is not given, and where that is from
-TYPICAL: Mapping[str, tuple[str, str]] = {
-    "starting_ratio": ("1.5", "1.5 is what inverters allow for a minute in their heavy-duty rating; at the "
-                       "mains 2 to 3, by the data sheet of the motor"),
-    "efficiency": ("0.95", "0.97 to 0.98 for each stage of spur, helical or bevel gears"),
-    "rope_modulus": ("100 GPa", "90 to 120 GPa on the metallic cross-section, 0.46 d^2, of a rope in use"),
-    "resistance": ("0.008, of a belt 0.02", "travel on rolling bearings 0.006 to 0.01; belts 0.016 to 0.03, "
-                   "DIN 22101"),
-    "damping_ratio": ("0.02", "0.02 for gears and steel shafts; with an elastomer coupling 0.06, psi/(4 pi) "
-                      "by its catalogue"),
+TWICE = {
+    "rope_length": "how stiff the rope is", "radius": "how large the wheel or drum is",
+    "rise": "how steep the track is",
 }  # fmt: skip
-# the unit that a bare number has at the prompt and in the form, where it is not that of SI; in a file such a
-# number is refused
-USUAL: Mapping[str, str] = {
-    "rated_power": "kW", "rated_speed": "rpm", "torque_lag": "ms", "backlash": "arcmin",
-    "rope_modulus": "GPa", **dict.fromkeys(
-        ("coupling_play", "coupling_diameter", "shaft_diameter", "shaft_length", "output_play",
-         "play_diameter", "rope_diameter"), "mm"),
-}  # fmt: skip
-# parameters that say something about these machines only
-ABOUT: Mapping[str, tuple[Machine, ...]] = {
-    **dict.fromkeys(("mass", "radius"), ("hoist", "travel", "belt")), "resistance": ("travel", "belt"),
-    **dict.fromkeys(("reeving", "rope_stiffness", "rope_length", "rope_diameter", "rope_modulus"), ("hoist",))
-}  # fmt: skip
-# parameters that need not be given where the other one is
-INSTEAD: Mapping[str, str] = {
-    "rated_torque": "rated_power", "starting_ratio": "starting_torque", "maximum_ratio": "maximum_torque",
-    "rope_length": "rope_stiffness",
-}  # fmt: skip
-FORMER = {"power": "rated_power", "speed": "rated_speed"}  # keywords of former versions
-_QUOTIENT = re.compile(r"\s*(\d+\.?\d*)\s*[:/]\s*(\d+\.?\d*)\s*")
+# keywords of former versions
+FORMER = {"power": "rated_power", "speed": "rated_speed", "output_torque": "active_torque"}
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
+FORCES = {"load_torque", "load_friction"}
 SETTLE = {
-    "starting_ratio": {"starting_torque"}, "efficiency": {"stiffness", "load_inertia", "load_torque"},
-    "backlash": {"gap"}, "rope": {"stiffness"}, "rope_modulus": {"stiffness"}, "resistance": {"load_torque"},
-    "damping_ratio": {"damping"},
+    "starting_ratio": {"starting_torque"}, "efficiency": {"stiffness", "load_inertia", *FORCES},
+    "backlash": {"gap"}, "rope": {"stiffness"}, "rope_modulus": {"stiffness"}, "resistance": FORCES,
+    "damping_ratio": {"damping"}, "stiffness": {"stiffness"},
 }  # fmt: skip
+
+SHOWN_IN = {"kW": 1e3, "ms": 1e-3, "rpm": math.pi / 30.0}  # units of a drive file that are not those of SI
+
+
+class _Load(NamedTuple):
+    """The load at the output: kg m2 and N m, each with what it is from."""
+
+    inertia: float
+    inertia_from: str
+    active: float
+    active_from: str
+    friction: float
+    friction_from: str
+
+
+class _MotorSide(NamedTuple):
+    """One motor and its share of the load, at the motor shaft: kg m2 and N m."""
+
+    J1: float
+    J2: float
+    Ms: float
+    active: float
+    friction: float
+    overhauling: bool  # whether the load drives the motor
+
+
+class _Entry(NamedTuple):
+    """A line of a drive file: the value in SI at the motor shaft, as it is shown, and what it is from."""
+
+    value: Any
+    text: str
+    about: str
 
 
 def _maybe(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
@@ -173,6 +185,10 @@ class DataSheet(ParameterSet):
     play_diameter: MaybeNumber = _maybe("output.play_diameter", "m", "diameter on which they have this play",
         '"120 mm"')
     mass: MaybeNumber = _maybe("load.mass", "kg", "mass that is moved", '"12000 kg"')
+    goods: MaybeNumber = _maybe("load.goods", "kg", "mass of goods or passengers on an inclined belt",
+        '"4000 kg"')
+    counterweight: Number = _nothing("load.counterweight", "kg", "mass of the counterweight", '"1400 kg"')
+    diameter: MaybeNumber = _maybe("load.diameter", "m", "diameter of wheel or drum", '"315 mm"')
     radius: MaybeNumber = _maybe("load.radius", "m", "radius of wheel or drum", '"0.1575 m"')
     reeving: Number = parameter("load.reeving", "1",
         "falls of rope that carry the load for one that is wound", "2", "above 0", default=1.0)
@@ -184,11 +200,23 @@ class DataSheet(ParameterSet):
         "modulus of the rope on its metallic cross-section", '"105 GPa"', "above 0", default=100e9)
     resistance: MaybeNumber = parameter("load.resistance", "1", "resistance to motion over weight", "0.008",
         "from 0 to 1", default=None)
+    slope: Number = parameter("load.slope", "rad",
+        "slope of track or belt, angle or per cent, below 0 downhill", '"2 deg"', default=0.0)
+    rise: MaybeNumber = parameter("load.rise", "m", "rise of track or belt, below 0 downhill", '"6 m"',
+        default=None)
+    length: MaybeNumber = _maybe("load.length", "m", "length of track or belt along which it rises so much",
+        '"40 m"')
     output_inertia: Number = _nothing("load.inertia", "kg*m^2",
         "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"', at_output="here")
-    output_torque: Number = _nothing("load.torque", "N*m", "further torque of the load at the output",
-        '"20 N*m"', at_output="here")
+    friction: Number = _nothing("load.friction", "N*m",
+        "further friction of the load at the output, against the motion only", '"20 N*m"',
+        at_output="here")
+    active_torque: Number = parameter("load.torque", "N*m",
+        "further torque of the load at the output that acts always, as wind; below 0 where it helps",
+        '"20 N*m"', default=0.0, at_output="here")
     motors: Number = parameter("load.motors", "1", "motors on one load and rope", "2", "above 0", default=1.0)
+    elastic_frequency: MaybeNumber = _maybe("shaft.elastic_frequency", "Hz",
+        "frequency at which motor and load oscillate against each other, gap closed", '"8 Hz"')
     damping_ratio: Number = parameter("shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03",
         "from 0 to 1", default=0.02)
     permissible_output_torque: MaybeNumber = _maybe("limits.output_torque", "N*m",
@@ -223,7 +251,7 @@ class DataSheet(ParameterSet):
 
     @classmethod
     def describes(cls, document: Mapping[str, Any]) -> bool:
-        """Whether TOML tables are those of a data sheet, not of a drive: by a key that no drive has.
+        """Whether TOML tables are those of a data sheet, not of a drive: by a key or table no drive has.
 
         >>> DataSheet.describes({"load": {"machine": "hoist"}}), DataSheet.describes({"load": {"torque": 7}})
         (True, False)
@@ -235,7 +263,8 @@ class DataSheet(ParameterSet):
         own = paths(cls.PARAMETERS) - paths(Drive.PARAMETERS)
         tables = {name: keys for name, keys in document.items() if isinstance(keys, dict)}
         of_drive = {"stiffness", "gap"} & tables.get("shaft", {}).keys()
-        return not of_drive and any(f"{name}.{key}" in own for name, keys in tables.items() for key in keys)
+        keys_of_a_sheet = any(f"{name}.{key}" in own for name, keys in tables.items() for key in keys)
+        return not of_drive and (keys_of_a_sheet or bool({"coupling", "output", "rope"} & document.keys()))
 
     def to_toml(self) -> str:
         """The data sheet as a file that `load` reads.
@@ -262,7 +291,7 @@ class DataSheet(ParameterSet):
         share = bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
-        given |= {name: _quotient(name, given[name]) for name in ("ratio", "reeving") if name in given}
+        given |= {name: converted(name, value) for name, value in given.items()}
         given |= {"efficiency": f"{share} %"} if per_cent else {}
         try:
             super()._fill(given, wording, wrong, *known)
@@ -279,12 +308,12 @@ class DataSheet(ParameterSet):
     def contradictions(self) -> Iterator[str]:
         """What is missing for this machine, what contradicts something else, and what stands alone."""
         given, of = self.given(), self.PARAMETERS
-        for name in ("output_inertia",) if self.machine == "rotor" else ("mass", "radius"):
-            if not getattr(self, name):
-                p = of[name]
+        for name in NEEDED[self.machine]:
+            if not getattr(self, name) and not (name == "diameter" and self.radius):
+                p, instead = of[name], ", or [load] radius" if name == "diameter" else ""
                 yield (
                     f"{p.place} is missing: a {self.machine} needs the {p.meaning}; "
-                    f"write for example {p.key} = {p.example}."
+                    f"write for example {p.key} = {p.example}{instead}."
                 )
         for name, machines in ABOUT.items():
             if name in given and self.machine not in machines:
@@ -296,7 +325,7 @@ class DataSheet(ParameterSet):
             ("coupling_play", "coupling_diameter"), ("output_play", "play_diameter"),
             ("shaft_length", "shaft_diameter"), ("shaft_diameter", "shaft_length"),
             ("rope_length", "rope_diameter"), ("rope_diameter", "rope_length"),
-            ("rope_modulus", "rope_diameter"),
+            ("rope_modulus", "rope_diameter"), ("rise", "length"), ("length", "rise"),
         ):  # fmt: skip
             if given.get(one) and not given.get(other):
                 p, q = of[one], of[other]
@@ -308,11 +337,36 @@ class DataSheet(ParameterSet):
                     f"{p.place} is read as {value:.5g}, where the {p.meaning} is {usual}; write for example "
                     f'{p.example} or "{100.0 * float(p.example):g} %".'
                 )
+        yield from self._load_in_doubt()
         yield from self._said_twice()
-        if not self._stiffnesses:
+        if self._stiffnesses and self.elastic_frequency is not None:
             yield (
-                "nothing here is elastic: give [coupling] stiffness, [gear] stiffness, [output] diameter "
-                "and length of a shaft, or [rope] stiffness of a hoist, as far as they are known."
+                f"{of['elastic_frequency'].place} says how stiff all parts are together, and "
+                f"{', '.join(self._stiffnesses)} are given as well; leave out the one or the others."
+            )
+
+    def _load_in_doubt(self) -> Iterator[str]:
+        """What of the load would mean something else than what it says."""
+        given, of = self.given(), self.PARAMETERS
+        if self.active_torque and self.machine != "hoist" and "friction" not in given:
+            yield (
+                f"{of['active_torque'].place} = {self.active_torque:.5g} N*m: does it act always, as a lift, "
+                "wind or an imbalance, or only against the motion? If always, write friction = 0 as well, or "
+                "what friction there is; if it is friction, write friction in place of torque."
+            )
+        if self.rise and self.length and abs(self.rise) >= self.length:
+            yield (
+                f"{of['rise'].place} = {self.rise:.5g} m: a track of {self.length:.5g} m cannot rise so far; "
+                "give the length along the slope."
+            )
+        if abs(self.slope) >= 0.5 * math.pi:
+            yield f"{of['slope'].place} = {self.slope:.5g} rad: a slope is below 90 deg; check the unit."
+        if "goods" in given and not self._sine:
+            yield f"{of['goods'].place} says nothing without a slope; give slope, or rise and length."
+        if self.goods is not None and self.mass is not None and self.goods > self.mass:
+            yield (
+                f"{of['goods'].place} = {self.goods:.5g} kg is more than {of['mass'].place} = "
+                f"{self.mass:.5g} kg, of which it is a part."
             )
 
     def _said_twice(self) -> Iterator[str]:
@@ -321,8 +375,8 @@ class DataSheet(ParameterSet):
         for name, other in INSTEAD.items():
             if not {name, other} <= given.keys():
                 continue
-            if name == "rope_length":
-                yield "[rope] stiffness and [rope] length both say how stiff the rope is; leave one out."
+            if name in TWICE:
+                yield f"{of[other].place} and {of[name].place} both say {TWICE[name]}; leave one out."
                 continue
             first = given[name] * (self.rated_speed if name == "rated_torque" else rated or math.nan)
             if abs(first - given[other]) > 0.05 * given[other]:
@@ -344,7 +398,10 @@ class DataSheet(ParameterSet):
             found["efficiency"] = f"efficiency {self.efficiency:g}"
         if not {"coupling_play", "backlash", "output_play"} & given.keys():
             found["backlash"] = "no backlash"
-        if self.machine == "hoist" and not {"rope_stiffness", "rope_length"} & given.keys():
+        if not STIFFNESSES & given.keys():
+            usual = f"{BAND[0]:g} to {BAND[1]:g} Hz of most drives with gears"
+            found["stiffness"] = f"elastic frequency {BAND[1]:g} Hz, the stiff end of the {usual}"
+        elif self.machine == "hoist" and not ROPE & given.keys():
             found["rope"] = "rigid rope"
         if "rope_diameter" in given:
             more = "" if "rope_modulus" in given else f"modulus {self.rope_modulus / 1e9:g} GPa on a "
@@ -358,7 +415,7 @@ class DataSheet(ParameterSet):
 
     def assumed_still(self, settled: Iterable[str]) -> str:
         """What is assumed, less what no longer counts where these parameters of the drive are set."""
-        settled = {*settled}
+        settled = {*settled, *({"load_friction"} - self._follows.keys())}
         return "; ".join(one for name, one in self.assumed.items() if not SETTLE.get(name, {""}) <= settled)
 
     def _mark(self, name: str) -> str:
@@ -385,11 +442,12 @@ class DataSheet(ParameterSet):
     @property
     def _arm(self) -> float:
         """Radius on which the load moves with the output, m."""
-        return (self.radius or 0.0) / self.reeving
+        radius = self.radius if self.diameter is None else 0.5 * self.diameter
+        return (radius or 0.0) / self.reeving
 
     @cached_property
     def _stiffnesses(self) -> dict[str, float]:
-        """By part, N m/rad at the motor shaft."""
+        """By part that is given, N m/rad at the motor shaft."""
         gear = self._gear
         rope, found = self.rope_stiffness, {}
         if self.rope_length and self.rope_diameter:
@@ -402,9 +460,36 @@ class DataSheet(ParameterSet):
             twist = STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length)
             found["output shaft"] = gear.to_motor(twist, "N*m/rad")
         if rope:
-            drum = rope * self.reeving * self._arm**2 / self.motors
+            # car and counterweight hang on ropes of their own; they store (m1^2 + m2^2) a^2/(2 k) together
+            m1, m2 = self.mass or 0.0, self.counterweight
+            both = (m1 + m2) ** 2 / (m1**2 + m2**2)
+            drum = rope * self.reeving * self._arm**2 * both / self.motors
             found[f"rope{self._mark('rope_modulus')}"] = gear.to_motor(drum, "N*m/rad")
         return found
+
+    @property
+    def _stiffness(self) -> tuple[float, str]:
+        """Of all parts in series, N m/rad at the motor shaft, and what it is from."""
+        if parts := self._stiffnesses:
+            rigid = "; rope assumed rigid" if "rope" in self.assumed else ""
+            return 1.0 / sum(1.0 / one for one in parts.values()), f"in series, {_parts(parts)}{rigid}"
+        frequency, of = self.elastic_frequency or BAND[1], self._motor_side
+        c = (2.0 * math.pi * frequency) ** 2 * of.J1 * of.J2 / (of.J1 + of.J2)  # [G](8)
+        return c, f"elastic frequency {frequency:g} Hz{self._mark('stiffness')}"
+
+    @property
+    def ends(self) -> Mapping[str, Drive]:
+        """The drives at both ends of what an unknown stiffness may be, the stiff one first; else empty.
+
+        >>> sheet = DataSheet(machine="rotor", rated_power=1e3, rated_speed=150, motor_inertia=0.01,
+        ...     output_inertia=0.1)
+        >>> {end: round(drive.Omega / (2 * math.pi), 9) for end, drive in sheet.ends.items()}
+        {'30 Hz': 30.0, '3 Hz': 3.0}
+        """
+        if STIFFNESSES & self.given().keys():
+            return {}
+        soft = self.replace(elastic_frequency=BAND[0]).drive.replace(assumed=self.drive.assumed)
+        return {f"{BAND[1]:g} Hz": self.drive, f"{BAND[0]:g} Hz": soft}
 
     @cached_property
     def _gaps(self) -> dict[str, float]:
@@ -420,181 +505,241 @@ class DataSheet(ParameterSet):
         return found
 
     @cached_property
-    def _load(self) -> tuple[float, str, float, str]:
-        """Inertia and torque of the whole load at the output, each with what it is from."""
-        inertia, torque = self.output_inertia, self.output_torque
+    def _load(self) -> _Load:
+        """The whole load at the output."""
+        inertia, friction, active = self.output_inertia, self.friction, self.active_torque
         J = [f"{inertia:.5g} kg m^2 at the output"] if inertia else []
-        M = [f"{torque:.5g} N m at the output"] if torque else []
-        if self.machine != "rotor":
-            mass, arm = self.mass or 0.0, self._arm
-            inertia += mass * arm**2
-            J.insert(0, f"{mass:.5g} kg on a radius of {arm:.5g} m")
-            share, what = 1.0, "the weight"
-            if self.machine != "hoist":
-                share = RESISTANCE[self.machine] if self.resistance is None else self.resistance
-                what = f"{share:.5g} of the weight{self._mark('resistance')}"
-            torque += share * mass * GRAVITY * arm
+        F = [f"{friction:.5g} N m of friction at the output"] if friction else []
+        M = [f"{active:.5g} N m at the output"] if active else []
+        if self.machine == "rotor":
+            return _Load(inertia, ", ".join(J), active, ", ".join(M), friction, ", ".join(F))
+        mass, arm, balance = self.mass or 0.0, self._arm, self.counterweight
+        inertia += (mass + balance) * arm**2
+        moved = f"{mass:.5g} kg" + (f" and a counterweight of {balance:.5g} kg" if balance else "")
+        J.insert(0, f"{moved} on a radius of {arm:.5g} m")
+        if self.machine == "hoist":
+            lifted = mass - balance
+            what = f"the weight of {lifted:.5g} kg" if balance else "the weight"
+        else:
+            # the two strands of a belt balance one another: what an incline lifts is the goods on it
+            rising = mass if self.goods is None else self.goods
+            lifted, share = rising * self._sine, self._share
+            what = f"the weight of {rising:.5g} kg times {self._sine:.5g}, the sine of the slope"
+            friction += share * mass * GRAVITY * arm * math.sqrt(1.0 - self._sine**2)
+            F.insert(0, f"{share:.5g} of the weight{self._mark('resistance')} on {arm:.5g} m")
+        if lifted:
+            active += lifted * GRAVITY * arm
             M.insert(0, f"{what} on {arm:.5g} m")
-        return inertia, ", ".join(J), torque, ", ".join(M) or "none"
+        return _Load(inertia, ", ".join(J), active, ", ".join(M), friction, ", ".join(F))
 
-    def _lines(self) -> dict[str, tuple[str, str]]:
-        """The drive file by parameter of a drive: the value as TOML, and what it is from."""
-        geared = bool({"ratio", "efficiency"} & self.given().keys())
-        gear, rated, mark = self._gear, self.rated, self._mark
-        i, eta = gear
-        stiffness = 1.0 / sum(1.0 / one for one in self._stiffnesses.values())
-        through = "no gears"
-        if i != 1.0 or eta != 1.0:
-            through = f"through {i:.5g}:1, efficiency {eta:.5g}{mark('efficiency')}"
-        shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
-        inertia, inertia_from, torque, torque_from = self._load
-        J1 = self.motor_inertia + self.added_inertia
-        J2 = gear.to_motor(inertia / self.motors, "kg*m^2")
-        Mc = gear.to_motor(torque / self.motors, "N*m")
-        damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * J1 * J2 / (J1 + J2))
-        speed = f'"{self.rated_speed * 30.0 / math.pi:.6g} rpm"'
-        hoist, gap = self.machine == "hoist", sum(self._gaps.values())
-        assumed, no_gap = "; ".join(self.assumed.values()), mark("backlash") and "none given, assumed"
-        unsaid = assumed and "source" not in self.given()
+    @property
+    def _share(self) -> float:
+        """Resistance to motion over weight."""
+        return RESISTANCE.get(self.machine, 0.0) if self.resistance is None else self.resistance
+
+    @property
+    def _sine(self) -> float:
+        """Of the slope of track or belt."""
+        return self.rise / self.length if self.rise and self.length else math.sin(self.slope)
+
+    @cached_property
+    def _motor_side(self) -> _MotorSide:
+        """Inertias and torques at the motor shaft, of one of the motors."""
+        (i, eta), load, starting = self._gear, self._load, self.starting_torque
+        overhauling = load.active + load.friction < 0.0
+        # where the load drives the motor, the losses of the gears help the motor to hold it
+        through = (eta / i if overhauling else 1.0 / (i * eta)) / self.motors
+        if starting is None:
+            starting = self.starting_ratio * (self.rated or math.nan)
+        return _MotorSide(
+            J1=self.motor_inertia + self.added_inertia,
+            J2=self._gear.to_motor(load.inertia / self.motors, "kg*m^2"), Ms=starting,
+            active=load.active * through, friction=load.friction * through, overhauling=overhauling,
+        )  # fmt: skip
+
+    @property
+    def speed(self) -> float:
+        """Speed of the load at the rated speed of the motor: m/s, of a rotor rad/s."""
+        return self.rated_speed / self.ratio * (1.0 if self.machine == "rotor" else self._arm)
+
+    @property
+    def acceleration(self) -> float:
+        """Mean acceleration of the load under the starting torque, m/s2, of a rotor rad/s2."""
+        of = self._motor_side
+        return self.speed / self.rated_speed * (of.Ms - of.active - of.friction) / (of.J1 + of.J2)
+
+    @property
+    def motion(self) -> str:
+        """Speed and acceleration of the load, as they are said.
+
+        >>> DataSheet(machine="travel", rated_power="3 kW", rated_speed="1410 rpm", motor_inertia=0.0062,
+        ...     starting_ratio=2.2, ratio=38.1, mass="6.5 t", diameter="315 mm", gear_stiffness=35e3).motion
+        'load 36.62 m/min, accelerated by 1.426 m/s^2 on average'
+        """
+        if self.machine == "rotor":
+            speed, unit = f"{self.speed * 30.0 / math.pi:.4g} rpm", "rad/s^2"
+        else:
+            speed, unit = f"{60.0 * self.speed:.4g} m/min", "m/s^2"
+        return f"load {speed}, accelerated by {self.acceleration:.4g} {unit} on average"
+
+    @property
+    def doubts_of_motion(self) -> list[str]:
+        """What can hardly be of the motion of the load, which a drive does not know."""
+        if self.machine == "rotor":
+            return []
+        a, balanced = self.acceleration, self.counterweight > 0.0
+        return list(doubts_of_motion(self.machine, self.speed, a, self._sine, balanced))
+
+    @property
+    def doubts(self) -> list[str]:
+        """What is possible and hardly ever true, of the drive and of the motion of its load."""
+        return [*doubts(self.drive), *self.doubts_of_motion]
+
+    @cached_property
+    def _follows(self) -> dict[str, _Entry]:
+        """What follows, by parameter of a drive."""
+        gear, rated, mark, given = self._gear, self.rated, self._mark, self.given()
+        of, load, (stiffness, stiffness_from) = self._motor_side, self._load, self._stiffness
+        damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * of.J1 * of.J2 / (of.J1 + of.J2))
+        gap, assumed = sum(self._gaps.values()), "; ".join(self.assumed.values())
+        no_gap, unsaid = mark("backlash") and "none given, assumed", assumed and "source" not in given
         more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
+        soft_behind = self._stiffnesses and "coupling" not in self._stiffnesses
 
-        def at_motor(number: float) -> str:
-            return f"at the motor {number:.5g}, " if geared else ""
-
-        def parts(found: Mapping[str, float]) -> str:
-            return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in found.items())
-
-        def si(number: float | None, unit: str) -> str:
-            return "" if number is None else f'"{number:.5g} {unit}"'
-
-        def there(number: float, unit: str, behind: object = True) -> str:
-            """At the output, where it can be known there: as the sheet says it."""
-            if not (geared and behind):
-                return si(number, unit)
-            value = float(gear.to_output(number, unit))
-            if unit == "rad":  # as catalogues give a backlash
-                return f'"{Units("arcmin").shown(value, unit):.9g} arcmin at output"'
-            text = shortest(value, unit, within=1e-12)
-            text = f"{value:.6g}" if len(text) > 15 else text  # computed
-            return f'"{text} at output"' if " " in text else f'"{text} {unit} at output"'
-
-        def of_ratio(torque: float | None, ratio: float | None, mark: str) -> tuple[str, str]:
+        def of_ratio(name: str, ratio: float | None) -> _Entry:
+            torque = getattr(self, f"{name}_torque")
             if torque is not None or ratio is None or rated is None:
-                return si(torque, "N*m"), "data sheet"
-            return si(ratio * rated, "N*m"), f"{ratio:.5g} times the rated torque{mark}"
+                return _entry(torque, "N*m", "data sheet")
+            return _entry(ratio * rated, "N*m", f"{ratio:.5g} times the rated torque{mark(f'{name}_ratio')}")
 
-        found = {
-            "name": (literal(self.name), ""),
-            "source": (literal(f"{self.source} and assumed values" if unsaid else self.source), ""),
-            "assumed": (literal(assumed) if assumed else "", ""),
-            "motor_inertia": (si(J1, "kg*m^2"), f"rotor {self.motor_inertia:.5g}{more}"),
-            "starting_torque": of_ratio(self.starting_torque, self.starting_ratio, mark("starting_ratio")),
-            "maximum_torque": of_ratio(self.maximum_torque, self.maximum_ratio, ""),
-            "rated_power": (si(self.rated_power and self.rated_power / 1e3, "kW"), "plate"),
-            "rated_torque": (si(self.rated_torque, "N*m"), "plate"),
-            "rated_speed": (speed, "plate"),
-            "torque_lag": (si(1e3 * self.torque_lag or None, "ms"), "of the inverter"),
-            "gear_ratio": (f"{i!r}".removesuffix(".0") if geared else "", ""),
-            "gear_efficiency": (f"{eta:.9g}" if geared else "", f"of all gears{mark('efficiency')}"),
-            "stiffness": (there(stiffness, "N*m/rad", "coupling" not in self._stiffnesses),
-                          f"in series, {parts(self._stiffnesses)}"
-                          f"{'; rope assumed rigid' if 'rope' in self.assumed else ''}"),
-            "damping": (si(damping, "N*m*s/rad"),
-                        f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
-            "gap": (there(gap, "rad", gap and "coupling" not in self._gaps),
-                    parts(self._gaps) if gap else no_gap or "given as 0"),
-            "load_inertia": (there(J2, "kg*m^2"), f"{inertia_from}; {at_motor(J2)}{through}{shared}"),
-            "load_torque": (there(Mc, "N*m"), f"{torque_from}; {at_motor(Mc)}{through}{shared}"),
-            "load_kind": ('"active"', "a load that hangs") if hoist else ('"reactive"', "friction"),
-            "target_speed": (speed, "rated speed"),
+        entries = {
+            "name": _entry(self.name),
+            "source": _entry(f"{self.source} and assumed values" if unsaid else self.source),
+            "assumed": _entry(assumed or None),
+            "motor_inertia": _entry(of.J1, "kg*m^2", f"rotor {self.motor_inertia:.5g}{more}"),
+            "starting_torque": of_ratio("starting", self.starting_ratio),
+            "maximum_torque": of_ratio("maximum", self.maximum_ratio),
+            "rated_power": _entry(self.rated_power, "kW", "plate"),
+            "rated_torque": _entry(self.rated_torque, "N*m", "plate"),
+            "rated_speed": _entry(self.rated_speed, "rpm", "plate"),
+            "torque_lag": _entry(self.torque_lag or None, "ms", "of the inverter"),
+            "stiffness": self._there(stiffness, "N*m/rad", stiffness_from, soft_behind),
+            "damping": _entry(damping, "N*m*s/rad",
+                              f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
+            "gap": self._there(gap, "rad", _parts(self._gaps) if gap else no_gap or "given as 0",
+                               gap and "coupling" not in self._gaps),
+            "load_inertia": self._there(of.J2, "kg*m^2", f"{load.inertia_from}; {self._through(of.J2)}"),
+            **self._torques(),
+            "target_speed": _entry(self.rated_speed, "rpm", f"rated speed: {self.motion}"),
         }  # fmt: skip
         limits = self.permissible_torque, self.permissible_output_torque
-        if not geared:  # one shaft, for which the smaller one counts
+        if self._geared:
+            entries["gear_ratio"] = _Entry(gear.ratio, f"{gear.ratio!r}".removesuffix(".0"), "")
+            efficiency = f"of all gears{mark('efficiency')}"
+            entries["gear_efficiency"] = _Entry(gear.efficiency, f"{gear.efficiency:.9g}", efficiency)
+        else:  # one shaft, for which the smaller one counts
             limits = min((one for one in limits if one is not None), default=None), None
-        found["permissible_torque"], found["permissible_output_torque"] = (
-            (si(one, "N*m"), "") for one in limits
-        )
-        if hoist:
-            found |= {
-                "start_position": ('"hanging"', "the brake holds the motor, the load winds up the shaft"),
-                "brake": ('"motor"', ""),
-                "release": ('"torque"', "torque proving"),
+        names = "permissible_torque", "permissible_output_torque"
+        entries |= {name: _entry(value, "N*m") for name, value in zip(names, limits, strict=True)}
+        return {name: one for name, one in entries.items() if one.value is not None}
+
+    @property
+    def _geared(self) -> bool:
+        return bool({"ratio", "efficiency"} & self.given().keys())
+
+    def _through(self, at_motor: float) -> str:
+        """What a value comes through from the load, and what it is at the motor."""
+        gear, driven = self._gear, "driving the motor " * self._motor_side.overhauling
+        shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
+        if gear == Gear(1.0):
+            return f"{driven}without gears{shared}" if driven else f"no gears{shared}"
+        before = f"at the motor {at_motor:.5g}, " if self._geared else ""
+        efficiency = f"efficiency {gear.efficiency:.5g}{self._mark('efficiency')}"
+        return f"{before}{driven}through {gear.ratio:.5g}:1, {efficiency}{shared}"
+
+    def _there(self, value: float, unit: str, about: str, behind: object = True) -> _Entry:
+        """An entry that is shown at the output, where it can be known there: as the sheet says it."""
+        if not (self._geared and behind):
+            return _entry(value, unit, about)
+        there = float(self._gear.to_output(value, unit))
+        if unit == "rad":  # as catalogues give a backlash
+            return _Entry(value, f'"{Units("arcmin").shown(there, unit):.9g} arcmin at output"', about)
+        text = shortest(there, unit, within=1e-12)
+        text = f"{there:.6g}" if len(text) > 15 else text  # computed
+        return _Entry(value, f'"{text if " " in text else f"{text} {unit}"} at output"', about)
+
+    def _torques(self) -> dict[str, _Entry]:
+        """The torque of the load by its parts, and where a start begins that they decide."""
+        load, of = self._load, self._motor_side
+        active, friction, hoist = of.active, of.friction, self.machine == "hoist"
+
+        def torque(value: float, about: str) -> _Entry:
+            # "at output" divides by the efficiency, and a load that drives the motor is multiplied by it
+            origin = f"{about or 'none'}; {self._through(value)}"
+            return self._there(value, "N*m", origin, behind=not of.overhauling)
+
+        if not active:
+            unknown = _entry("unknown", "", "every figure is the worst of both flanks and mid-gap")
+            return {
+                "load_torque": torque(friction, load.friction_from),
+                "load_kind": _entry("reactive", "", "friction"),
+                **({"start_position": unknown} if self._gaps else {}),
             }
-        elif gap:
-            found["start_position"] = ('"unknown"', "every figure is the worst of both flanks and mid-gap")
-        return found
+        entries = {
+            "load_torque": torque(active, load.active_from),
+            "load_kind": _entry("active", "", "a load that hangs" if hoist else "it acts always"),
+            **({"load_friction": torque(friction, load.friction_from)} if friction else {}),
+        }
+        if friction >= abs(active):
+            return entries | {
+                "start_position": _entry("unknown", "", "friction holds the load where it stopped")
+            }
+        holds = f"the {'brake' if hoist else 'brake or backstop'} holds the motor"
+        return entries | {
+            "start_position": _entry("hanging", "", f"{holds}, the load winds up the shaft"),
+            "brake": _entry("motor"),
+            "release": _entry("torque", "", "torque proving"),
+        }
 
     def drive_toml(self) -> str:
         """The drive file: each number where it is known, with what it is from in a comment.
 
-        That of a part behind the gear is "at output" there, which `Drive` brings to the motor shaft.
+        That of a part behind the gear is "at output" there, which `Drive` brings to the motor shaft. What is
+        computed has five or six digits, what is typed all.
         """
-        blocks, found = [], self._lines()
+        blocks, follows = [], self._follows
         for table in Drive.TABLES:
-            lines = [(p.key, *found[p.name]) for p in table.parameters if found.get(p.name, ("",))[0]]
-            wide = max((len(f"{key} = {value}") for key, value, about in lines if about), default=0)
-            rows = [
-                f"{f'{key} = {value}':{wide}}  # {about}" if about else f"{key} = {value}"
-                for key, value, about in lines
-            ]
+            entries = [(p.key, follows[p.name]) for p in table.parameters if p.name in follows]
+            lines = [(f"{key} = {one.text}", one.about) for key, one in entries]
+            wide = max((len(line) for line, about in lines if about), default=0)
+            rows = [f"{line:{wide}}  # {about}" if about else line for line, about in lines]
             if rows:
                 blocks.append("\n".join([f"[{table.name}]", *rows] if table.name else rows))
         return "\n\n".join(blocks) + "\n"
 
     @cached_property
     def drive(self) -> Drive:
-        """The drive of `drive_toml`: what is computed has five or six digits there, what is typed all."""
+        """The drive that follows, exactly; the numbers of `drive_toml` may have fewer digits."""
+        values = {name: one.value for name, one in self._follows.items()}
         try:
-            return Drive.from_toml(self.drive_toml(), where="the drive that follows")
+            return Drive._made(values, Wording("the drive that follows", style="toml"), [])
         except InputError as error:
             cause = " Is [gear] ratio inverted (turns of the motor for one of the output), or a power in W?"
             raise InputError([one + cause * ("cannot move" in one) for one in error.sentences]) from None
 
 
-# what is typed -------------------------------------------------------------------------------------------
+def _parts(values: Mapping[str, float]) -> str:
+    """Parts of a sum at the motor shaft."""
+    return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in values.items())
 
 
-def _quotient(name: str, value: object) -> object:
-    """The quotient that "38:1" or "4/2" is where a ratio or a reeving is written; anything else as it is."""
-    found = _QUOTIENT.fullmatch(str(value)) if name in ("ratio", "reeving") else None
-    return float(found[1]) / float(found[2]) if found and float(found[2]) else value
+def _entry(value: Any, unit: str = "", about: str = "") -> _Entry:
+    """A word or a number in SI, shown in this unit to five digits.
 
-
-def typed(p: Parameter, text: str) -> str:
-    """What is typed at a prompt or in a form for one parameter: a bare number has its usual unit.
-
-    >>> [typed(DataSheet.PARAMETERS[name], "95") for name in ("backlash", "mass", "efficiency", "ratio")]
-    ['95 arcmin', '95 kg', '95 %', '95']
+    >>> _entry(149.75, "rpm").text, _entry("hanging").text, _entry(0.0123456, "kg*m^2").text
+    ('"1430.01 rpm"', '"hanging"', '"0.012346 kg*m^2"')
     """
-    text = str(_quotient(p.name, text))
-    number, unit = bare(text), USUAL.get(p.name, p.unit)
-    if p.name == "efficiency" and number and float(number) >= 10.0:
-        unit = "%"
-    return f"{number} {unit}" if number and unit not in ("", "1") else text.strip()
-
-
-def if_empty(p: Parameter) -> str:
-    """What is used where nothing is typed for a parameter.
-
-    >>> [if_empty(DataSheet.PARAMETERS[name]) for name in ("efficiency", "backlash", "rated_power", "motors")]
-    ['0.95, assumed', 'none', 'by rated torque', '1']
-    """
-    if p.name in TYPICAL:
-        return f"{TYPICAL[p.name][0]}, assumed"
-    other = next((name for name, instead in INSTEAD.items() if instead == p.name), "")
-    if other:
-        return f"by {DataSheet.PARAMETERS[other].key.replace('_', ' ')}"
-    return f"{p.default:g}" if isinstance(p.default, float) and p.default else p.default or "none"
-
-
-def echo(p: Parameter, text: str) -> str:
-    """What is typed for one parameter, with its value in SI; "" for a word or a plain number.
-
-    >>> [echo(DataSheet.PARAMETERS[name], "1460") for name in ("rated_speed", "mass", "ratio")]
-    ['1460 rpm = 152.9 rad/s', '1460 kg', '']
-    """
-    written = typed(p, text)
-    if not p.unit or bare(written):
-        return ""
-    value = f"{float(f'{read_value(p, written):.4g}'):.10g} {p.unit}".removesuffix(" 1")
-    return written if written.endswith(f" {p.unit}") else f"{written} = {value}"
+    if not unit or value is None:
+        return _Entry(value, literal(value), about)
+    digits = 6 if unit == "rpm" else 5
+    return _Entry(value, f'"{value / SHOWN_IN.get(unit, 1.0):.{digits}g} {unit}"', about)

@@ -6,9 +6,14 @@ import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from softstart.drive.checks import elastic_frequency
+from softstart.drive.checks import GRAVITY, elastic_frequency
 
-__all__ = ["TwoMasses", "doubts"]
+__all__ = ["TwoMasses", "doubts", "doubts_of_motion"]
+
+# usual speeds of the load, m/min; lifts, which have a counterweight, are faster
+USUAL_SPEEDS = {"hoist": (0.5, 150.0), "travel": (1.0, 300.0), "belt": (1.0, 480.0)}
+LIFTS = 600.0
+ADHESION = (0.12, 0.2)  # force over weight that steel wheels transmit to rails, damp and dry
 
 
 class TwoMasses(NamedTuple):
@@ -59,6 +64,36 @@ def doubts(machine: Any) -> list[str]:
     'speed 13,942 rpm, where m'
     """
     return [*_doubts(machine.lumped), *_not_the_rated_torque(machine.motor), *_nothing_holds(machine)]
+
+
+def doubts_of_motion(
+    machine: str, speed: float, acceleration: float, sine: float, balanced: bool
+) -> Iterator[str]:
+    """Sentences on how the load of a data sheet moves: `speed` in m/s, mean `acceleration` in m/s2.
+
+    `sine` is that of the slope; `balanced` says that there is a counterweight. Driven wheels transmit
+    m (a + g sin) of the weight m g cos that they carry, at most: all of it if every wheel is driven.
+
+    >>> [one[:52] for one in doubts_of_motion("travel", 0.61, 1.5, 0.0, False)]
+    ['mean acceleration 1.5 m/s^2 needs 0.153 of the weigh']
+    >>> [one[:27] for one in doubts_of_motion("belt", 25.0, 1.5, 0.0, False)]
+    ['speed of the load 1,500 m/m']
+    """
+    low, high = USUAL_SPEEDS.get(machine, (0.0, math.inf))
+    high, rate = LIFTS if balanced else high, 60.0 * speed
+    if not low <= rate <= high:
+        yield (
+            f"speed of the load {rate:,.4g} m/min, where a {machine} has {low:g} to {high:g} m/min: a "
+            "diameter written as radius, mm as m, the ratio, or the falls of a rope?"
+        )
+    needed = (acceleration / GRAVITY + sine) / math.sqrt(1.0 - sine**2)
+    if machine == "travel" and needed > ADHESION[0]:
+        yield (
+            f"mean acceleration {acceleration:.4g} m/s^2 needs {needed:.3g} of the weight as friction at the "
+            f"wheels if all of them are driven, {2.0 * needed:.3g} if half of them are, where steel wheels "
+            f"transmit {ADHESION[0]:g} to {ADHESION[1]:g}: they slip, or the diameter was written as radius, "
+            "or the torque is higher than the inverter will give?"
+        )
 
 
 def _doubts(of: TwoMasses) -> Iterator[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
@@ -307,7 +306,8 @@ class Drive(ParameterSet):
         from softstart.drive.data_sheet import DataSheet
 
         if DataSheet.describes(document):
-            document = tomllib.loads(DataSheet._from_document(dict(document), where).drive_toml())
+            drive = DataSheet._from_document(dict(document), where).drive
+            return cls._made(drive.given(), Wording(where, style="toml"), [])
         return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------

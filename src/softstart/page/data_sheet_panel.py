@@ -7,8 +7,17 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.drive.data_sheet import ABOUT, MACHINES, TYPICAL, USUAL, DataSheet, echo, if_empty, typed
-from softstart.drive.doubts import doubts
+from softstart.drive.data_sheet import DataSheet
+from softstart.drive.data_sheet_words import (
+    ABOUT,
+    MACHINES,
+    TYPICAL,
+    USUAL,
+    echo,
+    if_empty,
+    in_usual_unit,
+    typed,
+)
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
@@ -77,7 +86,7 @@ class DataSheetPanel:
         reveal(self._answer, "nearest")
         try:
             found = DataSheet.from_settings(written)
-            title, sentences = "Check these values.", doubts(found.drive)
+            title, sentences = "Check these values.", found.doubts
         except InputError as error:
             found, title, sentences = None, "There is no drive yet.", list(error.sentences)
         self._troubles.say(sentences, title)
@@ -97,7 +106,7 @@ class DataSheetPanel:
 
 def made(p: Parameter) -> Any:
     """The field of one parameter with an example; below it its value in SI, or what is used without."""
-    needed = p.required or p.name in ("mass", "radius")
+    needed = p.required or p.name == "mass"
     unit = USUAL.get(p.name, p.unit)
     label = p.meaning[0].upper() + p.meaning[1:] + (f", {printed(unit)}" if unit not in ("", "1") else "")
     name = f"sheet-{p.path.replace('.', '-') or p.name}"
@@ -115,7 +124,7 @@ def made(p: Parameter) -> Any:
             nothing = "" if needed or if_empty(p) == "none" else f"empty: {if_empty(p)}"
             said = echo(p, text) if text.strip() else nothing
         except RefusedError as refusal:
-            said = refusal.reason
+            said = in_usual_unit(p, refusal).reason
         note.set_text(said)
 
     say()

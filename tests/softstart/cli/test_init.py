@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import io
 import math
+import re
+import signal
+import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -13,13 +17,13 @@ from softstart import DataSheet, Drive
 ANSWERS = [
     "gantry", "", "travel", "3", "1430", "0.0119", "0.0066", "", "2.2", "", "2.6", "2 ms", "1500", "0",
     "31.5", "0.94", "25 N*m/arcmin", "15", "55", "900",
-    "", "12 t", "0.1575", "", "1.2", "", "", "", "1.6 kN*m", "",
+    "", "12 t", "315", "", "", "", "1.2", "", "", "", "", "1.6 kN*m", "",
 ]  # fmt: skip
 POWER = "rated power in kW, as 3 [by rated torque]: "
 SLEWING = {
     "load.machine": "rotor", "motor.rated_power": "15", "motor.rated_speed": "1460", "motor.inertia": "0.09",
     "motor.starting_torque": "240", "gear.ratio": "38", "gear.efficiency": "1", "gear.stiffness": "1.1e6",
-    "gear.backlash": "8", "load.inertia": "290", "load.torque": "900",
+    "gear.backlash": "8", "load.inertia": "290", "load.friction": "900",
 }  # fmt: skip
 UNITS = {"motor.rated_power": "15 kW", "motor.rated_speed": "1460 1/min", "gear.backlash": "8 arcmin"}
 
@@ -68,37 +72,124 @@ def test_a_wrong_answer_is_asked_again(run, typed):
 
 
 def test_an_end_of_the_answers_names_the_one_that_is_missing(run, typed, nothing_left):
-    typed(*ANSWERS[:5])
-    code, out, said = run("init", "--ask", "--out", "mine.toml")
-    assert (code, out) == (2, "")
-    assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in said
-    assert "--set motor.inertia=" in said
-    nothing_left()
     typed()  # without a terminal it asks for nothing
     code, out, err = run("init")
     assert (code, out) == (2, "")
     for missing in ("[load] machine", "[motor] rated_power", "[motor] rated_speed", "[motor] inertia"):
         assert f"{missing} is missing" in err
+    nothing_left()
+    typed(*ANSWERS[:5])
+    code, out, said = run("init", "--ask", "--out", "mine.toml")
+    assert (code, out) == (2, "")
+    assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in said
+    assert "--set motor.inertia=" in said
+    assert "What was answered is kept in mine.sheet.toml; the same command goes on from there." in said
+
+
+@pytest.mark.parametrize("at", [1, 4, 9, 20, len(ANSWERS) - 1])
+def test_an_interrupted_dialog_goes_on_where_it_was(run, typed, place, at):
+    """Wherever it ends, by the same command; nothing is asked twice."""
+    typed(*ANSWERS)
+    whole = run("init", "--ask")
+    assert not list(place.glob("softstart-init*")), "what is printed leaves no file"
+    typed(*ANSWERS[:at])
+    begun = run("init", "--ask", "--out", "mine.toml")
+    typed(*ANSWERS[at:])
+    code, _, said = run("init", "--ask", "--out", "mine.toml")
+    assert (begun.code, code) == (2, 0)
+    assert (place / "mine.toml").read_text() == whole.out
+    assert "name of the drive" not in said
+    assert (begun.err + said).count("answers are taken up from mine.sheet.toml") == 1
+    kept = DataSheet.load("mine.sheet.toml")  # the answers are the data sheet, to edit and to read again
+    assert kept.drive_toml() == whole.out
+
+
+def test_answers_are_gone_back_to_and_taken_away(run, typed):
+    typed(*ANSWERS)
+    right = run("init", "--ask").out
+    # a wrong power is corrected two questions later; Enter keeps the speed; a wrong lag is taken away
+    wrong = [*ANSWERS[:3], "30", *ANSWERS[4:5], "<", "back", "3", "", *ANSWERS[5:]]
+    typed(*wrong)
+    code, out, said = run("init", "--ask")
+    assert (code, out) == (0, right)
+    assert "rated power in kW, as 3 [30 kW, - for none]: " in said
+    typed(*ANSWERS[:7], "9", "<", "-", *ANSWERS[8:])
+    assert run("init", "--ask").out == right
+
+
+def test_what_contradicts_is_asked_again_and_nothing_is_lost(run, typed):
+    """A ratio turned round: the drive cannot move; the sentence names the ratio, which is asked again."""
+    typed(*ANSWERS)
+    right = run("init", "--ask").out
+    inverted = [*ANSWERS[:14], "1:31.5", *ANSWERS[15:]]
+    typed(*inverted)
+    code, out, said = run("init", "--ask")
+    assert (code, out) == (2, "")
+    assert "Is [gear] ratio inverted" in said
+    typed("", "31.5", "")  # starting torque, ratio, torque of the load
+    assert run("init", "--ask")[:2] == (0, right)
+
+
+def test_a_file_that_is_not_of_answers_is_left_alone(run, typed, place):
+    (place / "mine.sheet.toml").write_text("# my own\n")
+    typed(*ANSWERS)
+    code, out, err = run("init", "--ask", "--out", "mine.toml")
+    assert (code, out) == (2, "")
+    assert "there is such a file already" in err
+    assert (place / "mine.sheet.toml").read_text() == "# my own\n"
+
+
+@pytest.mark.slow  # a process of its own
+def test_an_interrupt_loses_nothing(place):
+    dialog = subprocess.Popen(
+        [sys.executable, "-m", "softstart", "init", "--ask", "--out", "mine.toml"], cwd=place, text=True,
+        stdin=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    dialog.stdin.write("\n".join(ANSWERS[:6]) + "\n")
+    dialog.stdin.flush()
+    said = ""
+    while "brake, fan and coupling" not in said and dialog.poll() is None:
+        said += dialog.stderr.read(1)
+    dialog.send_signal(signal.SIGINT)
+    _, rest = dialog.communicate(timeout=20)
+    assert dialog.returncode == 130
+    assert "what was answered is kept in mine.sheet.toml; the same command goes on from there" in rest
+    assert 'inertia = "0.0119 kg*m^2"' in (place / "mine.sheet.toml").read_text()
+
+
+def test_an_example_of_the_template_is_no_data(run, place):
+    """Unchanged it is refused, with what is missing; and so by every command that takes a data sheet."""
+    template = run("init", "--template").out
+    (place / "sheet.toml").write_text(template)
+    for command in ("init", "compare"):
+        code, out, err = run(command, "sheet.toml")
+        assert (code, out) == (2, "")
+        for missing in ("[load] machine", "[motor] rated_power", "[motor] rated_speed", "[motor] inertia"):
+            assert f"{missing} is missing" in err
+    assert DataSheet.TABLES
+    assert tomllib.loads(template) == {table.name: {} for table in DataSheet.TABLES if table.name}
 
 
 def test_the_template_is_a_sheet_that_can_be_filled_in(run, place, as_json):
+    """Every example of a travel drive, but what others say already."""
+    others = re.compile(r"# (radius|rise|elastic_frequency|length) .*(wheel or|rise|oscillate)")
     filled = "".join(
         line.removeprefix("# ") + "\n"
-        for line in run("init", "--template").out.splitlines()
-        if "only for hoist;" not in f"{line};"
+        for line in run("init", "--template").out.splitlines()[2:]
+        if not re.search(r"only for (hoist|belt)(;|$)", line) and not others.match(line)
     ).replace("[rope]", "")
     (place / "sheet.toml").write_text(filled)
     found, sheet = as_json("init", "sheet.toml"), DataSheet.load("sheet.toml")
     assert found["data_sheet"]["machine"] == "travel"
     assert found["drive"]["load_inertia"] == sheet.drive.J2
-    half = run("init", "sheet.toml", "--set", "load.mass=6000 kg", "--set", "load.torque=0").out
+    half = run("init", "sheet.toml", "--set", "load.mass=6000 kg", "--set", "load.friction=0").out
     assert Drive.from_toml(half).Mc < 0.51 * sheet.drive.Mc
 
 
 def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
     """Prompt, --set, data sheet given to a command, and form."""
     typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
-          "", "290", "900", "", "", "", "")  # fmt: skip
+          "", "290", "900", "", "", "", "", "")  # fmt: skip
     assert run("init", "--ask", "--out", "asked.toml").code == 0
     settings = [word for path, text in (SLEWING | UNITS).items() for word in ("--set", f"{path}={text}")]
     assert run("init", *settings, "--out", "set.toml").code == 0

@@ -159,7 +159,9 @@ def test_what_nobody_gave_is_marked():
 def test_a_file_and_back(tmp_path):
     sheet = DataSheet.from_settings(GANTRY)
     assert DataSheet.from_toml(sheet.to_toml()) == sheet
-    assert sheet.drive == Drive.from_toml(sheet.drive_toml())
+    written = Drive.from_toml(sheet.drive_toml())  # five digits
+    for name, value in sheet.drive.given().items():
+        assert getattr(written, name) == (value if isinstance(value, str) else pytest.approx(value, rel=5e-5))
     (tmp_path / "sheet.toml").write_text(sheet.to_toml())  # a data sheet where a drive is asked for
     assert Drive.load(tmp_path / "sheet.toml") == sheet.drive
 
@@ -176,10 +178,7 @@ def test_a_file_and_back(tmp_path):
         ({"rope.stiffness": 8e5}, "[rope] stiffness is for a hoist"),
         (HOIST | ROPE | {"rope.stiffness": 8e5}, "both say how stiff the rope is"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
-        (
-            dict.fromkeys(("coupling.stiffness", "gear.stiffness", "output.diameter", "output.length")),
-            "nothing here is elastic",
-        ),
+        ({"load.radius": None}, "[load] diameter is missing: a travel needs the diameter of wheel or drum"),
         ({"gear.ratio": "1:31.5"}, "raise the one or lower the other. Is [gear] ratio inverted (turns of"),
         (
             {"gear.efficiency": "0.95 %"},
