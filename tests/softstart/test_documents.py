@@ -1,8 +1,9 @@
-"""Files with several tables of one name: changes before what they say, and mistakes with their place."""
+"""Files with several tables of one name, and with columns: what is read, and mistakes with their place."""
 
 import pytest
 
 from softstart import Chain, InputError
+from softstart.input.columns import Wanted, read_columns
 
 GOOD = """
 name = "two"
@@ -40,3 +41,14 @@ def test_each_mistake_has_its_sentence(text, also, said):
     with pytest.raises(InputError) as caught:
         Chain.from_toml(text, where="my.toml", also=also)
     assert any(said in sentence for sentence in caught.value.sentences), caught.value.sentences
+
+
+def test_columns_of_other_names_are_taken_in_order_only_where_there_is_none_too_many():
+    """Which of three are time and torque, nobody knows."""
+    wanted = (Wanted(("time", "t"), "s"), Wanted(("torque", "u"), "N*m"))
+    two, three = "zeit,moment\n1,2\n", "zeit,weg,moment\n1,3,2\n"
+    for text in (two, three.replace("moment", "u").replace("zeit", "T")):
+        assert [column.tolist() for column in read_columns(text, "here", wanted).values] == [[1.0], [2.0]]
+    for text in (three, three.replace("zeit", "t")):
+        with pytest.raises(InputError, match="it must name the columns, as time,torque"):
+            read_columns(text, "here", wanted)

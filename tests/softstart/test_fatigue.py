@@ -34,6 +34,17 @@ def test_the_example_of_astm_e1049() -> None:
     assert counts(rainflow_cycles(HISTORY, repeated=True)) == {3.0: 1.0, 4.0: 1.0, 7.0: 1.0, 9.0: 1.0}
 
 
+def test_a_curve_of_several_points_is_straight_in_logarithms_and_goes_on_beyond_them() -> None:
+    curve = SNCurve(None, ((300.0, 1e3), (200.0, 1e4), (100.0, 1e6), (80.0, 5e7)))
+    T, N = np.log([[80.0, 100.0, 200.0, 300.0], [5e7, 1e6, 1e4, 1e3]])
+    first, last = (N[1] - N[0]) / (T[1] - T[0]), (N[3] - N[2]) / (T[3] - T[2])
+    for torque in (60.0, 80.0, 90.0, 100.0, 150.0, 200.0, 250.0, 300.0, 400.0):
+        x = math.log(torque)
+        exact = float(np.interp(x, T, N)) + first * min(x - T[0], 0.0) + last * max(x - T[3], 0.0)
+        assert float(curve.cycles(torque)) == pytest.approx(math.exp(exact), rel=1e-12)
+        assert float(curve.torque(math.exp(exact))) == pytest.approx(torque, rel=1e-12)
+
+
 def test_a_repeated_history_may_begin_anywhere() -> None:
     rng = np.random.default_rng(5)
     for _ in range(50):

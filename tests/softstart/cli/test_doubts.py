@@ -71,6 +71,14 @@ def test_k_dyn_that_is_doubted_is_that_of_the_start(position: str) -> None:
         assert not found or f"about {k:.4g} " in found[0]
 
 
+@pytest.mark.parametrize("ratio", [0.01, 0.05, 0.1])
+def test_of_a_damped_drive_it_is_so_to_2_percent(ratio: float) -> None:
+    stiff = CRANE.replace(gap=3.0, stiffness=3684.65, damping=2.0 * ratio * math.sqrt(3684.65 * J))
+    (found,) = (one for one in doubts(stiff) if one.startswith("K_dyn of direct"))
+    said = float(found.partition("about ")[2].split()[0])
+    assert said == pytest.approx(simulate(stiff, "direct").k_dyn_first_contact, rel=0.02)
+
+
 def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run, as_json) -> None:
     """Of 9 arcmin written as 9 rad, behind 25:1, come 225 rad at the motor."""
     gap = ("--set", "gap=225 rad", "--controllers", "direct")

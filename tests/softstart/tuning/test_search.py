@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import rosen
 
-from softstart.tuning.search import evolve, populations
+from softstart.tuning.search import agreement, evolve, populations
 from softstart.tuning.trials import cost, excess, in_time, upper
 
 
@@ -52,6 +52,11 @@ def test_a_corner_and_one_parameter():
     assert searched([lambda x: np.abs(x[:, 0] - 0.123)], [[0.5]], 30).best[0][0, 0] == pytest.approx(
         0.123, abs=3e-4
     )
+
+
+def test_searches_agree_that_are_within_1_percent_of_the_best_and_of_what_was_settled_on():
+    assert agreement([1.0, 1.0099, 1.0101, 2.0], 1.0) == 2
+    assert agreement([1.0, 1.0099], 0.99) == 0
 
 
 # the rule -------------------------------------------------------------------------------------------------
