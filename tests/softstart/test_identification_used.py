@@ -13,9 +13,19 @@ import pytest
 from tests.softstart.test_identification import REVERSE
 from tests.softstart.test_identification import TRUTH as UNKNOWN
 
-from softstart import Drive, Identification, InputError, compare, identify, plan_experiments, simulate, tune
+from softstart import (
+    Drive,
+    Identification,
+    InputError,
+    compare,
+    identify,
+    plan_experiments,
+    records,
+    simulate,
+    tune,
+)
 from softstart.identification.planning import made_up_log
-from softstart.start.comparison import LEFT_POSSIBLE
+from softstart.start.comparison import LEFT_POSSIBLE, intervals
 from softstart.tuning.question import scenarios_drawn, scenarios_of
 
 TRUTH = UNKNOWN.replace(start_position="mid-gap")
@@ -50,6 +60,24 @@ def test_a_plan_tells_the_intervals_that_a_fit_then_has(found: Identification) -
 
 
 # ---- drives that are left possible ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("late", [2, 3])
+def test_an_interval_holds_the_value_itself_and_is_known_for_nine_of_ten_drives(late: int) -> None:
+    """Of 20 drives with wider gaps, all with a larger K_dyn, some do not reach their speed by 0.5 s."""
+    crane = Drive.load("crane-4amtkf")
+    inertias = np.append(np.linspace(0.16, 0.2, 20 - late), np.ones(late))
+    drawn, run = (
+        records(crane, load_inertia=inertias, gap=np.linspace(0.6, 0.8, 20)),
+        simulate(crane, "direct"),
+    )
+    found = intervals(run, drawn, "direct", until=0.5)
+    starts = [simulate(one, "direct", 0.5) for one in drawn.elements()]
+    k_dyn, times = ([getattr(one, name) for one in starts] for name in ("k_dyn", "start_time"))
+    assert min(k_dyn) > run.k_dyn
+    assert found["k_dyn"] == (run.k_dyn, pytest.approx(np.quantile(k_dyn, 0.975), rel=1e-12))
+    ends = np.nanquantile(times, [0.025, 0.975]) if late == 2 else [math.nan, math.nan]
+    assert found["start_time"] == pytest.approx(tuple(ends), rel=1e-12, nan_ok=True)
 
 
 def test_draws_have_the_intervals_and_the_correlations_that_are_shown(found: Identification) -> None:

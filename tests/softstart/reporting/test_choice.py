@@ -99,6 +99,16 @@ def test_an_optimum_within_1_percent_of_its_bound_is_proved(hostile, over, prove
         assert loose == ([] if certain else [pytest.approx(20.0)])
 
 
+def test_the_lowest_known_takes_no_longer(hostile):
+    time, rows = hostile.choice.chosen.run.start_time, hostile.comparison.rows
+    quick, slow = (FrontPoint(share * time, "reached", "OPTIMAL", "", k_dyn=share) for share in (0.9, 1.1))
+    both = Limit(points=(slow, quick))
+    assert [both.lowest_known(at * time, ()) for at in (0.8, 1.0, 1.2)] == [None, 0.9, 0.9]
+    assert both.lowest_known(0.8 * time, rows) is None
+    as_quick = [row.run.k_dyn for row in rows if row.run.start_time <= time]
+    assert Limit().lowest_known(time, rows) == min(as_quick)
+
+
 def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(hostile):
     best = hostile.choice.chosen
     (sheet,) = [one for one in hostile.sheets if one.name == best.name]
