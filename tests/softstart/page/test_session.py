@@ -33,6 +33,17 @@ def test_all_figures_are_those_of_compare_to_the_bit():
         assert session.time_lost(strategy) == row.time_lost
 
 
+@pytest.mark.parametrize(("time", "selected"), [("0.2 s", "ramp"), ("1 s", "direct")])
+def test_the_gentlest_takes_no_more_than_twice_the_time_of_direct(time, selected):
+    """A ramp of 1 s has a lower K_dyn, and takes 2.3 times as long."""
+    session = Session(controllers=["direct", "ramp"])
+    session.select("ramp")
+    session.set_parameter("time", time)
+    session.select_gentlest()
+    assert session.selected == selected
+    assert session.result("ramp").k_dyn < session.result("direct").k_dyn
+
+
 def test_undo_and_redo_go_through_every_change():
     session = Session(controllers=["direct", "ramp"])
     seen = [session.bench]

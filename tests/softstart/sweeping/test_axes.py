@@ -84,6 +84,10 @@ IMPOSSIBLE = {
         {"starting_torque": [10, 60], "load.torque": [5, 12], "maximum_torque": [80]},
         "starting_torque = 10 N.m: .* load_torque = 12 N",
     ),
+    "not at an end": (
+        {"starting_torque": [50, 10, 60], "load.torque": [12], "maximum_torque": [80]},
+        "starting_torque = 10 N.m: .* load_torque = 12 N",
+    ),
     "a kind": ({"load.kind": ["active", "reactive"], "load.torque": [1, -1]}, "load_torque = -1 N"),
     "samples": ({"sample": {"starting_torque": [10, 60], "load_torque": [3, 60], "maximum_torque": [70, 71]}},
                 r"starting_torque\[1\] = 60"),
