@@ -11,7 +11,7 @@ from hypothesis import strategies as some
 from tests.controllers.starts import CRANE
 
 from softstart import simulate
-from softstart.controller import CompiledController
+from softstart.controller import CompiledController, make_controller
 from softstart_controllers.ramp import Ramp
 from softstart_controllers.s_curve import SCurve
 from softstart_controllers.sampled import mean_torque
@@ -81,3 +81,10 @@ def test_mean_torque_is_exact_for_any_lag(before: float, demand: float, samples:
     blurred = 2**-52 * abs(demand) / (tail * away) if away else 0.0
     tolerance = (2e-6 + min(1.0, blurred)) * away + 1e-9
     assert mean_torque(before, after, demand) == pytest.approx(exact, rel=1e-9, abs=tolerance)
+
+
+@pytest.mark.parametrize(("elastic", "period"), [(0.1, 1e-3), (0.033, 1e-3), (0.016, 0.5e-3)])
+def test_a_stiff_drive_is_sampled_32_times_an_elastic_period(elastic: float, period: float) -> None:
+    stiff = CRANE.replace(stiffness=0.035 * 0.175 / 0.21 * (2.0 * math.pi / elastic) ** 2)
+    for name in ("ramp", "shaped", "state-feedback"):
+        assert make_controller(name).defaults(stiff)["period"] == pytest.approx(period, rel=1e-12)

@@ -112,6 +112,20 @@ def test_what_is_left_is_the_sensitivity_curve_of_the_textbook(error: float) -> 
     assert left_over(nominal, ZVD, a, plant) == pytest.approx(curve**2, rel=1e-8)
 
 
+@pytest.mark.parametrize(("order", "power"), [(ZV, 1), (ZVD, 2)])
+@pytest.mark.parametrize("impact", [0.0, 0.6])
+def test_an_error_of_the_frequency_is_felt_in_the_second_order_under_a_lag_too(
+    order: int, power: int, impact: float
+) -> None:
+    """With half the error ZV leaves half the swing, ZVD a quarter, from rest and after an impact."""
+    free = CRANE.replace(minimum_torque=-1e4, maximum_torque=1e4, contact_law="dead-zone")
+    nominal = on_the_flank(free.replace(torque_lag=0.3 / CRANE.Omega), impact)
+    plants = [nominal.replace(stiffness=CRANE.c * (1.0 + error) ** 2) for error in (0.01, 0.005)]
+    a, wait = 0.5 * math.pi / nominal.Omega, 45.0 * nominal.torque_lag
+    whole, half = (left_over(nominal, order, a, plant, wait) for plant in plants)
+    assert math.log2(whole / half) == pytest.approx(power, abs=0.02)
+
+
 @given(st.sampled_from([ZV, ZVD]), st.floats(0.0, 1.2), st.floats(-1.5, 1.5), st.floats(0.0, 0.4))
 @settings(max_examples=200, deadline=None)
 def test_planned_levels_rise_and_keep_the_torque_in_its_range(

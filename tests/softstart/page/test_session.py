@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import zlib
 from base64 import urlsafe_b64decode, urlsafe_b64encode
+from collections import OrderedDict
 
 import pytest
 
 from softstart import Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
+from softstart.page import links
 from softstart.page.links import bench_of, link_of
 from softstart.page.session import MAX_STRATEGIES, Session
 
@@ -42,6 +44,16 @@ def test_the_gentlest_takes_no_more_than_twice_the_time_of_direct(time, selected
     session.select_gentlest()
     assert session.selected == selected
     assert session.result("ramp").k_dyn < session.result("direct").k_dyn
+
+
+def test_of_benches_that_are_kept_the_latest_stay(monkeypatch):
+    monkeypatch.setattr(links, "MOST_KEPT", 2)
+    monkeypatch.setattr(links, "_kept", OrderedDict())
+    first, second, third = (Session(controllers=["direct"]) for _ in range(3))
+    known = [links.keep(one) for one in (first, second, first, third)]
+    assert links.kept(*known[0]) is first.bench  # kept again after the second
+    assert links.kept(*known[1]) is None
+    assert links.kept(*known[3]) is third.bench
 
 
 def test_undo_and_redo_go_through_every_change():
