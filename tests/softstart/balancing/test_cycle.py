@@ -97,6 +97,17 @@ def test_compression_and_gas_exchange_are_what_was_asked_for():
     assert pressure(cycle, np.radians([250.0, 350.0])) == pytest.approx([1.1e5, 1.1e5], rel=1e-13)
 
 
+@pytest.mark.parametrize(
+    ("share", "left"), [(0.0, 1.0), (0.25, (2 + math.sqrt(2)) / 4), (0.5, 0.5), (1.0, 0.0)]
+)
+def test_in_the_blowdown_the_pressure_falls_along_half_a_cosine(share, left):
+    cycle = SimpleCycle(10.0, "9 bar", exhaust_opening="130 deg", blowdown="40 deg")
+    theta = np.radians([129.999999, 130.0 + 40.0 * share])
+    v, (before, during) = volume(cycle, theta), pressure(cycle, theta)
+    expanded = before * (v[0] / v[1]) ** cycle.expansion_exponent
+    assert during == pytest.approx(left * expanded + (1.0 - left) * 1.1e5, rel=1e-7)
+
+
 def test_mean_pressure_follows_its_table_over_the_speeds():
     cycle = SimpleCycle(9.9, ("8 bar", "10 bar"), speeds=("1000 rpm", "3000 rpm"))
     for rpm, bar in ((500.0, 8.0), (1000.0, 8.0), (1500.0, 8.5), (3000.0, 10.0), (4000.0, 10.0)):
