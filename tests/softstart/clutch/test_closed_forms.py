@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.motion import first_crossing, roots
@@ -37,6 +38,15 @@ def test_linear_law_is_the_closed_form(load_torque):
     run = engage(clutch)
     t = np.linspace(0.0, run.slip_time, 2001)
     assert run.at(t)["T"] == pytest.approx(linear_torque(clutch, t), abs=1e-11 * clutch.clutch_torque)
+
+
+def test_the_work_while_engaging_ends_with_the_law():
+    """Of friction torque times slip up to tM, by the trapezoidal rule: what slips on is no part of it."""
+    run = engage(PAPER)
+    t = np.linspace(0.0, PAPER.engagement_time, 100_001)
+    states = run.at(t)
+    assert run.work_while_engaging == pytest.approx(trapezoid(states["F"] * states["slip"], t), rel=1e-9)
+    assert run.work_while_engaging < 0.5 * run.slip_work
 
 
 def test_without_load_and_with_a_stiff_shaft_friction_takes_what_the_masses_get():

@@ -1,6 +1,7 @@
 """Everything that can be wrong with a drive: one sentence a mistake, with file, table and key."""
 
 import json
+import math
 import os
 import re
 from pathlib import Path
@@ -192,6 +193,12 @@ def test_rated_torque_power_and_speed_agree_within_what_a_data_sheet_rounds():
     assert crane.replace(rated_power=None, rated_torque=30).rated_torque == 30.0
     with pytest.raises(InputError, match=r"rated_torque = 30 N\*m: with the rated speed .* 2200 W"):
         crane.replace(rated_torque=30)
+    rated = 2200.0 / (880.0 * math.pi / 30.0)
+    for off in (-0.049, 0.049):
+        assert crane.replace(rated_torque=(1.0 + off) * rated).rated_torque == (1.0 + off) * rated
+    for off in (-0.051, 0.051):
+        with pytest.raises(InputError, match="agree within 5 %"):
+            crane.replace(rated_torque=(1.0 + off) * rated)
 
 
 @pytest.mark.parametrize("name", [name for name, p in PARAMETERS.items() if p.unit])
