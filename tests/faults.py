@@ -1,4 +1,4 @@
-"""Which tests find the small faults of `faults.toml`: `python tests/faults.py [WORD]`, three quarters of an hour.
+"""Which tests find the small faults of `faults.toml`: `python tests/faults.py [WORD]`, in 45 minutes.
 
 Each fault is put into a copy of the checkout, and the tests that could see it are run, but the slow ones. A
 table says how many of them fail, and names one; exit code 1 if a fault is found by none. A test that alone
