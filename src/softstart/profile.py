@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
+from softstart.notebook import OneLine
 
 MOST_SAMPLES = 1_000_000
 
 
-@dataclass(frozen=True, eq=False, init=False)
-class TorqueProfile:
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class TorqueProfile(OneLine):
     """A torque demand that is linear between its knots; two knots at the same instant are a step.
 
     After the last knot the last torque is held.

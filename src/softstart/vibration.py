@@ -27,6 +27,7 @@ import numpy as np
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.notebook import OneLine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,8 +49,8 @@ class Node(NamedTuple):
     share: float
 
 
-@dataclass(frozen=True, eq=False)
-class Vibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Vibration(OneLine):
     """Natural vibration of a chain, in SI at the motor shaft, gaps closed, undamped.
 
     `Omega[m]` is the frequency of mode m in rad/s; mode 0 is the rigid one, exactly 0, which a chain with a
@@ -286,8 +287,8 @@ class TwoMassFigures(NamedTuple):
     gap: float
 
 
-@dataclass(frozen=True, eq=False)
-class Reduction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduction(OneLine):
     """A chain reduced to two masses at the motor shaft, which have its frequency, node, inertia and gap.
 
     `J1` at the motor and `J2` at the load, kg m2, `c` N m/rad, `d` N m s/rad, `gap` rad. `vibration` is the

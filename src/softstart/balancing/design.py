@@ -27,6 +27,7 @@ from softstart.arrays import Complex, Vector
 from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, largest, shaking_of_shafts
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
+from softstart.notebook import OneLine
 from softstart.quantities import to_si
 
 if TYPE_CHECKING:
@@ -104,8 +105,8 @@ DESIGNS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Residual:
+@dataclass(frozen=True, eq=False, repr=False)
+class Residual(OneLine):
     """What one layout leaves on the housing, one entry for each speed.
 
     `height` and `offset` in m of the middle of the shafts (None without designed ones). The moments are
@@ -142,8 +143,8 @@ class Residual:
         return {name: None if values is None else float(values[index]) for name, values in columns.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class Balance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Balance(OneLine):
     """An engine over its speed range at one load: as it is, and with the balancers designed for it.
 
     The first of `residuals` is the engine without balancer shafts; "own-shafts" follows if it has any; then,

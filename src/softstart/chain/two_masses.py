@@ -18,13 +18,14 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.notebook import OneLine
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Verification(OneLine):
     """A controller set up for the drive, on drive and chain; K_dyn over the drive's mean torque."""
 
     drive: Run
@@ -131,8 +132,8 @@ def verify_on_chain(
     return Verification(simulate(drive, made, until), whole)
 
 
-@dataclass(frozen=True, eq=False)
-class TwoMassError:
+@dataclass(frozen=True, eq=False, repr=False)
+class TwoMassError(OneLine):
     """How far two masses are off the chain they stand for, in K_dyn: see `two_mass_error`.
 
     `verified` are the starts of strategies, `of_torques` the largest error under torques over time (a share

@@ -32,6 +32,7 @@ from softstart.clutch.motion import (
     values,
 )
 from softstart.errors import InputError, SimulationError
+from softstart.notebook import OneLine
 from softstart.quantities import to_si
 
 MOST_STEPS = 400_000
@@ -90,8 +91,8 @@ class EnergyBalance:
         return abs(self.drive - spent) / abs(self.drive) if self.drive else abs(spent)
 
 
-@dataclass(frozen=True, eq=False)
-class Engagement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Engagement(OneLine):
     """One engagement, as `engage` returns it: torques in N m, times in s, work in J.
 
     Attributes

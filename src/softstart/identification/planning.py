@@ -25,7 +25,7 @@ from softstart.identification.unknowns import (
     values_of,
 )
 from softstart.kernel.records import S_PHI
-from softstart.notebook import Shown
+from softstart.notebook import OneLine, Shown
 from softstart.profile import TorqueProfile
 from softstart.quantities import show, to_si
 from softstart.start.comparison import INTERVAL
@@ -49,8 +49,8 @@ WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may 
 NEAR: Final = 0.01  # relative distance of a design to its limits: for positions between those checked then
 
 
-@dataclass(frozen=True, eq=False)
-class Experiment:
+@dataclass(frozen=True, eq=False, repr=False)
+class Experiment(OneLine):
     """A torque demand and what it would tell."""
 
     name: str
@@ -62,7 +62,7 @@ class Experiment:
     score: float = math.nan  # root mean square of the half intervals of wanted parameters; less is better
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan(Shown, sheet="identification.plan_sheet"):
     """Experiments for a drive: the standard ones, then the planned one."""
 

@@ -71,7 +71,7 @@ class Estimate:
         return np.asarray(self.value * np.exp(np.clip(steps, -math.log(WIDEST), math.log(WIDEST))))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification(Shown, sheet="identification.identification_sheet"):
     """A drive from its logs.
 

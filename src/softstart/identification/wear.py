@@ -89,7 +89,7 @@ class Line:
         return middle, high if b * b > a * c else -math.inf, math.inf
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Wear(Shown, sheet="identification.wear_sheet"):
     """How the gap of a drive grows, and when it reaches its limit."""
 

@@ -17,13 +17,14 @@ from softstart.chain.machines import Machine
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.notebook import Shown
+from softstart.notebook import OneLine, Shown
 from softstart.optimal.descent import BEND
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
+from softstart.start.recommendation import SLOW
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
 
@@ -42,8 +43,8 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class FrontPoint:
+@dataclass(frozen=True, repr=False)
+class FrontPoint(OneLine):
     """The least K_dyn for one bound on the start time, or why there is none. Times in s.
 
     `status` is OPTIMAL, INFEASIBLE (no start is that quick; `shortest_start_time` would do) or NOT_FOUND (the
@@ -109,8 +110,8 @@ class FrontPoint:
         return cls(**record | {name: tuple(record[name]) for name in ("time", "torque")})
 
 
-@dataclass(frozen=True)
-class ControllerPoint:
+@dataclass(frozen=True, repr=False)
+class ControllerPoint(OneLine):
     """A controller: its K_dyn, its start time in s, and the optimum at just that start time.
 
     `start_time` is NaN where the load does not reach its target speed; then there is no `optimum`.
@@ -140,7 +141,7 @@ class ControllerPoint:
         }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Front(Shown, sheet="optima.front_sheet"):
     """The least K_dyn for each bound on the start time, and the controllers against that limit.
 
@@ -183,6 +184,18 @@ class Front(Shown, sheet="optima.front_sheet"):
             if point.shortest_start_time is not None and point.terminal == self.terminal
         ]
         return known[0] if known else math.nan
+
+    @property
+    def gentlest(self) -> ControllerPoint | None:
+        """The controller with the lowest K_dyn of those that have an optimum and are not slow.
+
+        Not that with the least ratio: where a controller is as quick as any start can be, no start is better
+        within its time, and its ratio is 1 however hard it starts.
+        """
+        judged = [one for one in self.controllers if one.ratio is not None]
+        latest = SLOW * min((one.start_time for one in judged), default=math.nan)
+        quick = (one for one in judged if one.start_time <= latest)
+        return min(quick, key=lambda one: one.k_dyn, default=None)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""

@@ -15,6 +15,7 @@ from softstart.chain.machines import varied
 from softstart.controller import Controller
 from softstart.controller.base import Effort
 from softstart.drive import Drive
+from softstart.notebook import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row
@@ -24,8 +25,8 @@ INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
 MOST_MAPS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class RobustnessMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustnessMap(OneLine):
     """K_dyn and start time (s) of one strategy: a row per gap (rad), a column per load inertia (kg m2).
 
     K_dyn refers to the mean torque of the nominal drive, so that it compares shaft torques. NaN where the
@@ -67,8 +68,8 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k_dyn), time)
 
 
-@dataclass(frozen=True, eq=False)
-class Choice:
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(OneLine):
     """The strategies compared, their maps by name (of a machine with one gap), and which are best."""
 
     comparison: Comparison

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from softstart.errors import InputError
+from softstart.notebook import OneLine
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
 from softstart.optimal.front import FrontPoint, Stretch
 from softstart.optimal.optimize import optimize
@@ -30,8 +31,8 @@ EARLIER = 0.85  # of the quickest strategy: from where on the curve is drawn
 POLL = 0.1  # s
 
 
-@dataclass(frozen=True)
-class Limit:
+@dataclass(frozen=True, repr=False)
+class Limit(OneLine):
     """What no start can go below, and what the best ones found reach.
 
     `times` (s) and `bounds`: a K_dyn that no torque over time within the motor's limits can go below, however

@@ -15,6 +15,7 @@ from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError
+from softstart.notebook import OneLine
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.start.batch import prepared
 from softstart.start.comparison import compared
@@ -125,8 +126,8 @@ def multiple(value: float, step: float | None) -> str:
     return fixed(value, min(max(math.ceil(-math.log10(step)), 3 - order, 0), max(6 - order, 0)))
 
 
-@dataclass(frozen=True, eq=False)
-class Rise:
+@dataclass(frozen=True, eq=False, repr=False)
+class Rise(OneLine):
     """A ramp for an inverter that asks for another figure than its time: exact, and rounded.
 
     `rise` is the time between the torques of the sheet (s) that comes of the rounded one, `run` the start.
@@ -143,8 +144,8 @@ class Rise:
         return {**figures, "k_dyn": self.run.k_dyn, "start_time": self.run.start_time}
 
 
-@dataclass(frozen=True, eq=False)
-class Sheet:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sheet(OneLine):
     """What to set for one strategy, and what comes of it.
 
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the

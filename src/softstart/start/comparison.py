@@ -84,7 +84,7 @@ def intervals(
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Strategies side by side on one drive.
 
@@ -118,6 +118,16 @@ class Comparison:
     rows: tuple[Row, ...]
     fitted_to: Drive | None = None
     worst_case: tuple[str, ...] = CASES
+
+    def __repr__(self) -> str:
+        """One line with the gentlest and the hardest start.
+
+        >>> compare("crane-4amtkf", ["direct", "ramp"])
+        <Comparison: 2 strategies on Crane travel drive 4AMTKF(H)112L6, K_dyn 2.106 (ramp) to 3.118 (direct)>
+        """
+        rows = sorted(self.rows, key=lambda row: row.run.k_dyn)
+        ends = " to ".join(f"{row.run.k_dyn:.3f} ({row.name})" for row in (rows[0], rows[-1])[: len(rows)])
+        return f"<Comparison: {len(rows)} strategies on {self.drive.name}, K_dyn {ends}>"
 
     @cached_property
     def recommendation(self) -> Recommendation:

@@ -13,7 +13,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
-from softstart.notebook import Shown
+from softstart.notebook import OneLine, Shown
 from softstart.quantities import to_si
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
@@ -30,8 +30,8 @@ HOURS_PER_YEAR = 8766.0
 RATIO_OF_A_GEAR, RATIO_OF_A_COUPLING, LARGEST_RATIO = 0.01, 0.005, 0.06
 
 
-@dataclass(frozen=True, eq=False)
-class Life:
+@dataclass(frozen=True, eq=False, repr=False)
+class Life(OneLine):
     """What one start does to one shaft, and how often it can be repeated. Torques are at the motor shaft.
 
     Attributes
@@ -130,7 +130,7 @@ class Life:
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fatigue(Shown, sheet="fatigue.fatigue_sheet"):
     """Lives of the shafts of a machine under several strategies. It is returned by `fatigue`.
 

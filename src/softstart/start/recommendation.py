@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Limit, Limits
+from softstart.notebook import OneLine
 from softstart.start.fatigue import worst_damage
 from softstart.start.run import Run
 
@@ -125,8 +126,8 @@ def _times(share: float) -> str:
     return f"{float(f'{1.0 - share:.3g}'):,.6g}"
 
 
-@dataclass(frozen=True, eq=False)
-class Row:
+@dataclass(frozen=True, eq=False, repr=False)
+class Row(OneLine):
     """One strategy: its start, and how it fares when the drive is not the one it was set up for.
 
     The robustness figures keep the controller as it was set up for the nominal drive, while the gap is
@@ -262,8 +263,8 @@ def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Recommendation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recommendation(OneLine):
     """What is recommended, and why, in one text that is the same wherever it is shown.
 
     Attributes

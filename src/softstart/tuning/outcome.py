@@ -25,7 +25,7 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.notebook import Shown
+from softstart.notebook import OneLine, Shown
 from softstart.tuning.question import Question, given_to
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 What = Literal["schedule", "robust"]
 
 
-@dataclass(frozen=True, eq=False)
-class RobustSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustSet(OneLine):
     """One set of gains for all cells and scenarios.
 
     `parameters` are all parameters of the controller, set up for the nominal drive; `gains` those that were
@@ -69,7 +69,7 @@ class RobustSet:
         return {**found, "feasible": self.feasible, "cells": _rows(self.cells)}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tuning(Shown, sheet="tuning.tuning_sheet"):
     """Tuned gains of one controller over a grid of gaps and load inertias; the result of `tune`.
 

@@ -93,9 +93,15 @@ def price_table(sides: dict[str, tuple[Trials, Found]], best: Optima) -> xarray.
     if not (both or best):
         return None
     columns: Columns = {}
+    late = False
     for side, (trials, found) in sides.items():
         question, bounds = trials.question, _by_cell(trials, trials.bound)[:, 0]
         values = _over_scenarios(_by_cell(trials, found.judged.metric), question.quantile)
+        # what is later than allowed is no match for an optimum, or another set, within that time
+        over = excess(
+            _by_cell(trials, found.judged.start_time), _by_cell(trials, trials.bound), question.quantile
+        )
+        late = late | (over > 0.0)
         columns[side] = (values, "1", f"{question.metric_name} of the {side}")
         columns[f"{side}_bound"] = (bounds, "s", "bound on the start time")
         if best:
@@ -104,10 +110,11 @@ def price_table(sides: dict[str, tuple[Trials, Found]], best: Optima) -> xarray.
             least, low = np.array(each, dtype=np.float64).T  # None becomes NaN
             columns[f"{side}_optimum"] = (least, "1", "least K_dyn of any start within the bound")
             columns[f"{side}_lower_bound"] = (low, "1", "its lower bound")
-            columns[f"{side}_over_optimum"] = (values / least, "1", f"{side} over optimum")
+            ratio = np.where(over > 0.0, math.nan, values / least)
+            columns[f"{side}_over_optimum"] = (ratio, "1", f"{side} over optimum, if in time")
     if both:
-        ratio = columns["robust"][0] / columns["schedule"][0]
-        columns["robust_over_schedule"] = (ratio, "1", "what one set for all costs")
+        ratio = np.where(late, math.nan, columns["robust"][0] / columns["schedule"][0])
+        columns["robust_over_schedule"] = (ratio, "1", "what one set for all costs, if both are in time")
     return _dataset(question, columns)
 
 

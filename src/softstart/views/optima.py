@@ -280,9 +280,9 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
 
 
 def _front_tables(front: Front) -> list[Table]:
-    """The curve, and the controllers, the one nearest to the limit first."""
+    """The curve, and the controllers, the gentlest first."""
     points, blind = front.points, len(front.drive.positions) > 1
-    order = sorted(front.controllers, key=lambda one: one.ratio or math.inf)
+    order = sorted(front.controllers, key=lambda one: one.k_dyn)
     curve = {
         "start time\nallowed s": column_of([p.start_time_bound for p in points], 5),
         "K_dyn": [number(p.k_dyn, 4) for p in points],
@@ -307,21 +307,18 @@ def _front_tables(front: Front) -> list[Table]:
 
 
 def _front_conclusion(front: Front) -> str:
-    """What the curve spans, and which controller comes nearest to it."""
+    """What the curve spans, and the gentlest controller beside the optimum of just its own start time."""
     found = [point for point in front.points if point.found]
     if not found:
         return "None of these start times is feasible."
     ends = (f"{one.k_dyn:.3f} in {one.start_time_bound:.4g} s" for one in found[:1] + found[1:][-1:])
     text = f"{_capital(best_k_dyn(front.drive))} {' to '.join(ends)}."
-    judged = [one for one in front.controllers if one.ratio is not None and one.optimum is not None]
-    if not judged:
+    best = front.gentlest
+    if best is None or best.optimum is None or best.optimum.k_dyn is None:
         return text
-    best = min(judged, key=lambda one: one.ratio or math.inf)
-    least, blind = best.optimum.k_dyn if best.optimum else math.nan, len(front.drive.positions) > 1
     return (
-        f"{text} {'Lowest beside it' if blind else 'Nearest to the limit'}: {best.name}, K_dyn "
-        f"{best.k_dyn:.3f} where {least:.3f} is {'that of the best profile' if blind else 'the least'} in "
-        f"its start time of {best.start_time:.4g} s."
+        f"{text} Gentlest strategy: {best.name}, K_dyn {best.k_dyn:.3f} in {best.start_time:.4g} s, "
+        f"where the {best_start(front.drive)} has {best.optimum.k_dyn:.3f}."
     )
 
 

@@ -27,6 +27,7 @@ PRICES = {
     "robust_over_optimum": "one set / optimum",
 }
 SHOWN = 24  # cells on a terminal
+SAME_TIME = 1e-3  # bounds on the start time that differ by less count as one
 
 
 def figure_of(tuning: Tuning, what: str | None) -> Any:
@@ -190,7 +191,11 @@ def conclusions(tuning: Tuning) -> list[str]:
     for ratio, title in PRICES.items():
         if price is not None and ratio in price:
             missing = int(price[ratio].isnull().sum())
-            without = f" ({missing} of {price[ratio].size} cells without an optimum)" if missing else ""
+            without = (
+                f" ({missing} of {price[ratio].size} cells not in time, or without an optimum)"
+                if missing
+                else ""
+            )
             ratios.append(f"{title} {_between(price[ratio])}{without}")
     return [*found, f"Ratios of {metric}: {'; '.join(ratios)}."] if ratios else found
 
@@ -215,6 +220,15 @@ def notes(tuning: Tuning) -> list[str]:
             f"{_between(tuning.between[tuning.metric])}, up to {beyond:.1f} % beyond the bound on the start "
             "time."
         )
+    if tuning.price is not None and "robust_over_schedule" in tuning.price:
+        robust, each = (np.asarray(tuning.price[f"{side}_bound"]) for side in ("robust", "schedule"))
+        known = np.isfinite(robust) & np.isfinite(each)
+        apart = float(np.max(np.abs(robust[known] / each[known] - 1.0), initial=0.0))
+        if apart > SAME_TIME:
+            found.append(
+                "One set and each cell tuned are held to different start times: those of the defaults of the "
+                f"nominal drive, and of each cell. They are up to {100.0 * apart:.1f} % apart."
+            )
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
         optimum = "the cell's drive, its motor without lag, dead time and noise; terminal reached"
         found.append(f"Optimum: {optimum}.")

@@ -97,11 +97,6 @@ def tables(found: list[Front]) -> tuple[Table, ...]:
     )  # fmt: skip
 
 
-def nearest(front: Front) -> ControllerPoint:
-    """The controller with the smallest ratio to the optimum."""
-    return min((one for one in front.controllers if one.ratio is not None), key=lambda one: one.ratio or 0.0)
-
-
 def claims(found: list[Front], progress: Progress) -> list[Claim]:
     """The form of the optimum, the range below 1, the controllers, and constant torque."""
     return [
@@ -168,8 +163,9 @@ def method_2(found: list[Front]) -> Claim:
     said, ratios, closest = [], [], []
     for front in found:
         (one,) = (c for c in front.controllers if c.name == "reduced-two-stage")
-        best, gap = nearest(front), gap_of(front)
-        closest.append(f"{best.name} x{best.ratio:.2f} at {gap:g} rad")
+        best, gap = front.gentlest, gap_of(front)
+        if best is not None:
+            closest.append(f"{best.name} x{best.ratio:.2f} at {gap:g} rad")
         if one.ratio is not None and one.optimum is not None:
             ratios.append(one.ratio)
             said.append(
@@ -179,7 +175,7 @@ def method_2(found: list[Front]) -> Claim:
     return Claim(
         "Method 2 of [G] is close to the optimum.",
         Verdict.of(max(ratios) < 1.1),
-        f"Over the whole start it has K_dyn {'; '.join(said)}. Nearest of all controllers: "
+        f"Over the whole start it has K_dyn {'; '.join(said)}. The gentlest controller: "
         f"{'; '.join(closest)}.",
     )
 

@@ -12,7 +12,15 @@ from tests.softstart.optimal.drives import CRANE, QUICK
 
 from softstart import InputError, optimize, simulate
 from softstart.controller import ready_controller_names
-from softstart.optimal.front import Front, FrontPoint, _monotone, default_start_times, pareto
+from softstart.optimal.front import (
+    ControllerPoint,
+    Front,
+    FrontPoint,
+    _monotone,
+    default_start_times,
+    pareto,
+)
+from softstart.views.optima import front_sheet
 
 TIMES = [0.33, 0.29, 0.31]
 
@@ -81,6 +89,30 @@ def test_controllers_are_judged_at_their_own_start_time(front: Front) -> None:
             assert one.k_dyn >= (one.optimum.k_dyn_lower_bound or 0.0)
             assert one.ratio == pytest.approx(one.k_dyn / (one.optimum.k_dyn or math.nan))
     assert judged >= 4
+
+
+def beside(name: str, k_dyn: float, start_time: float, least: float) -> ControllerPoint:
+    point = FrontPoint(start_time, "reached", "OPTIMAL", "", k_dyn=least)
+    return ControllerPoint(name, k_dyn, start_time, "", point)
+
+
+def test_a_controller_as_quick_as_any_start_is_not_the_best_of_all() -> None:
+    """Where direct has the shortest start time its ratio is 1 however hard it starts.
+
+    Figures of conveyor-11kw and crane-4amtkf; what takes more than twice the time is no match either.
+    """
+    direct = beside("direct", 1.655, 0.8715, 1.655)
+    hold, late = beside("pulse-coast-hold", 0.983, 0.9079, 0.974), beside("late", 0.3, 1.8, 0.2)
+    steep = beside("reduced-first-stage", 2.387, 0.8717, 2.343)
+    assert [one.ratio for one in (direct, hold)] == [1.0, pytest.approx(1.009, abs=1e-3)]
+    for named, some in ((hold, (direct, steep, late, hold)), (direct, (direct,)), (steep, (steep,))):
+        front = Front(CRANE, "reached", (), some)
+        assert front.gentlest is named
+    some = (direct, steep, late, hold, ControllerPoint("no start", 0.1, math.nan, "", None))
+    curve = (FrontPoint(0.9, "reached", "OPTIMAL", "", k_dyn=0.98),)
+    (said,) = front_sheet(Front(CRANE, "reached", curve, some)).found
+    assert said.endswith(": pulse-coast-hold, K_dyn 0.983 in 0.9079 s, where the optimum has 0.974.")
+    assert Front(CRANE, "reached", (), some[-1:]).gentlest is None
 
 
 def test_start_times_that_are_too_short_are_marked() -> None:

@@ -1,6 +1,7 @@
 """The recommendation follows its rule, the map is that of simulate, what is said of the limit is proved."""
 
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +9,9 @@ import pytest
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.controller import make_controller
+from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.front import FrontPoint
+from softstart.optimal.problem import Problem
 from softstart.reporting import report
 from softstart.reporting.choice import robustness
 from softstart.reporting.document import answer, for_customer
@@ -117,7 +120,7 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
     def said(words, *, known=1.0, **changes):
         point = FrontPoint(best.run.start_time, "reached", "OPTIMAL", "", k_dyn=known * best.run.k_dyn)
         made = replace(hostile, limit=Limit(points=(point,)), sheets=(replace(sheet, **changes),))
-        return words in answer(made)
+        return words in re.split(r" In the [\d.]+ s of ", answer(made))[0]  # what follows is of the ramp
 
     calm = {"rounded": SimpleNamespace(k_dyn=k, start_time=time), "worst_k_dyn": k, "slowest": time}
     for share, told in ((1.049, False), (1.051, True)):
@@ -130,6 +133,23 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
         assert said("the gentlest start known has", known=share, **calm) == told
     for step, coarse in ((0.099, False), (0.101, True)):
         assert Setting("time", "", "s", 1.0, 1.0, step).coarse == coarse
+
+
+def test_each_bound_is_that_of_the_start_beside_which_it_stands(hostile, read):
+    """The answer has two starts of different times, each with the bound of its own; so has each row."""
+    made = hostile
+    pattern = r"[Ii]n the ([\d.]+) s of (\S+) (?:with a K_dyn|none is) below (\d+\.\d+)"
+    said = re.findall(pattern, made.answer)
+    assert {name for _, name, _ in said} == {made.choice.chosen.name, made.choice.ordinary.name}
+    assert len({time for time, _, _ in said}) == 2
+    own = read.rows("lower bound at that time")
+    for row in made.comparison.rows:
+        time = row.run.start_time
+        bound = momentum_bound(Problem(made.drive, time, "reached")).k_dyn
+        assert float(own[row.name]["lower bound at that time"]) == pytest.approx(bound, abs=5e-4)
+        for told, _, below in (one for one in said if one[1] == row.name):
+            assert float(told) == pytest.approx(time, rel=1e-3)
+            assert 0.0 <= bound - float(below) <= 1e-3  # rounded to the safe side
 
 
 def test_search_for_optima_ends_when_its_time_is_up():

@@ -14,6 +14,7 @@ from softstart.parallel import Pool
 from softstart.start.recommendation import Row
 from softstart.tuning.ranges import tunable
 from softstart.tuning.trials import Trials
+from softstart.views.tuning import conclusions
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 GRID = {"gaps": [0.5, 2.0], "inertias": ["2 J1", "5 J1"]}
@@ -212,6 +213,18 @@ def test_the_price_sets_the_optimum_beside_it():
     assert float(price.schedule) == float(tuned.schedule.k_dyn[0, 0]) >= best.bound.k_dyn
     assert float(price.robust_over_schedule) == pytest.approx(float(price.robust / price.schedule))
     assert float(price.schedule_over_optimum) == pytest.approx(float(price.schedule) / best.k_dyn)
+
+
+@pytest.mark.slow
+def test_what_is_later_than_allowed_is_not_set_beside_an_optimum_in_time():
+    """In 0.2409 s no K_dyn is below 2.2; take-up with 0.97 takes half as long again, and is no match."""
+    options = {"generations": 2, "population": 6, "restarts": 1, "workers": 1, "start_time": 0.2409}
+    tuned = tune(CRANE, "take-up", [0.5], ["5 J1"], **options)
+    price = tuned.price.isel(gap=0, load_inertia=0)
+    assert float(price.schedule) < 0.5 * float(price.schedule_optimum)
+    for ratio in ("schedule_over_optimum", "robust_over_optimum", "robust_over_schedule"):
+        assert math.isnan(float(price[ratio]))
+    assert "1 of 1 cells not in time" in " ".join(conclusions(tuned))
 
 
 # bad input ------------------------------------------------------------------------------------------------

@@ -1,0 +1,67 @@
+"""A result that is printed is one line that says what came out, however much it holds."""
+
+import re
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+import softstart
+from softstart import (
+    Chain,
+    Clutch,
+    Drive,
+    TorqueProfile,
+    compare,
+    engage,
+    fatigue,
+    natural_vibration,
+    reduce_chain,
+    simulate,
+)  # fmt: skip
+from softstart.notebook import OneLine, Shown
+from softstart.optimal.front import ControllerPoint, Front, FrontPoint
+
+CRANE = Drive.load("crane-4amtkf").replace(damping=0.3)
+KNOTS = tuple(np.linspace(0.0, 1.0, 500).tolist())
+POINT = FrontPoint(0.4, "reached", "OPTIMAL", "", 1.01, 1.0, "momentum", "all", time=KNOTS, torque=KNOTS)
+
+
+def printed():
+    chain, run = Chain.load("crane-4-mass"), simulate(CRANE, "ramp")
+    both = compare(CRANE, ["direct", "ramp"])
+    front = Front(CRANE, "reached", (POINT,) * 20, (ControllerPoint("ramp", 1.2, 0.4, "", POINT),) * 9)
+    yield from (run, both, both.rows[0], both.recommendation, front, POINT, front.controllers[0])
+    yield from (lives := fatigue([run]), lives.rows[0], TorqueProfile(KNOTS, KNOTS))
+    yield from (natural_vibration(chain), reduce_chain(chain), engage(Clutch.load("paper-c")))
+
+
+def test_a_result_is_printed_in_one_line():
+    for result in printed():
+        text = repr(result)
+        assert str(result) == text
+        assert text.startswith(f"<{type(result).__name__}: ")
+        assert len(text) < 600
+        assert "\n" not in text
+        assert "array(" not in text
+
+
+def test_the_line_of_a_comparison_and_of_a_front_has_their_figures():
+    assert repr(compare(CRANE, ["direct", "ramp"])).endswith(" (ramp) to 2.901 (direct)>")
+    front = Front(CRANE, "reached", (POINT,), (ControllerPoint("ramp", 1.2, 0.4, "", POINT),))
+    assert "ramp, K_dyn 1.200 in 0.4 s" in repr(front)
+    assert "K_dyn 1.01, K_dyn lower bound 1, " in repr(POINT)
+    assert repr(replace(POINT, time=KNOTS[:3])).endswith(", time [3], torque [500]>")
+
+
+def test_no_result_prints_its_arrays():
+    """A dataclass makes a repr of its own unless it is told not to."""
+    house = Path(softstart.__file__).parent
+    for path in house.rglob("*.py"):
+        if re.search(r"^class \w+\((OneLine|Shown)", path.read_text("utf-8"), re.MULTILINE):
+            import_module(".".join(("softstart", *path.relative_to(house).with_suffix("").parts)))
+    found = [*OneLine.__subclasses__(), *Shown.__subclasses__()]
+    assert len(found) > 25
+    own = {one.__name__ for one in found if "__repr__" in vars(one)}
+    assert own == {"Run", "Optimum", "LinearView"}
