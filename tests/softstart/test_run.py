@@ -195,6 +195,19 @@ def test_a_start_that_does_not_reach_its_target_is_not_too_long() -> None:
     assert simulate([drive], make_controller("direct", {"torque": 6.0})).status.item() == "NOT_REACHED"
 
 
+def test_a_start_with_too_fast_a_motion_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Damping of 1e7 N m s/rad: 3.4e8/s, a span in 9 ns. Recorded or not, spans are bounded in number."""
+    stiff = CRANE.replace(damping=1e7)
+    with pytest.raises(SimulationError, match=r"units of damping, .* direct, t = 0\.0166\d+ s, 1 events"):
+        simulate(stiff, "direct", max_events=100)
+    batch = simulate([stiff, CRANE], "direct", max_events=100, workers=1)
+    assert batch.status.values.tolist() == ["TOO_STIFF", "REACHED"]
+    assert np.isnan(batch.k_dyn.values[0])
+    monkeypatch.setattr("softstart.start.recorded.MOST_BYTES", 1_000_000)
+    with pytest.raises(SimulationError, match="or memory"):
+        simulate(stiff, "direct")
+
+
 class Sleeper(PlainController):
     """Does not return for a while."""
 

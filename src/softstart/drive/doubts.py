@@ -51,9 +51,10 @@ class TwoMasses(NamedTuple):
 def doubts(machine: Any) -> list[str]:
     """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
 
-    Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed
-    at most 10,000 rpm; start under the starting torque, (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of
-    direct at the first contact, [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
+    Elastic frequency, [G](8), 0.5 to 500 Hz; its damping ratio at most 1; gap at most half a turn of the
+    motor; J2/J1 0.01 to 100; speed at most 10,000 rpm; start under the starting torque,
+    (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of direct at the first contact,
+    [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
     below 1 before the larger inertia. A chain counts by the lever rule.
 
     >>> from softstart.drive import Drive
@@ -107,6 +108,13 @@ def _doubts(of: TwoMasses) -> Iterator[str]:
             f"elastic frequency {frequency:.4g} Hz, where drives have 0.5 to 500 Hz: a stiffness per degree "
             "or in kN m, an inertia in kg cm2 or g m2 written as kg m2, or a value that is not at the motor "
             "shaft (divided by the ratio squared)?"
+        )
+    ratio = of.d * float(Omega) / (2.0 * c) if c > 0.0 else math.nan
+    if ratio > 1.0:
+        yield (
+            f"damping ratio {ratio:.4g} of the elastic mode, d/2 sqrt((J1 + J2)/(c J1 J2)), where drives "
+            "have 0.001 to 0.2 and from 1 on nothing oscillates: a damping in another unit, or not at the "
+            "motor shaft (divided by the ratio squared)?"
         )
     if of.gap > math.pi:
         yield (

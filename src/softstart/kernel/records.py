@@ -357,7 +357,11 @@ _kinds: Any = np.arange(1, 9)
 CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED = _kinds
 
 # why `advance` came back
-ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)
+(
+    ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG,
+    TOO_STIFF,
+) = range(10)  # fmt: skip
+SPANS_PER_EVENT = 2.0  # so many times as many spans as events are permitted
 
 # what a span ends with
 (

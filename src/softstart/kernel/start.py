@@ -18,7 +18,8 @@ from softstart.kernel.records import (
     ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT, EVENT_LIMIT, LOWER, MASS, MEASURED, MOST_NOTED, NO_EVENT,
     NOT_FINITE,
     NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
-    SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
+    SHAFT_NOTES, SPANS_PER_EVENT, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U,
+    TONE, TOO_LONG, TOO_STIFF,
     UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
 )  # fmt: skip
 from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, find_piece, orders
@@ -215,6 +216,8 @@ def stands(s: Record, spans: Matrix, events: Matrix) -> int:
     """Why the start does not go on: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
     if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + MOST_NOTED >= events.shape[0]):
         return BUFFER_FULL
+    if s.n_spans > SPANS_PER_EVENT * s.event_cap:  # recorded or not: each takes time
+        return TOO_STIFF
     stop = s.t_end
     if math.isnan(s.start_time) and stop == math.inf:
         stop = s.time_limit
@@ -291,7 +294,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
             move(s, n, x, x * h)
             if spans.shape[0] > 0:
                 spans[int(s.n_spans), S_END] = s.time
-                s.n_spans += 1.0
+            s.n_spans += 1.0
         total = s.u
         for i in range(s.n):
             total += s.w[i]

@@ -15,8 +15,10 @@ from softstart.kernel import records as at
 from softstart.kernel import replay, sensitivity, start
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.start.rows import Rows
+from softstart.start.status import Status
 
 FIRST_ROWS = 256
+MOST_BYTES = 1 << 30  # of the record of one start
 
 
 class Recorder:
@@ -81,7 +83,9 @@ class Recorder:
         return reason
 
     def grow(self) -> None:
-        """Twice the room for whatever is nearly full."""
+        """Twice the room for whatever is nearly full; raises SimulationError where memory is not for that."""
+        if 2 * (self.spans.nbytes + self.events.nbytes) > MOST_BYTES:
+            raise SimulationError(Status.TOO_STIFF.value)
         if self.state.n_spans >= self.spans.shape[0]:
             self.spans = np.concatenate([self.spans, np.zeros_like(self.spans)])
         else:
@@ -90,7 +94,7 @@ class Recorder:
     def finished(self) -> Recorded:
         """What has been recorded."""
         now = self.state
-        spans, events = int(now.n_spans), int(now.n_events)
+        spans, events = min(int(now.n_spans), len(self.spans)), int(now.n_events)
         rows = np.zeros((spans + 1, self.spans.shape[1]))
         rows[:spans] = self.spans[:spans]
         start.note_state(self.work, rows[spans])

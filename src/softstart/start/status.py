@@ -51,6 +51,11 @@ class Status(Enum):
         "The start was given up: it lasts more than 100,000 elastic periods of the drive. Check the units of "
         "inertias, stiffness and target speed, or end the run earlier (until)."
     )
+    TOO_STIFF = (
+        "The start was given up: it takes more steps of computation than max_events (two for each) or memory "
+        "(1 GB) permit, as its fastest motion is too fast for so long a start. Check the units of damping, "
+        "stiffness and inertias, or end the run earlier (until)."
+    )
 
     @property
     def finished(self) -> bool:
@@ -66,6 +71,7 @@ _BROKEN = {
     at.BAD_COMMAND: Status.BAD_COMMAND,
     at.QUEUE_FULL: Status.QUEUE_FULL,
     at.TOO_LONG: Status.TOO_LONG,
+    at.TOO_STIFF: Status.TOO_STIFF,
 }
 
 

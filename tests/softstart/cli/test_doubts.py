@@ -27,6 +27,7 @@ def test_no_shipped_machine_is_doubted(machine: str) -> None:
     [
         ("elastic frequency", {"stiffness": J * (0.5 * TURN) ** 2}, 0.99, {}),
         ("elastic frequency", {"stiffness": J * (500 * TURN) ** 2}, 1.01, {"gap": 0.0}),
+        ("damping ratio", {"damping": 2.0 * math.sqrt(368.465 * J)}, 1.01, {}),
         ("half a turn", {"gap": math.pi}, 1.01, {}),
         ("inertia of the load", {"load_inertia": 0.01 * 0.035}, 0.99, {}),
         ("inertia of the load", {"load_inertia": 100 * 0.035}, 1.01, {}),
