@@ -13,6 +13,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from datetime import date, time
 from decimal import Decimal
 from functools import lru_cache
@@ -387,10 +388,8 @@ class Units(NamedTuple):
                 found |= {"angle": "mm", "diameter": parse(arc[1], "m")}
                 if not found["diameter"] > 0.0:
                     raise RefusedError("the diameter of the pitch circle must be above 0")
-            elif part in ("rad", *TYPED["rad"]):
-                found["angle"] = part
-            elif part in ("rad/s", *TYPED["rad/s"]):
-                found["speed"] = part
+            elif same := _same_unit(part):
+                found |= same
             else:
                 raise RefusedError(
                     f'{show(part)} is no unit of an angle or a speed; write for example "deg, rpm", or '
@@ -439,6 +438,25 @@ class Units(NamedTuple):
         if self.of(si) == "mm":  # a length is no angle
             return f"{float(text) * self.size(si):.{MOST_DIGITS}g}"
         return f"{text.strip()} {self.of(si)}"
+
+
+def _same_unit(written: str) -> dict[str, str]:
+    """The unit of an angle or a speed that somebody wrote, in any spelling, as a field of `Units`.
+
+    >>> _same_unit("rpm"), _same_unit("1/min"), _same_unit("degree"), _same_unit("N")
+    ({'speed': 'rpm'}, {'speed': 'rpm'}, {'angle': 'deg'}, {})
+    """
+    known = {"angle": ("rad", *TYPED["rad"]), "speed": ("rad/s", *TYPED["rad/s"])}
+    for field, units in known.items():
+        if written in units:
+            return {field: written}
+    for field, units in known.items():
+        with suppress(RefusedError):
+            size = cast("float", parse(f"1 {written}", units[0]))
+            for unit in units:
+                if math.isclose(size, ORDINARY.get((unit, units[0]), 1.0), rel_tol=1e-9):
+                    return {field: unit}
+    return {}
 
 
 def _single(value: object, unit: str, infinite: bool) -> float:
