@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces
 
-from softstart import Drive
+from softstart import Drive, InputError
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.start.simulation import simulate
 
@@ -188,6 +189,13 @@ def test_a_rigid_joint_carries_what_moves_the_masses_behind_it():
     assert run.peak_torques[1] == pytest.approx(same.peak_torques[0], rel=1e-13)
     T = run.at(run.t)["T"]
     assert T[:, 0] == pytest.approx(12.0 - (12.0 - T[:, 1]) / 3.0, rel=1e-12)
+
+
+def test_masses_that_are_joined_rigidly_start_with_one_speed_to_the_digits_of_a_data_sheet():
+    for off, refused in ((0.9e-6, False), (1.1e-6, True)):
+        masses = [Mass(1.0, initial_speed=3.0), Mass(2.0, initial_speed=3.0 * (1.0 + off))]
+        with pytest.raises(InputError, match="give both the same") if refused else nullcontext():
+            simulate(Chain(masses, [Shaft("inf")]), None, 1.0)
 
 
 def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
