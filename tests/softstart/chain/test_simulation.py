@@ -11,6 +11,7 @@ from softstart import Command, Drive, InputError, PlainController, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import Sensor
 from softstart.start.rows import rows_of
+from softstart.views.starts import shaft_table
 
 CRANE = Drive.load("crane-4amtkf")
 DRIVES = {
@@ -21,6 +22,16 @@ DRIVES = {
     "dead time and noise": {"computing_delay": 0.0017, "torque_noise": 0.5, "encoder_lines": 256},
     "from overlap": {"start_position": 0.27, "initial_load_speed": 5.0, "load_kind": "reactive"},
 }
+
+
+def test_the_table_of_shafts_has_the_torque_at_each_own_shaft_by_hand():
+    """Behind 4:1 it is four times that at the motor shaft: that of the same masses without the gear."""
+    shafts, masses = [Shaft(1e4, ratio=4.0, side="after"), Shaft(2e4, gap=0.02)], [Mass(2.0), Mass(3.0)]
+    geared = Chain([Mass(0.1), *masses], shafts, Motor(20.0), target_speed=20.0)
+    plain = Chain([Mass(1.6), *masses], [Shaft(1e4), shafts[1]], Motor(80.0), target_speed=5.0)
+    table, exact = shaft_table(simulate(geared, "direct")), simulate(plain, "direct").peak_torques
+    for row, torque in zip(table.rows, exact, strict=True):
+        assert [float(row[3]), float(row[4])] == pytest.approx([0.25 * torque, torque], rel=1e-3)
 
 
 @pytest.mark.parametrize("changes", DRIVES.values(), ids=list(DRIVES))
