@@ -21,6 +21,7 @@ from softstart.controller import Command, CompiledController, PlainController, c
 from softstart.controller.base import Measured
 from softstart.controller.compiled import Vector
 from softstart.start import engine
+from softstart.views.starts import clipped_torque
 
 CRANE = Drive.load("crane-4amtkf")
 DAMPED = CRANE.replace(damping=1.0, load_kind="reactive")
@@ -107,6 +108,18 @@ def test_a_start_without_end_is_given_up_after_a_hundred_stiff_ones_and_a_hundre
         run = simulate(drive.replace(**given), "direct", parameters=weak)
         assert run.status is Status.NOT_REACHED
         assert run.end_time == pytest.approx(begin + limit, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("beyond", "said"), [(1e-10, ""), (1e-8, "up to 6.4e-07 N m"), (0.05, "up to 3.2 N m")]
+)
+def test_a_demand_beyond_the_motor_is_told_but_for_rounding(beyond: float, said: str) -> None:
+    """The motor has 64 N m."""
+    run = simulate(CRANE, Pieces(pieces=((0.0, 64.0 * (1.0 + beyond)),)))
+    told = clipped_torque(run)
+    assert bool(told) == bool(said)
+    assert said in told
+    assert run.clipped.time == pytest.approx(run.end_time, rel=1e-12)
 
 
 def test_csv_reads_back(run: Run, tmp_path: Path) -> None:
