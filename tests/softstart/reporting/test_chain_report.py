@@ -58,9 +58,13 @@ def test_lives_of_shafts_are_those_of_fatigue_and_sources_of_a_drive_are_refused
     with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
         report(CHAIN, controllers=["ramp"], project=about)
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
-    page = report(damped, controllers=["take-up"], budget=0.0).to_html()
+    of_damped = report(damped, controllers=["take-up"], budget=0.0)
+    page = of_damped.to_html()
     found = fatigue([simulate(damped, name) for name in ("take-up", "direct")])
     last = re.findall(r">take-up</th>(.*?)</tr>", page)[-1]
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
     assert relative == pytest.approx([life.relative for life in found.by_run[0]], rel=5e-3)
     assert "Longest life: take-up" in page
+    # the shaft line lasts as long as the shaft that gains least
+    assert of_damped.life_gain == pytest.approx(min(life.relative for life in found.by_run[0]), rel=1e-9)
+    assert of_damped.life_gain < 0.95 * max(life.relative for life in found.by_run[0])
