@@ -11,9 +11,10 @@ import click
 from softstart.chain.elements import LIBRARY
 from softstart.cli.asking import asked
 from softstart.cli.options import changes_option, json_option, named_as_options, read_changes, typed_settings
+from softstart.cli.running import working
 from softstart.drive import data_sheet_words as sheets
 from softstart.drive import library
-from softstart.drive.data_sheet import DataSheet
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.data_sheet_words import ABOUT, MACHINES, TYPICAL
 from softstart.errors import InputError
 from softstart.input.files import write_whole
@@ -68,13 +69,28 @@ def init(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_js
         return
     for one in found.doubts:
         print(f"softstart: doubt: {one}", file=sys.stderr)
+    for one in _both_ends(found):
+        print(f"softstart: {one}", file=sys.stderr)
     if out is None:
         print(text, end="")
         return
     assumed = f" Assumed: {drive.assumed}." if drive.assumed else ""
     shipped = out in (*library.names(), *LIBRARY.names())  # whose name alone would be that machine
     path = shlex.quote(f"./{out}" if shipped else out)
+    if isinstance(found.possible, UnknownStiffness) and (sheet or asks):  # the drive file has one end only
+        path = shlex.quote(sheet or str(kept))
     sentence(console(), f"{out} is written.{assumed} What next: softstart compare {path}")
+
+
+def _both_ends(sheet: DataSheet) -> list[str]:
+    """How the strategies compare at both ends of an unknown stiffness."""
+    if not isinstance(sheet.possible, UnknownStiffness):
+        return []
+    from softstart.start.comparison import compare
+    from softstart.views.starts import both_ends
+
+    with working("comparing both ends of the stiffness ..."):
+        return both_ends(compare(sheet))[1:]
 
 
 def template_text() -> str:

@@ -20,7 +20,7 @@ from softstart.chain.model import Chain, is_chain
 from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
-from softstart.drive.data_sheet import DataSheet
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.input.documents import Table, parsed
 from softstart.input.files import ABSENT, Library, read_text, refusal_of
@@ -92,6 +92,12 @@ def count(least: int = 1, most: int = 10**15) -> Callable[..., Any]:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
+    found = _drive(name, settings)
+    return found.drive if isinstance(found, UnknownStiffness) else found
+
+
+def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
+    """The drive, at both ends where a data sheet has no stiffness."""
     if is_chain(name):
         remedy = f'"softstart reduce {name} --out DIR" writes the two masses that stand for it'
         raise InputError(f'"{name}": this is a chain, and a drive is needed here; {remedy}.')
@@ -110,9 +116,16 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
     )
     for doubt in found.doubts_of_motion:
         print(f"softstart: doubt: {doubt}", file=sys.stderr)
-    drive = found.drive.with_settings(settings) if settings else found.drive
     given = read_settings(settings, Drive.PARAMETERS)[0]
-    return drive if "assumed" in given else drive.replace(assumed=found.assumed_still(given))
+    ends = found.possible
+    drives = [
+        one.with_settings(settings) if settings else one
+        for one in (ends if isinstance(ends, UnknownStiffness) else (ends,))
+    ]
+    if "assumed" not in given:
+        drives = [one.replace(assumed=found.assumed_still(given)) for one in drives]
+    # a stiffness that is set as one of the drive leaves one end
+    return UnknownStiffness(*drives) if drives[0].stiffness != drives[-1].stiffness else drives[0]
 
 
 def _data_sheet(name: str) -> str | None:
@@ -126,6 +139,12 @@ def _data_sheet(name: str) -> str | None:
 
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
+    found = _machine(name, settings)
+    return found.drive if isinstance(found, UnknownStiffness) else found
+
+
+def _machine(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:
+    """The one drive, or the chain, asked for; a drive at both ends where a data sheet has no stiffness."""
     if is_chain(name):
         return Chain.load(name, also=read_changes(settings))
     known = (*drive_names(), *CHAINS.names())
@@ -134,16 +153,21 @@ def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
         raise InputError(
             f'"{name}": there is no such file, and no shipped drive or chain of this name; {hint}'
         )
-    return read_drive(name, settings)
+    return _drive(name, settings)
 
 
-def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Chain | Identification:
-    """The one drive, the chain, or the identification in a folder, with its changes."""
+def read_machine_or_identified(
+    name: str, settings: Sequence[str]
+) -> Drive | Chain | UnknownStiffness | Identification:
+    """The one drive, the chain, or the identification in a folder, with its changes.
+
+    A drive is at both ends where a data sheet has no stiffness.
+    """
     if name not in drive_names() and os.path.isfile(os.path.join(name, "identification.json")):
         from softstart.identification.result import Identification
 
         return Identification.load(name).with_settings(settings)
-    return read_machine(name, settings)
+    return _machine(name, settings)
 
 
 @contextmanager

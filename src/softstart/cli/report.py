@@ -153,7 +153,7 @@ def _printed(page: str, browser: str) -> bytes:
 def _sheet(made: Report, written: str) -> Sheet:
     """What is printed of a report: its answer, and what rounding does to each strategy."""
     from softstart.views.sheet import Sheet
-    from softstart.views.starts import machine_lines
+    from softstart.views.starts import both_ends, machine_lines
 
     notes = []
     for one in made.sheets:
@@ -164,4 +164,6 @@ def _sheet(made: Report, written: str) -> Sheet:
         exact, rounded = one.exact.k_dyn, one.rounded.k_dyn
         notes.append(f"{one.name}: K_dyn {exact:.4f} exact, {rounded:.4f} after rounding{off}")
     notes += [*(f"{name} was left out: {reason}" for name, reason in made.failed), f"Written to {written}."]
-    return Sheet("Report", machine_lines(made.drive), found=[made.answer], notes=notes)
+    return Sheet(
+        "Report", machine_lines(made.drive), found=[made.answer, *both_ends(made.comparison)], notes=notes
+    )

@@ -14,6 +14,7 @@ from softstart.cli import options
 from softstart.cli.options import reading
 from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.drive import PARAMETERS
+from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.quantities import multiple, to_si, values_in
 from softstart.views.markdown import kept_state
@@ -124,8 +125,8 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     "parts are saved at once, so that an interrupted command resumes."
 )
 def tune(
-    *, drive: Machine | Identification, controller: str, params: dict[str, str], only: str | None,
-    **asked: Any,
+    *, drive: Machine | Identification | UnknownStiffness, controller: str, params: dict[str, str],
+    only: str | None, **asked: Any,
 ) -> Answer:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
@@ -134,6 +135,8 @@ def tune(
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
     """
+    if isinstance(drive, UnknownStiffness):
+        drive = drive.drive  # gains for the stiff end; the result lists it among what is assumed
     asked |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
     with (
         kept_state(option_value("out"), STATE, "finished parts") as state,

@@ -30,7 +30,7 @@ from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, par
 from softstart.input.parameters import Mistake, Parameter, Wording, bare, without_unit
 from softstart.quantities import Units, shortest
 
-__all__ = ["DataSheet"]
+__all__ = ["BAND", "DataSheet", "UnknownStiffness"]
 
 # elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
 # K_dyn is the higher one, and results are compared with those of the soft end
@@ -95,6 +95,13 @@ def _maybe(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any
 def _nothing(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
     """A quantity that is 0 where it is not given."""
     return parameter(path, unit, meaning, example, "0 or more", default=0.0, **more)
+
+
+class UnknownStiffness(NamedTuple):
+    """A drive of unknown stiffness: at the stiff end of what is usual, and at the soft end."""
+
+    drive: Drive
+    soft: Drive
 
 
 class DataSheet(ParameterSet):
@@ -475,21 +482,26 @@ class DataSheet(ParameterSet):
             return 1.0 / sum(1.0 / one for one in parts.values()), f"in series, {_parts(parts)}{rigid}"
         frequency, of = self.elastic_frequency or BAND[1], self._motor_side
         c = (2.0 * math.pi * frequency) ** 2 * of.J1 * of.J2 / (of.J1 + of.J2)  # [G](8)
-        return c, f"elastic frequency {frequency:g} Hz{self._mark('stiffness')}"
+        soft = (
+            f"; {c * (BAND[0] / BAND[1]) ** 2:.5g} at {BAND[0]:g} Hz"
+            if self.elastic_frequency is None
+            else ""
+        )
+        return c, f"elastic frequency {frequency:g} Hz{self._mark('stiffness')}{soft}"
 
     @property
-    def ends(self) -> Mapping[str, Drive]:
-        """The drives at both ends of what an unknown stiffness may be, the stiff one first; else empty.
+    def possible(self) -> Drive | UnknownStiffness:
+        """The drive; where no stiffness is known, with that at the soft end of what it may be.
 
         >>> sheet = DataSheet(machine="rotor", rated_power=1e3, rated_speed=150, motor_inertia=0.01,
         ...     output_inertia=0.1)
-        >>> {end: round(drive.Omega / (2 * math.pi), 9) for end, drive in sheet.ends.items()}
-        {'30 Hz': 30.0, '3 Hz': 3.0}
+        >>> [round(drive.Omega / (2 * math.pi), 9) for drive in sheet.possible]
+        [30.0, 3.0]
         """
         if STIFFNESSES & self.given().keys():
-            return {}
-        soft = self.replace(elastic_frequency=BAND[0]).drive.replace(assumed=self.drive.assumed)
-        return {f"{BAND[1]:g} Hz": self.drive, f"{BAND[0]:g} Hz": soft}
+            return self.drive
+        soft = self.replace(elastic_frequency=BAND[0]).drive
+        return UnknownStiffness(self.drive, soft.replace(assumed=self.drive.assumed))
 
     @cached_property
     def _gaps(self) -> dict[str, float]:

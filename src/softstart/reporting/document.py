@@ -187,6 +187,7 @@ def document(report: Report) -> str:
         "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS,
         "geared": drive.gear is not None, "gear_in_words": gear_in_words(drive),
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
+        "ends": starts.both_ends(report.comparison),
         "doubts": doubts.doubts(drive), "units": units_of(drive), "most_torque": report.most_torque,
         "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
@@ -215,7 +216,7 @@ def strategies(report: Report) -> Table:
     rows, gear = report.ordered, report.drive.gear
     output = starts.Figure("at the\noutput\nN m", lambda row: gear.to_output(row.run.peak_torque, "N*m"))
     shown = (
-        *starts.GENTLE, *([output] if gear else []), *(starts.INTERVALS if rows[0].intervals else []),
+        *starts.GENTLE, *([output] if gear else []), *starts.of_the_unknown(rows),
         starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],
     )  # fmt: skip
     # a digit more than a terminal holds

@@ -20,6 +20,7 @@ from softstart.chain.model import Chain, load_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.input.files import write_whole
@@ -28,7 +29,14 @@ from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.sheet import Sheet, make_sheet
-from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compared, make_controllers
+from softstart.start.comparison import (
+    REFERENCE,
+    Comparison,
+    Uncertain,
+    as_far_as_known,
+    compared,
+    make_controllers,
+)
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
@@ -227,7 +235,7 @@ class Report:
 
 
 def report(
-    drive: Drive | Chain | Uncertain | str,
+    drive: Drive | Chain | Uncertain | DataSheet | UnknownStiffness | str,
     *,
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -241,9 +249,10 @@ def report(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification or str
-        A drive or chain, or the name or file of one, or an identification, whose figures have intervals. With
-        several gaps there are no maps, and each shaft has its figures.
+    drive : Drive, Chain, Identification, DataSheet or str
+        A drive or chain, or the name or file of one, or an identification, whose figures have intervals. Of
+        a data sheet without any stiffness both ends of what is usual are compared (`compare`). With several
+        gaps there are no maps, and each shaft has its figures.
     controllers : sequence of str or Controller, optional
         Names, files of tuned gains, or Controller objects. By default all installed controllers that need
         no parameter. `direct` is added as the reference if it is not among them.
@@ -286,11 +295,8 @@ def report(
     docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
-    drawn = None
-    if isinstance(drive, Uncertain):
-        drawn = drive.draws()
-        drive = drive.drive
-    machine: Any = load_machine(drive) if isinstance(drive, str | Path) else drive
+    known, drawn, soft = as_far_as_known(drive)
+    machine: Any = load_machine(known) if isinstance(known, str | Path) else known
     if not is_machine(machine):
         raise InputError(
             f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or a shipped name."
@@ -327,13 +333,17 @@ def report(
             progress(share, what)
 
     started: list[tuple[Controller, Row]] = []
+    at_soft_end: list[Row] = []
     maps: dict[str, RobustnessMap] = {}
     failed: list[tuple[str, str]] = []
     reference, what = simulate(machine, REFERENCE), machine.WHAT.removeprefix("a ")
+    soft_reference = None if soft is None else simulate(soft, REFERENCE)
     for number, one in enumerate(made):
         show(0.5 * number / len(made), f"starting the {what} under {label_of(one)}")
         try:
-            row = compared(machine, one, reference, drawn=drawn)
+            row = compared(machine, one, reference, drawn=drawn, soft=soft)
+            if soft is not None:
+                at_soft_end.append(compared(soft, one, soft_reference))
             if mapped:
                 maps[row.name] = robustness(machine, one)
             started.append((one, row))
@@ -342,7 +352,8 @@ def report(
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     rows = tuple(row for _, row in started)
-    choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case), maps)
+    there = None if soft is None else Comparison(soft, tuple(at_soft_end))
+    choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case, soft_end=there), maps)
     sheets: list[Sheet] = []
 
     def round_off() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import NormalDist
 from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
@@ -15,6 +15,7 @@ from softstart.chain.machines import Machine, one_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
+from softstart.drive.data_sheet import BAND, DataSheet, UnknownStiffness
 from softstart.drive.doubts import doubts
 from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
@@ -28,6 +29,7 @@ REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
 LEFT_POSSIBLE = "the upper end of 95 %"  # the case of a row whose drive is known within intervals
+SOFT_END = f"elastic frequency {BAND[0]:g} Hz"  # the case of a row whose drive is of unknown stiffness
 UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque", "start_time")
 FEWEST_KNOWN: Final = 0.9  # of the drives drawn whose start must have such a figure
 
@@ -99,6 +101,8 @@ class Comparison:
         The drive for which the strategies are set up, None where that is `drive` itself.
     worst_case : tuple of str
         The changes of the drive under which its limits must be kept as well.
+    soft_end : Comparison or None
+        The strategies set up for the soft end of what an unknown stiffness may be, and started there.
 
     Examples
     --------
@@ -118,6 +122,7 @@ class Comparison:
     rows: tuple[Row, ...]
     fitted_to: Drive | None = None
     worst_case: tuple[str, ...] = CASES
+    soft_end: Comparison | None = None
 
     def __repr__(self) -> str:
         """One line with the gentlest and the hardest start.
@@ -134,6 +139,12 @@ class Comparison:
         """What is recommended, and why."""
         return recommend(self.drive, self.rows)
 
+    @cached_property
+    def at_this_end(self) -> Recommendation:
+        """What is recommended if the stiffness is that of `drive`, whatever happens at the soft end."""
+        rows = (replace(row, worst_case=tuple({*row.worst_case} - {SOFT_END})) for row in self.rows)
+        return recommend(self.drive, tuple(rows))
+
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
         from softstart.views import sheet, starts
@@ -149,11 +160,12 @@ class Comparison:
             "recommendation": self.recommendation.summary(),
             "strategies": [row.summary() for row in self.rows],
             "doubts": doubts(self.drive),
+            **({} if self.soft_end is None else {"soft_end": self.soft_end.summary()}),
         }
 
 
 def compare(
-    drive: Machine | Uncertain | str = DEFAULT_DRIVE,
+    drive: Machine | Uncertain | DataSheet | UnknownStiffness | str = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -165,10 +177,12 @@ def compare(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification or str
+    drive : Drive, Chain, Identification, DataSheet or str
         One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
-        in `simulate`. With an identification each row has `intervals` over 200 drives that its
-        logs leave possible, and limits must be kept at their upper ends as well.
+        in `simulate`. Of a data sheet without any stiffness the stiff end of what is usual counts; limits
+        must be kept at the soft end as well, and `soft_end` compares the strategies as set up for that. With
+        an identification each row has `intervals` over 200 drives that its logs leave possible, and limits
+        must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
         Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
         installed controllers that need no parameter, and those that are given parameters.
@@ -209,11 +223,8 @@ def compare(
     ----------
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
-    drawn = None
-    if isinstance(drive, Uncertain):
-        drawn = drive.draws()
-        drive = drive.drive
-    drive = one_machine(drive)
+    known, drawn, soft = as_far_as_known(drive)
+    drive = one_machine(known)
     if fitted_to is not None and not is_machine(fitted_to):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
     counted = (
@@ -224,8 +235,20 @@ def compare(
         raise InputError(f"worst_case = {worst_case!r}: there are {named}; () is the drive as it is alone.")
     made = make_controllers(controllers, parameters or {})
     direct = simulate(drive, REFERENCE, until)
-    rows = tuple(compared(drive, one, direct, until, fitted_to, counted, drawn) for one in made)
-    return Comparison(drive, rows, fitted_to, rows[0].worst_case)
+    rows = tuple(compared(drive, one, direct, until, fitted_to, counted, drawn, soft) for one in made)
+    at_soft_end = None
+    if soft is not None:
+        at_soft_end = compare(soft, made, until=until, fitted_to=fitted_to, worst_case=counted)
+    return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end)
+
+
+def as_far_as_known(drive: Any) -> tuple[Any, Records | None, Drive | None]:
+    """The machine itself, the drives drawn where it is known within intervals, and that of the soft end."""
+    if isinstance(drive, DataSheet):
+        drive = drive.possible
+    if isinstance(drive, UnknownStiffness):
+        return drive.drive, None, drive.soft
+    return (drive.drive, drive.draws(), None) if isinstance(drive, Uncertain) else (drive, None, None)
 
 
 def make_controllers(
@@ -260,14 +283,19 @@ def compared(
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
     drawn: Records | None = None,
+    soft: Drive | None = None,
 ) -> Row:
     """The row of one controller; `direct` is the start that its times are compared with.
 
-    `drawn` are the drives that are left possible, where the drive is known within intervals.
+    `drawn` are the drives that are left possible, where the drive is known within intervals; `soft` is that
+    at the soft end of what an unknown stiffness may be.
     """
     run = simulate(drive, controller, until, fitted_to=fitted_to)
     _ = run.settled_time  # now, while what a controller prints is still caught
     cases = {case: changed_case(drive, controller, case, until, fitted_to) for case in CASES}
+    if soft is not None:
+        cases[SOFT_END] = _case(soft, drive, controller, until, fitted_to)
+        worst_case = (*worst_case, SOFT_END)
     if drawn is None:
         return Row(run, direct, cases, worst_case)
     found = intervals(run, drawn, controller, until, fitted_to)
@@ -286,6 +314,13 @@ def changed_case(
 ) -> Case:
     """A controller set up for `drive` with 4 times its gap, or 0.4 of its load inertia."""
     changed = drive.changed(gaps=WORN_GAP) if case == "gap x4" else drive.changed(load_inertia=LIGHT_INERTIA)
+    return _case(changed, drive, controller, until, fitted_to)
+
+
+def _case(
+    changed: Machine, drive: Machine, controller: Controller, until: float | None, fitted_to: Drive | None
+) -> Case:
+    """A controller set up for `drive` or `fitted_to` on a drive that is another one."""
     try:
         return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:

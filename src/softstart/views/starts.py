@@ -8,10 +8,11 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
+from softstart.drive.data_sheet import BAND
 from softstart.drive.doubts import doubts
-from softstart.start.comparison import Comparison
+from softstart.start.comparison import SOFT_END, Comparison
 from softstart.start.metrics import SETTLED_BAND
-from softstart.start.recommendation import Row, checked_limits
+from softstart.start.recommendation import Recommendation, Row, checked_limits
 from softstart.start.run import SETTLING_PERIODS, Run
 from softstart.views.drawing import (
     COLOURS,
@@ -375,8 +376,7 @@ def comparison_table(
     rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "", bold: Sequence[int] = ()
 ) -> Table:
     """The strategies and these figures, by default all; beside K_dyn also flags and limits, where needed."""
-    uncertain = INTERVALS if rows[0].intervals else ()
-    figures = figures or (*GENTLE, *QUICK, *uncertain, *TIMES, *at_details(rows[0].run.drive))
+    figures = figures or (*GENTLE, *QUICK, *of_the_unknown(rows), *TIMES, *at_details(rows[0].run.drive))
     judged = GENTLE[0] in figures
     cells = {"strategy": [row.marked if judged else row.name for row in rows]}
     for heading, of, decimals, digits in figures:
@@ -387,6 +387,40 @@ def comparison_table(
     if judged and any(row.against_limits for row in rows):
         cells["limits"] = [row.against_limits for row in rows]
     return Table.of(title, cells, ("strategy", "limits"), bold=bold)
+
+
+def at_soft_end(rows: Sequence[Row]) -> tuple[Figure, ...]:
+    """K_dyn at the soft end of an unknown stiffness, if it is unknown."""
+    heading = f"K\n{BAND[0]:g} Hz"
+    figure = Figure(heading, lambda row: row.cases[SOFT_END].k_dyn, 3)
+    return (figure,) if SOFT_END in rows[0].cases else ()
+
+
+def of_the_unknown(rows: Sequence[Row]) -> tuple[Figure, ...]:
+    """What is shown besides of a drive that is known within intervals, or whose stiffness is unknown."""
+    return INTERVALS if rows[0].intervals else at_soft_end(rows)
+
+
+def both_ends(comparison: Comparison) -> list[str]:
+    """How the choice differs between both ends of an unknown stiffness; nothing where it is known."""
+    if comparison.soft_end is None:
+        return []
+    stiff, soft = comparison.at_this_end, comparison.soft_end.recommendation
+    same = [row.name for row in stiff.shown] == [row.name for row in soft.shown]
+    return [
+        "No stiffness is known. Strategies are set up for the stiff end of what is usual, elastic frequency "
+        f"{BAND[1]:g} Hz; K {BAND[0]:g} Hz: so set up at the soft end, where limits must be kept as well.",
+        f"If it is {BAND[1]:g} Hz: {_chosen(stiff)}. If it is {BAND[0]:g} Hz, and set up for it: "
+        f"{_chosen(soft)}. The choice {'is the same at both ends' if same else 'depends on the stiffness'}. "
+        "Give shaft.elastic_frequency, from the swing of the speed in a log, or a stiffness.",
+    ]
+
+
+def _chosen(choice: Recommendation) -> str:
+    """The strategies that a recommendation shows, with their K_dyn."""
+    word = "unbeaten" if choice.recommended is None else "recommended"
+    shown = [f"{row.name} (K_dyn {row.run.k_dyn:.3f})" for row in choice.shown]
+    return f"{word} {', '.join(shown)}" if shown else "no strategy keeps the limits"
 
 
 INTERVALS_NOTE = (
@@ -478,7 +512,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     """What is shown of a comparison; `rows` are its rows in another order."""
     machine, rows = comparison.drive, rows or comparison.rows
     bold = [rows.index(row) for row in comparison.recommendation.shown]
-    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*GENTLE, *QUICK))]
+    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*GENTLE, *at_soft_end(rows), *QUICK))]
     if rows[0].intervals:
         parts.append(("Intervals of 95 %", INTERVALS))
     if details:
@@ -501,7 +535,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),
         tables=[comparison_table(rows, which, title, bold) for title, which in parts],
-        found=[comparison.recommendation.text],
+        found=[comparison.recommendation.text, *both_ends(comparison)],
         notes=[
             *(definitions(comparison) if details else [f"{LEGEND} More: --details."]),
             *remarks(comparison),

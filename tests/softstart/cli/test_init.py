@@ -225,3 +225,45 @@ def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     assert "assumed:" not in run("simulate", "sheet.toml", "--controller", "direct", "--set", "damping=1").out
     code, _, err = run("simulate", "sheet.toml", "--controller", "direct", "--set", "gear.backlash=16")
     assert (code, 'write "16 arcmin"' in err) == (2, True)
+
+
+@pytest.fixture
+def unknown(place):
+    """A data sheet without any stiffness."""
+    settings = {path: text for path, text in (SLEWING | UNITS).items() if path != "gear.stiffness"}
+    (place / "sheet.toml").write_text(DataSheet.from_settings(settings).to_toml())
+
+
+@pytest.mark.usefixtures("unknown")
+@pytest.mark.parametrize(
+    "also", ["shaft.elastic_frequency=8 Hz", "gear.stiffness=1.1e6", "shaft.stiffness=700"]
+)
+def test_an_unknown_stiffness_is_compared_at_both_ends(run, also):
+    """Until one is given: in the sheet, or as that of the drive."""
+    compare = ("compare", "sheet.toml", "--controllers", "direct")
+    code, out, _ = run(*compare)
+    assert (code, "No stiffness is known." in out) == (0, True)
+    assert "If it is 30 Hz: unbeaten direct" in " ".join(out.split())
+    out = run(*compare, "--set", also).out
+    assert "stiffness is known" not in out
+    assert "elastic frequency" not in out
+
+
+@pytest.mark.slow  # starts of all strategies at both ends
+@pytest.mark.usefixtures("unknown")
+def test_init_says_how_the_choice_depends_on_an_unknown_stiffness(run):
+    code, out, err = run("init", "sheet.toml", "--out", "mine.toml")
+    assert code == 0
+    assert "softstart: If it is 30 Hz: unbeaten" in err
+    assert "What next: softstart compare sheet.toml" in " ".join(out.split())  # which has both ends
+    assert Drive.load("mine.toml").assumed.startswith("elastic frequency 30 Hz")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unknown")
+def test_a_report_says_how_the_choice_depends_on_an_unknown_stiffness(run, place):
+    found = run("report", "sheet.toml", "--controllers", "direct,ramp", "--budget", "0", "--out", "r.html")
+    assert "No stiffness is known." in found.out
+    text = (place / "r.html").read_text()
+    assert "Strategies are set up for the stiff end of what is usual" in text
+    assert "The choice" in text
