@@ -136,12 +136,15 @@ class Shaft(ParameterSet):
 
     # fmt: off
     stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness", '"368 N*m/rad"', "above 0",
-        default=None, infinite=True, kw_only=False)
+        default=None, infinite=True, kw_only=False,
+        at_output="side")
     damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping", '"1.5 N*m*s/rad"', "0 or more",
-        default=0.0)
+        default=0.0,
+        at_output="side")
     damping_ratio: MaybeNumber = parameter("shaft.damping_ratio", "1",
         "damping ratio of its two masses alone, instead of `damping`", "0.02", "0 or more", default=None)
-    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None)
+    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None,
+        at_output="side")
     backlash: MaybeNumber = parameter("shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"',
         "0 or more", default=None)
     diameter: MaybeNumber = parameter("shaft.diameter", "m", "pitch diameter", '"185 mm"', "above 0",
@@ -157,9 +160,11 @@ class Shaft(ParameterSet):
     contact_law: ContactLaw = parameter("shaft.contact_law", "", "law of the torque in contact", '"no-pull"',
         default="no-pull", choices=get_args(ContactLaw))
     permissible_torque: MaybeNumber = parameter("shaft.permissible_torque", "N*m",
-        "permissible peak torque of shaft, coupling or gear", '"800 N*m"', "above 0", default=None)
+        "permissible peak torque of shaft, coupling or gear", '"800 N*m"', "above 0", default=None,
+        at_output="side")
     start_position: MaybeNumber = parameter("shaft.start_position", "rad",
-        "twist at the start (0 is mid-gap); else by `start.position`", '"0 rad"', default=None)
+        "twist at the start (0 is mid-gap); else by `start.position`", '"0 rad"', default=None,
+        at_output="side")
     # fmt: on
 
     def contradictions(self) -> Iterable[str]:

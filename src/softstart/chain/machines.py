@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from softstart.drive import Drive
 from softstart.drive.checks import BROADCAST
 from softstart.drive.records import Columns, Records, is_machine
 from softstart.errors import InputError
-from softstart.input.parameters import Parameter, Wording, read_value
-from softstart.quantities import RefusedError, nearest, show
+from softstart.input.gear import alike
+from softstart.input.parameters import Parameter, Wording, at_motor, read_value
+from softstart.quantities import RefusedError, nearest, parse, show
 
 Machine = Drive | Chain
 SINGLE = "records: all fields are single values; give a list for one, as gap=[0.5, 2.0]."
@@ -83,6 +85,41 @@ def varied(machine: Machine | Records, values: Mapping[str, Any]) -> Records:
     return _records(machine, values, Columns.with_gap if "gap" in values else Columns.replace)
 
 
+def quantity_of(machine: Machine, key: str, given: object, name: str) -> float:
+    """A value of a parameter of a machine, by its word there, in SI at the motor shaft; also "... at output".
+
+    Raises `InputError`, a sentence that begins with `name`.
+
+    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=40)
+    >>> quantity_of(crane, "gap", "0.01 rad at output", "gaps"), quantity_of(crane, "gap", "2 rad", "gaps")
+    (0.4, 2.0)
+    """
+    knob = machine.knob(key)
+    assert knob is not None
+    p = knob.parameter
+    try:
+        number = parse(at_motor(p, given, machine.gear or machine.NO_GEAR), p.unit)
+        if not isinstance(number, float):
+            raise RefusedError(f"the {p.meaning} is one number, not a list")
+        return number
+    except RefusedError as refusal:
+        raise InputError(f"{name} = {show(given)}: {refusal.reason}.") from None
+
+
+def listed_of(given: Any, name: str) -> list[Any]:
+    """The values of a list, or the one that is none; "at output" stands behind each of them, or behind none.
+
+    >>> listed_of("1x", "gaps"), listed_of([0.5, "2x"], "gaps")
+    (['1x'], [0.5, '2x'])
+    """
+    listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
+    try:
+        alike(listed)
+    except RefusedError as refusal:
+        raise InputError(f"{name} = {show(listed)}: {refusal.reason}.") from None
+    return listed
+
+
 def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Columns]) -> Records:
     if not isinstance(machine, Records):
         machine = one_machine(machine)
@@ -109,7 +146,7 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
             wrong.append(f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}")
             continue
         try:
-            read[found.name] = read_value(found.parameter, value, batch=True)
+            read[found.name] = read_value(found.parameter, value, batch=True, gear=chain.NO_GEAR)
         except RefusedError as refusal:
             wording = Wording(written={found.parameter.name: key})
             wrong.append(wording.refused(found.parameter, value, refusal))

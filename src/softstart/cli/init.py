@@ -65,7 +65,8 @@ def init(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_js
         with named_as_options(output="--out"):
             write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
-        print_json({"data_sheet": found.values(), "drive": drive.values(), "doubts": found.doubts})
+        values = {"data_sheet": found.values(), "drive": drive.values(), "at_output": drive.at_output}
+        print_json({**values, "doubts": found.doubts})
         return
     for one in found.doubts:
         print(f"softstart: doubt: {one}", file=sys.stderr)

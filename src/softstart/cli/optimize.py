@@ -14,6 +14,7 @@ from softstart.cli import options
 from softstart.cli.options import quantity, reading
 from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
 from softstart.errors import InputError, SimulationError
+from softstart.input.gear import BEHIND
 from softstart.optimal.problem import OBJECTIVES, TERMINALS, StartTime
 from softstart.quantities import to_si, values_in
 from softstart.views.markdown import kept_state
@@ -50,10 +51,11 @@ def _start_time(text: str, option: str) -> str:
 
 
 def _each(unit: str) -> Callable[..., Any]:
-    """The callback of an option that is quantities with commas between."""
+    """The callback of an option that is quantities with commas between; "... at output" is read later."""
 
-    def read(text: str, option: str) -> list[float]:
-        return [float(to_si(one, unit, name=option)) for one in values_in(text, option)]
+    def read(text: str, option: str) -> list[float | str]:
+        each = values_in(text, option)
+        return [one if BEHIND.fullmatch(one) else float(to_si(one, unit, name=option)) for one in each]
 
     return reading(read)
 
@@ -133,8 +135,8 @@ def _no_solution() -> Iterator[None]:
 @options.of_drive(options.read_machine)
 @answers("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
 def optimize(
-    *, drive: Machine, gaps: Sequence[float] | None, inertias: Sequence[float] | None,
-    load_torques: Sequence[float] | None, **given: Any,
+    *, drive: Machine, gaps: Sequence[float | str] | None, inertias: Sequence[float | str] | None,
+    load_torques: Sequence[float | str] | None, **given: Any,
 ) -> Answer:  # fmt: skip
     """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
@@ -145,7 +147,8 @@ def optimize(
     bounds = {name: value for name, value in given.items() if value is not None}
     varied = {"gaps": gaps or (), "inertias": inertias or (), "load_torques": load_torques or ()}
     with _no_solution(), working("looking for the gentlest start ..."):
-        others = softstart.scenarios_of(drive, **varied)[1:]
+        with options.named_as_options():
+            others = softstart.scenarios_of(drive, **varied)[1:]
         best = softstart.optimize(drive, scenarios=others, **bounds)
     with working("starting the drive under the shipped controllers ..."):
         beside = [] if others else _runs_beside(best)

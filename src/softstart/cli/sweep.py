@@ -16,6 +16,7 @@ from softstart.cli.completion import one_of
 from softstart.cli.running import Answer, answers, attributed, option_value, working
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.input.gear import BEHIND
 from softstart.quantities import values_in
 from softstart.views.markdown import kept_state
 
@@ -151,11 +152,11 @@ def read_axes(texts: Sequence[str], recipe: Recipe, machine: Machine) -> dict[st
 def _read(key: str, text: str, subject: Subject) -> tuple[str, Any]:
     """The name and the values of an axis."""
 
-    def end(part: str) -> tuple[float, str]:
+    def end(part: str) -> tuple[float, object]:
         read = subject.coordinate(key, [part])
         if read.dtype.kind == "U":
             raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
-        return float(read.values[0]), str(read.name)
+        return float(read.values[0]), (read.name, BEHIND.fullmatch(part) is not None)
 
     name = subject.name_of(key)
     if text.count(":") not in (2, 3) or name == "controller" or ".py" in text:

@@ -16,6 +16,7 @@ from softstart.cli.running import Answer, answers, attributed, make_controllers,
 from softstart.drive import PARAMETERS
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
+from softstart.input.gear import BEHIND
 from softstart.quantities import multiple, to_si, values_in
 from softstart.views.markdown import kept_state
 
@@ -32,12 +33,16 @@ def read_grid(text: str, option: str, unit: str) -> list[Any]:
 
     >>> read_grid("0.5, 2x", "--gaps", "rad"), read_grid("0.5:2:4", "--gaps", "rad")
     ([0.5, '2.0x'], [0.5, 1.0, 1.5, 2.0])
-    >>> read_grid("2J1:5J1:3", "--inertias", "kg*m^2")
-    ['2.0J1', '3.5J1', '5.0J1']
+    >>> read_grid("2J1:5J1:3", "--inertias", "kg*m^2"), read_grid("0.01 rad at output", "--gaps", "rad")
+    (['2.0J1', '3.5J1', '5.0J1'], ['0.01 rad at output'])
     """
 
     def read(part: str) -> tuple[float, str]:
-        return multiple(part, option, ("x", "J1")) or (float(to_si(part, unit, name=option)), "")
+        there = BEHIND.fullmatch(part)  # of the gear of the drive, which is read later
+        if (found := multiple(part, option, ("x", "J1"))) is not None:
+            return found
+        value = float(to_si(there[1] if there else part, unit, name=option))
+        return value, f" {unit} at output" if there else ""
 
     found = options.read_values(text, option, read, LARGEST_GRID)
     return [f"{float(f'{one:.12g}')!r}{ending}" if ending else float(f"{one:.12g}") for one, ending in found]
@@ -84,7 +89,8 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 )
 @click.option("--gaps", metavar="GAP,...", callback=_grid("rad"),
     help="Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as "
-    "0.5:2:7; of a chain the sum of all gaps. Default: 0.5x,1x,2x,4x.")  # fmt: skip
+    "0.5:2:7; with a gear also '9 arcmin at output'; of a chain the sum of all gaps. Default: "
+    "0.5x,1x,2x,4x.")  # fmt: skip
 @click.option("--inertias", metavar="INERTIA,...", callback=_grid("kg*m^2"),
     help="Load inertias, likewise; also multiples of the motor's, 2J1:5J1:4. Default: 0.4x,1x,2x."
 )  # fmt: skip

@@ -53,9 +53,9 @@ def doubts(machine: Any) -> list[str]:
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; its damping ratio at most 1; gap at most half a turn of the
     motor; J2/J1 0.01 to 100; speed at most 10,000 rpm; start under the starting torque,
-    (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of direct at the first contact,
-    [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
-    below 1 before the larger inertia. A chain counts by the lever rule.
+    (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of direct at the first contact, [G](16) and (18), at most
+    8; Ms 0.5 to 6 times the rated torque; permissible torques at most 10 Ms, which no start comes near; no
+    ratio below 1 before the larger inertia. A chain counts by the lever rule.
 
     >>> from softstart.drive import Drive
     >>> crane = Drive.load("crane-4amtkf")
@@ -64,7 +64,10 @@ def doubts(machine: Any) -> list[str]:
     >>> doubts(crane.replace(target_speed=1460))[0][:25]
     'speed 13,942 rpm, where m'
     """
-    return [*_doubts(machine.lumped), *_not_the_rated_torque(machine.motor), *_nothing_holds(machine)]
+    return [
+        *_doubts(machine.lumped), *_not_the_rated_torque(machine.motor), *_permits_anything(machine),
+        *_nothing_holds(machine),
+    ]  # fmt: skip
 
 
 def doubts_of_motion(
@@ -177,6 +180,21 @@ def _not_the_rated_torque(motor: Any) -> Iterator[str]:
             f"starting torque {times:.4g} times the rated torque, where motors have 0.5 to 6 times: a ratio "
             "in per cent, rpm written as rad/s, or kW written as W?"
         )
+
+
+def _permits_anything(machine: Any) -> Iterator[str]:
+    """A permissible torque that decides nothing: mostly that of the output of a gear, taken at the motor."""
+    if machine.motor is None:
+        return
+    most, several = machine.permissible_torques.tolist(), len(machine.shaft_names) > 1
+    for name, torque in zip(machine.shaft_names, most, strict=True):
+        if (times := torque / float(machine.motor.starting_torque)) > 10.0:
+            of, side = (f"of {name}", "shaft.side") if several else ("of the shaft", "limits.output_torque")
+            yield (
+                f"permissible torque {of} {torque:.4g} N m at the motor shaft, {times:.4g} times the "
+                "starting torque, where shafts have up to 10 times: that at the other side of a gear "
+                f"({side}), or a wrong unit?"
+            )
 
 
 def _nothing_holds(machine: Any) -> Iterator[str]:

@@ -600,7 +600,8 @@ class Drive(ParameterSet):
         """What a summary of a start says of the machine."""
         both = self.load_kind == "active" and np.any(self.load_friction > 0.0)
         kind = "active and reactive" if both else self.load_kind
-        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": kind}
+        there = {} if self.gear is None else {"at_output": self.at_output}
+        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": kind, **there}
 
     def columns_of(self, states: Mapping[str, Vector]) -> dict[str, Vector]:
         """The states of a start under the headings of a table."""

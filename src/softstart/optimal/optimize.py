@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from softstart.chain.machines import Machine, one_machine
+from softstart.chain.machines import Machine, listed_of, one_machine, quantity_of
 from softstart.controller import ready_controller_names
 from softstart.drive import Limits
 from softstart.drive.limits import Limit
@@ -668,9 +668,9 @@ def _kept(
 def scenarios_of(
     drive: Machine,
     *,
-    gaps: Iterable[float] = (),
-    inertias: Iterable[float] = (),
-    load_torques: Iterable[float] = (),
+    gaps: Iterable[float | str] = (),
+    inertias: Iterable[float | str] = (),
+    load_torques: Iterable[float | str] = (),
 ) -> tuple[Machine, ...]:
     """The full grid of a machine's gaps, load inertias and load torques.
 
@@ -678,11 +678,12 @@ def scenarios_of(
     ----------
     drive : Drive or Chain
         The machine; it comes first, also where it is not on the grid, since K_dyn refers to it.
-    gaps : iterable of float
-        Gaps, rad; the machine's own where the list is left out, as of the others.
-    inertias : iterable of float
+    gaps : iterable of float or str
+        Gaps, rad, or texts with a unit, as "9 arcmin at output"; the machine's own where the list is left
+        out, as of the others.
+    inertias : iterable of float or str
         Load inertias, kg m2.
-    load_torques : iterable of float
+    load_torques : iterable of float or str
         Load torques, N m.
 
     Returns
@@ -709,7 +710,8 @@ def scenarios_of(
     docs/optimal-starts.md.
     """
     given = {"gap": gaps, "load_inertia": inertias, "load_torque": load_torques}
-    axes = {name: _values(name, values) for name, values in given.items()}
+    names = dict(zip(given, ("gaps", "inertias", "load_torques"), strict=True))
+    axes = {key: _values(drive, key, names[key], values) for key, values in given.items()}
     used = {name: values for name, values in axes.items() if values}
     grid = [
         drive.with_values(dict(zip(used, each, strict=True))) for each in itertools.product(*used.values())
@@ -717,8 +719,7 @@ def scenarios_of(
     return tuple(dict.fromkeys((drive, *(grid if used else ()))))
 
 
-def _values(name: str, given: Iterable[float]) -> list[float]:
-    try:
-        return list(dict.fromkeys(float(value) for value in given))
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {given!r}: give a list of numbers in SI units.") from None
+def _values(drive: Machine, key: str, name: str, given: Iterable[float | str]) -> list[float]:
+    if isinstance(given, str) or not hasattr(given, "__iter__"):
+        raise InputError(f"{name} = {given!r}: give a list of numbers in SI units, or of texts with a unit.")
+    return list(dict.fromkeys(quantity_of(drive, key, one, name) for one in listed_of(given, name)))

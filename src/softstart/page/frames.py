@@ -371,7 +371,7 @@ def machine_fields(session: Session, known: Mapping[str, Entry], units: Units) -
 
 def figure(session: Session, found: Strategy, units: Units) -> Frame:
     """The large figure and the numbers around it."""
-    run, gear = found.run, session.machine.gear
+    run = found.run
     facts = outcomes(found) | {
         "time_lost": number(session.time_lost(found)),
         "status": found.status,
@@ -381,7 +381,7 @@ def figure(session: Session, found: Strategy, units: Units) -> Frame:
     if run is not None:
         facts |= {
             "reached": math.isfinite(run.start_time),
-            "output_torque": number(math.nan if gear is None else gear.to_output(run.peak_torque, "N*m")),
+            "output_torque": number(run.peak_torque_at_output),
             "contacts": run.contacts,
             "impact_speed": number(units.shown(getattr(run, "impact_speed", math.nan), "rad/s")),
             "position": "".join(position_notes([run])),

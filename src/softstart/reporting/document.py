@@ -214,7 +214,7 @@ def inverters() -> dict[str, Any]:
 def strategies(report: Report) -> Table:
     """The figures of all strategies, the gentlest first."""
     rows, gear = report.ordered, report.drive.gear
-    output = starts.Figure("at the\noutput\nN m", lambda row: gear.to_output(row.run.peak_torque, "N*m"))
+    output = starts.Figure("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
     shown = (
         *starts.GENTLE, *([output] if gear else []), *starts.of_the_unknown(rows),
         starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],

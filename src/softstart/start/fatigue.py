@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import quantity_of
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
@@ -546,7 +547,7 @@ def _curve(machine: Any, slope: float | None) -> tuple[SNCurve, bool]:
 def _read_gap(worn_gap: float | str | None, machine: Any) -> float:
     if worn_gap is None:
         return math.nan
-    gap, own = float(to_si(worn_gap, "rad", name="worn_gap")), float(machine.gaps.sum())
+    gap, own = quantity_of(machine, "gap", worn_gap, "worn_gap"), float(machine.gaps.sum())
     if not gap > own:
         raise InputError(
             f"worn_gap = {worn_gap}: wear widens the gap; give one above that of the machine, {own:.6g} rad."

@@ -257,6 +257,12 @@ class Run(Shown, sheet="starts.run_sheet"):
         return float(self.peak_torques[self.worst_shaft])
 
     @property
+    def peak_torque_at_output(self) -> float:
+        """The same at the output of the gear of the drive, with its losses, N m; NaN without a gear."""
+        gear = self.drive.gear
+        return math.nan if gear is None else float(gear.to_output(self.peak_torque, "N*m"))
+
+    @property
     def peak_time(self) -> float:
         """When that is, s."""
         return float(self.peak_times[self.worst_shaft])
@@ -608,6 +614,7 @@ class Run(Shown, sheet="starts.run_sheet"):
             "worst_shaft": self.drive.shaft_names[self.worst_shaft],
             "utilisation": [None if math.isnan(one) else one for one in self.utilisation.tolist()],
             "peak_torque": self.peak_torque,
+            **({} if self.drive.gear is None else {"peak_torque_at_output": self.peak_torque_at_output}),
             "peak_time": self.peak_time,
             "peak_torques": self.peak_torques.tolist(),
             "peak_times": self.peak_times.tolist(),

@@ -19,6 +19,7 @@ from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.errors import InputError, Mistakes
+from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, meant_by, read_value
 from softstart.quantities import RefusedError, multiplied, nearest, show
 
@@ -148,8 +149,10 @@ class Subject:
                     read_value(parameter, given)
                 return texts, "", parameter.meaning
             own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
+            alike(values)
             given = [multiplied(value, key, own) for value in values]
-            read = np.float64(read_value(parameter, given, batch=True))
+            through = self.machine.gear or self.machine.NO_GEAR
+            read = np.float64(read_value(parameter, given, batch=True, gear=through))
         except RefusedError as reason:
             raise InputError(Wording(written={name: key}).refused(parameter, given, reason)) from None
         return read, parameter.unit, parameter.meaning

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from softstart.chain.machines import Machine
 
 What = Literal["schedule", "robust"]
+SAME = 1e-9  # within this share two values are one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,11 +134,33 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
         """The controller that takes its gains from the schedule. InputError if none was asked for."""
         return scheduled(self._schedule_file(), "schedule", self.question.recipe.make())
 
+    @property
+    def doubts(self) -> list[str]:
+        """Sentences on what can hardly be meant: a drive that is not within the gaps and inertias tuned over.
+
+        >>> from softstart import tune
+        >>> options = {"free": ["torque"], "certified": False, "generations": 1, "restarts": 1}
+        >>> tuned = tune("crane-4amtkf", "reduced-first-stage", [0.01], ["1x"], **options)
+        >>> tuned.doubts[0][:75]
+        'the gap of the drive, 0.5 rad, lies outside those tuned over, 0.01 rad: wha'
+        """
+        q, (gap, inertia) = self.question, self.drive.gap_and_inertia
+        return [
+            f"the {name} of the drive, {own:.5g} {unit}, lies outside those tuned over, "
+            f"{' to '.join(dict.fromkeys(f'{one:.5g}' for one in (axis[0], axis[-1])))} {unit}: what is said "
+            'of the gains is not said of this drive. Values at the output of a gear are written "at output".'
+            for name, unit, own, axis in (
+                ("gap", "rad", gap, q.gaps), ("load inertia", "kg m2", inertia, q.load_inertias)
+            )
+            if not axis[0] * (1.0 - SAME) <= own <= axis[-1] * (1.0 + SAME)
+        ]  # fmt: skip
+
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
         tables = {name: getattr(self, name) for name in ("schedule", "price", "between")}
         return {
             **self._asked(),
+            "doubts": self.doubts,
             "controller": self.controller,
             "given": given_to(self.question.recipe.make()),
             "free": {one.name: one.text() for one in self.question.ranges},

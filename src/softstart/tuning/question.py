@@ -6,13 +6,12 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
-from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import Machine
+from softstart.chain.machines import Machine, listed_of, quantity_of
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
@@ -132,7 +131,8 @@ INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia
 def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[float, ...]:
     """Gaps in rad, rising: numbers, texts with a unit, or multiples of the drive's own as "2x".
 
-    Those of a chain are the sum of all its gaps at the motor shaft, widened alike.
+    Those of a chain are the sum of all its gaps at the motor shaft, widened alike. Of a drive with a gear
+    also "9 arcmin at output".
 
     >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
     (0.5, 0.5235987755982988, 1.0)
@@ -144,7 +144,7 @@ def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[floa
                 f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
             )
         given = [f"{factor}x" for factor in GAP_MULTIPLES]
-    return _axis(given, name, "rad", {"x": own}, lambda gap: drive.moved(gap, inertia))
+    return _axis(drive, "gap", given, name, {"x": own}, lambda gap: drive.moved(gap, inertia))
 
 
 def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tuple[float, ...]:
@@ -156,20 +156,20 @@ def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tu
     gap, own = drive.gap_and_inertia
     given = [f"{factor}x" for factor in INERTIA_MULTIPLES] if given is None else given
     units = {"x": own, "J1": drive.motor_at_load}
-    return _axis(given, name, "kg*m^2", units, lambda inertia: drive.moved(gap, inertia))
+    return _axis(drive, "load_inertia", given, name, units, lambda inertia: drive.moved(gap, inertia))
 
 
 def _axis(
-    given: Any, name: str, unit: str, units: dict[str, float], check: Callable[[float], object]
+    drive: Machine, key: str, given: Any, name: str, units: dict[str, float], check: Callable[[float], object]
 ) -> tuple[float, ...]:
-    """Values in SI, each once, rising."""
-    listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
+    """Values of a parameter in SI, each once, rising."""
+    listed = listed_of(given, name)
     if not listed:
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
     found, wrong = set[float](), Mistakes()
     for one in listed:
         with wrong.noted():
-            found.add(value := float(to_si(multiplied(one, name, units), unit, name=name)))
+            found.add(value := quantity_of(drive, key, multiplied(one, name, units), name))
             with wrong.noted(f"{name}: "):
                 check(value)
     wrong.settle()
@@ -213,7 +213,7 @@ def scenarios_of(
     for name, given in (tolerances or {}).items():
         with wrong.noted("tolerances: "):
             knob = _knob(drive, name)
-            levels[knob.name] = _levels(knob, given)
+            levels[knob.name] = _levels(drive, knob, given)
             for level in levels[knob.name]:
                 drive.with_values({knob.name: level.of(knob.value)})
     wrong.settle()
@@ -257,16 +257,17 @@ def _knob(drive: Machine, name: str) -> Knob:
     raise InputError(f"{name} is not a quantity of a {drive.KIND}; {hint}")
 
 
-def _levels(knob: Knob, given: Any) -> list[Level]:
-    name, unit = knob.name, knob.parameter.unit
+def _levels(drive: Machine, knob: Knob, given: Any) -> list[Level]:
+    name = knob.name
     if isinstance(given, list | tuple | np.ndarray):
-        return [Level(0.0, float(value)) for value in np.atleast_1d(to_si(list(given), unit, name=name))]
+        each = listed_of(given, name)
+        return [Level(0.0, quantity_of(drive, name, one, name)) for one in each]
     if isinstance(given, str) and given.strip().endswith("%"):
         share = 0.01 * float(to_si(given.strip()[:-1], "1", name=name))
         if not 0.0 < share < 1.0:
             raise InputError(f'{name} = "{given}": give a share above 0 % and below 100 %.')
         return [Level(1.0 - share, 0.0), Level(1.0 + share, 0.0)]
-    spread = float(to_si(given, unit, name=name))
+    spread = quantity_of(drive, name, given, name)
     if not spread > 0.0:
         raise InputError(f"{name} = {given}: give how far it may be off, above 0.")
     return [Level(1.0, -spread), Level(1.0, spread)]

@@ -86,7 +86,8 @@ def tune(
         A name, `path/to/file.py:ClassName`, or an object.
     gaps, inertias : iterable, optional
         Gaps in rad and load inertias in kg m2: numbers, texts with a unit, multiples of the drive's own as
-        "2x", or inertias as multiples of the motor's as "5 J1". By default 0.5, 1, 2 and 4 times its gap, and
+        "2x", or inertias as multiples of the motor's as "5 J1"; of a drive with a gear also "9 arcmin at
+        output". By default 0.5, 1, 2 and 4 times its gap, and
         0.4, 1 and 2 times its load inertia. Those of a chain are the sum of all its gaps at the motor shaft,
         widened alike, and the inertia of its load mass.
     parameters : mapping, optional

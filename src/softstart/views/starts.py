@@ -449,6 +449,10 @@ def definitions(comparison: Comparison) -> list[str]:
     if checked_limits(comparison.drive):
         cases = ", ".join(("the machine as it is", *comparison.worst_case))
         found.append(f"limits: the least margin in the worst of {cases}.")
+        if comparison.drive.limits.output_torque is not None:
+            found.append(
+                "output torque: that of the shaft times the gear ratio, without losses, the safe side."
+            )
     if comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")
     return found
@@ -552,4 +556,8 @@ def _record(row: Row) -> Mapping[str, Any]:
     """The figures of a strategy under the names of JSON, each limit with a column of its own."""
     found = row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)}
     found |= {f"margin_{one['limit'].replace(' ', '_')}": one["margin"] for one in found.get("limits", ())}
-    return {key: value for key, value in found.items() if key not in ("parameters", "status_text", "limits")}
+    return {
+        key: value
+        for key, value in found.items()
+        if key not in ("parameters", "status_text", "limits", "at_output")
+    }

@@ -164,6 +164,7 @@ def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
     name, metric, table, price = tuning.metric, _metric(tuning), tuning.schedule, tuning.price
     one, found = tuning.robust, list[str]()
+    found += [f"Doubt: {one}" for one in tuning.doubts]
     shares = list[tuple[str, Any, Any]]()
     if table is not None:
         late, before = int((~table["in_time"]).sum()), _between(table[f"{name}_default"])

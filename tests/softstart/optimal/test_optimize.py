@@ -371,7 +371,7 @@ def test_the_grid_of_scenarios() -> None:
     assert grid[0] == CRANE
     assert len(set(grid)) == 8
     assert scenarios_of(CRANE) == (CRANE,)
-    with pytest.raises(InputError, match="gap = 3: give a list of numbers"):
+    with pytest.raises(InputError, match="gaps = 3: give a list of numbers"):
         scenarios_of(CRANE, gaps=3)  # type: ignore[arg-type]
     chains = scenarios_of(damped_crane(), inertias=[1e4])
     assert [one.masses[-1].inertia for one in chains] == [damped_crane().masses[-1].inertia, 1e4]
