@@ -9,6 +9,7 @@ imported only when a string has a unit that is not an ordinary one.
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 import math
 import re
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "check_whole", "doubtful_comma",
     "multiple", "multiplied", "nearest", "parse", "read_unit", "shortest", "show", "to_si", "values_in",
-    "whole_number", "with_points",
+    "whole_number", "with_points", "without_powers",
 ]  # fmt: skip
 
 Value = float | NDArray[np.float64]
@@ -109,6 +110,7 @@ day = 86400 * second
 year = 31557600 * second
 tonne = 1e6 * gram = t
 pound = 453.59237 * gram = lb
+ounce = pound / 16 = oz
 degree = 0.017453292519943295 * radian = deg = °
 turn = 6.283185307179586 * radian = rev = revolution = r = U
 arcminute = degree / 60 = arcmin
@@ -128,7 +130,7 @@ metric_horsepower = 735.49875 * watt = PS
 
 # Spellings that are offered for an unknown one.
 _USUAL = """
-m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf
+m mm cm in ft kg g lb oz t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf
 J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
 """
 
@@ -147,6 +149,7 @@ ORDINARY = {
     ("kg*cm^2", "kg*m^2"): 0.0001,
 }
 
+GRAVITY = 9.80665  # m/s^2
 MOST_DIGITS = 9  # of a number that a person may have written
 # Units that people write, in which a value has few digits where it has 17 in SI.
 TYPED = {
@@ -162,6 +165,7 @@ _SYMBOLS = str.maketrans(
 _WITHOUT_DOTS = re.compile(
     r"\b(?:(k?g(?=[cm]?m\^2)|[kMm]?N|kgf|kp)([cm]?m)(s?)|([kMm]?[NWJ])(s))(?![^\W\d_])"
 )
+_AS_FORCE = re.compile(r"(?<![^\W\d])(lb|oz)s?(?![^\W\d])")
 # What pint may see: names, "1/" and one-digit powers. Its own grammar evaluates whatever stands there.
 _NAME = re.compile(r"(?:[^\W\d]|°)+")
 _WRITTEN = re.compile(
@@ -233,10 +237,29 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
 
 # ---- reading a quantity ---------------------------------------------------------------------------------
 
+# 350x10^-4, 3.5·10⁻² and, of a text that lost its superscripts, 350x10-4
+_POWER_OF_TEN = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*[x×·⋅*]\s*10"
+    r"(?:\s*(?:\^|\*\*)\s*([+-]?[0-9]{1,2})|([+-][0-9]{1,2})|([⁻⁺]?[⁰¹²³⁴-⁹]{1,2}))(?![0-9.])"
+)
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 _NUMBER = re.compile(
     r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?(?![a-z])|nan(?![a-z]))",
     re.IGNORECASE,
 )
+
+
+def without_powers(text: str) -> str:
+    """The text with a power of ten at its beginning as catalogues write it, in figures of a program.
+
+    >>> without_powers("350x10^-4 kg*m^2"), without_powers("3.5·10⁻² kg m²"), without_powers("5 N*m")
+    ('350e-4 kg*m^2', '3.5e-2 kg m²', '5 N*m')
+    """
+    found = _POWER_OF_TEN.match(text.replace("\N{MINUS SIGN}", "-"))
+    if found is None:
+        return text
+    exponent = next(filter(None, found.groups()[1:])).translate(_SUPERSCRIPTS)
+    return f"{found[1]}e{exponent}{text[found.end() :]}"
 
 
 class RefusedError(ValueError):
@@ -433,6 +456,7 @@ class Units(NamedTuple):
 
     def typed(self, text: str, si: str) -> str:
         """What a bare number in such a field means, as `parse` reads it; any other text stays as it is."""
+        text = without_powers(text)
         if self.of(si) == si or not _NUMBER.fullmatch(text.strip()):
             return text
         if self.of(si) == "mm":  # a length is no angle
@@ -489,7 +513,7 @@ def _checked(number: float, unit: str, infinite: bool) -> float:
 
 
 def _text(text: str, unit: str, infinite: bool) -> float:
-    stripped = text.strip().replace("\N{MINUS SIGN}", "-")
+    stripped = without_powers(text.strip()).replace("\N{MINUS SIGN}", "-")
     match = _NUMBER.match(stripped)
     if match is None:
         raise RefusedError(f"this is not a number with a unit; {_remedy(unit)}")
@@ -536,12 +560,20 @@ def _factor(written: str, number: str, unit: str) -> float:
     found = read_unit(written)
     if isinstance(found, str):
         raise RefusedError(f"{found}; {_remedy(unit)}")
+    pounds = _AS_FORCE.sub(r"\1f", written)  # of torque, as in lb-ft, in-lb and oz-in
+    moment = _known("N*m^2")
+    if (
+        unit == "kg*m^2"
+        and found.dimensions == moment.dimensions
+        and not re.search("lb|oz|pound|ounce", written)
+    ):
+        return found.size / moment.size / (4.0 * GRAVITY)  # GD^2: a weight on the square of a diameter
     if unit == "rad/s" and "min" in written and found.dimensions == _known("Hz").dimensions:
         found = Unit(found.size * 2.0 * math.pi, _known(unit).dimensions)  # 1/min: revolutions, ISO 80000-3
-    for form in (unit, *quantity.others):
-        wanted = _known(form)
-        if wanted.dimensions == found.dimensions:
-            factor = found.size / wanted.size
+    forms = [_known(form) for form in (unit, *quantity.others)]
+    for read, wanted in itertools.product((found, read_unit(pounds)), forms):
+        if isinstance(read, Unit) and wanted.dimensions == read.dimensions:
+            factor = read.size / wanted.size
             decimal = float(f"{factor:.12g}")  # 9.80665 stays 9.80665 whatever order pint multiplied in
             return decimal if abs(factor - decimal) <= 1e-15 * factor else factor
     raise RefusedError(_wrong_kind(written, number, found, quantity))
@@ -560,7 +592,7 @@ def _wrong_kind(written: str, number: str, found: Unit, quantity: Quantity) -> s
         what = "which may count turns or radians"
         remedy = f'write "{amount} turn/s" or "{amount} rad/s"'
     elif unit == "kg*m^2" and other == "a flywheel moment":
-        return f"{written} is {other} (GD^2); divide it by 4 g and write the inertia in kg*m^2"
+        return f"{written} is {other}; write GD^2 in kgf*m^2, and WK^2 in lb*ft^2"
     elif found.dimensions == _known(unit.removesuffix("/rad")).dimensions:
         what = f"but {quantity.noun} is per angle"
         remedy = f'write "{number} {written}/rad" or "{number} {written}/deg"'

@@ -29,6 +29,20 @@ READ = [
     ("0.1 kgf*m*s^2", "kg*m^2", 0.980665),
     ("1.5 Nms/rad", "N*m*s/rad", 1.5),  # not the plural of Nm/rad
     ("1 lbf*ft", "N*m", 1.3558179483314004),
+    # pounds and ounces of torque are force, those of inertia mass: 0.45359237 kg, 9.80665 m/s2, 0.3048 m
+    *((f"1 {one}", "N*m", 0.45359237 * 9.80665 * 0.3048) for one in ("lb-ft", "ft-lb", "lb ft", "ft·lbs")),
+    *((f"1 {one}", "N*m", 0.45359237 * 9.80665 * 0.0254) for one in ("in-lb", "lb·in", "lbf-in")),
+    *((f"1 {one}", "N*m", 0.45359237 / 16 * 9.80665 * 0.0254) for one in ("oz-in", "in.oz", "ozf*in")),
+    ("1 lb-ft/deg", "N*m/rad", 0.45359237 * 9.80665 * 0.3048 * 180 / math.pi),
+    ("1 lb-ft^2", "kg*m^2", 0.45359237 * 0.3048**2),
+    ("1 oz-in²", "kg*m^2", 0.45359237 / 16 * 0.0254**2),
+    ("1 lb-in-s^2", "kg*m^2", 0.45359237 * 9.80665 * 0.0254),
+    ("1 lb-ft", "kg*m", 0.45359237 * 0.3048),  # an imbalance is a mass on a radius
+    # a flywheel moment GD^2 is a weight on the square of a diameter: J = G/g (D/2)^2
+    *((f"0.14 {one}", "kg*m^2", 0.035) for one in ("kgf*m^2", "kp m²", "kgfm2")),
+    ("0.14 N*m^2", "kg*m^2", 0.14 / 9.80665 / 4),
+    *((f"350{one} kg*m^2", "kg*m^2", 0.035) for one in ("x10^-4", " x 10^-4", "×10⁻⁴", "·10^-4", "x10-4")),
+    ("-2.5x10^+2 N*m", "N*m", -250.0),
     ("1 N*m/rpm", "N*m*s/rad", 60 / (2 * math.pi)),
     ("1 hp", "W", 745.6998715822702),
     ("\N{MINUS SIGN}5 N*m", "N*m", -5.0),
@@ -49,7 +63,11 @@ def test_is_read(value, unit, expected):
 REFUSED = [
     ("5 N*m", "N*m/rad", 'N*m is a torque, but a stiffness is per angle; write "5 N*m/rad" or "5 N*m/deg"'),
     ("5 N*m/rad", "N*m", 'N*m/rad is a stiffness, not a torque; write "5 N*m"'),
-    ("5 kgf*m^2", "kg*m^2", "kgf*m^2 is a flywheel moment (GD^2); divide it by 4 g"),
+    ("5 lbf*ft^2", "kg*m^2", "a flywheel moment; write GD^2 in kgf*m^2, and WK^2 in lb*ft^2"),
+    ("5 lb", "N*m", "lb is a mass, not a torque"),
+    ("5x10 N*m", "N*m", '"x10 N*m" is no unit'),
+    ("5e1x10^2 N*m", "N*m", '"x10^2 N*m" is no unit'),
+    ("5 ms at output", "s", '"at output" does not apply here; leave it out'),
     ("5 radd", "rad", 'unknown unit "radd" (did you mean "rad"?)'),
     ("5 %", "rad", '"%" is no unit'),
     ("5 rad^99", "rad", '"rad^99" is no unit'),

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
-from softstart.quantities import RefusedError, Value, nearest, parse, show
+from softstart.quantities import RefusedError, Value, nearest, parse, show, without_powers
 
 __all__ = [
     "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "at_motor", "bare", "meant_by",
@@ -242,7 +242,7 @@ def read_values(
 
 def bare(value: object) -> str:
     """A number without a unit as it is written; "" for anything else."""
-    text = str(value).strip()
+    text = without_powers(str(value).strip())
     return text if not isinstance(value, bool) and _BARE.fullmatch(text) else ""
 
 

@@ -154,7 +154,9 @@ class Screen:
         groups: dict[str, list[Frame]] = {}
         for one in known.values():
             groups.setdefault(one.group, []).append(described(one, self.units))
-        folded = (machines.MORE, "" if self.session.origin.limits else machines.LIMITS)
+        origin = self.session.origin
+        given = {machines.LIMITS: origin.limits, machines.GEAR: origin.gear, machines.MORE: False}
+        folded = [title for title, there in given.items() if not there]
         return [{"title": title, "rows": rows, "folded": title in folded} for title, rows in groups.items()]
 
     def _strategy_fields(self, found: Strategy) -> dict[str, Frame]:

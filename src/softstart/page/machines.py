@@ -33,7 +33,7 @@ DELTA = "\N{GREEK SMALL LETTER DELTA}"
 
 HEAD = "Units"  # the group that stands in the head of the page
 UNITS = ("deg, rpm", "rad, rad/s", "arcmin, rpm", "mm on 80 mm, rpm")
-LIMITS, MORE = "Limits", "more parameters"  # groups that are folded, limits where there are none
+LIMITS, GEAR, MORE = "Limits", "Gear", "more parameters"  # groups that are folded where they are empty
 # by table of a machine: its fields in their order; of a chain, a mass and a shaft take turns
 FIELDS: Mapping[str, str] = {
     "": "units name",
@@ -43,7 +43,9 @@ FIELDS: Mapping[str, str] = {
     "shaft": "gap stiffness damping damping_ratio contact_law permissible_torque",
     "load": "inertia torque kind friction viscous_friction",
     "start": "target_speed position brake release initial_load_speed",
-    "limits": "shaft_torque start_time starts_per_hour life fatigue.slope fatigue.torque fatigue.cycles",
+    "gear": "ratio efficiency",
+    "limits": "shaft_torque output_torque start_time starts_per_hour life fatigue.slope fatigue.torque "
+    "fatigue.cycles",
 }
 # what stands before a field, where that is not its key
 LABELS = {
