@@ -54,7 +54,7 @@ SETTLE = {
     "damping_ratio": {"damping"}, "stiffness": {"stiffness"},
 }  # fmt: skip
 
-SHOWN_IN = {"kW": 1e3, "ms": 1e-3, "rpm": math.pi / 30.0}  # units of a drive file that are not those of SI
+SHOWN_IN = {"kW": 1e3, "ms": 1e-3}  # units of a drive file that are not those of SI
 
 
 class _Load(NamedTuple):
@@ -633,7 +633,7 @@ class DataSheet(ParameterSet):
             "maximum_torque": of_ratio("maximum", self.maximum_ratio),
             "rated_power": _entry(self.rated_power, "kW", "plate"),
             "rated_torque": _entry(self.rated_torque, "N*m", "plate"),
-            "rated_speed": _entry(self.rated_speed, "rpm", "plate"),
+            "rated_speed": _entry(self.rated_speed, "rad/s", "plate"),
             "torque_lag": _entry(self.torque_lag or None, "ms", "of the inverter"),
             "stiffness": self._there(stiffness, "N*m/rad", stiffness_from, soft_behind),
             "damping": _entry(damping, "N*m*s/rad",
@@ -642,7 +642,7 @@ class DataSheet(ParameterSet):
                                gap and "coupling" not in self._gaps),
             "load_inertia": self._there(of.J2, "kg*m^2", f"{load.inertia_from}; {self._through(of.J2)}"),
             **self._torques(),
-            "target_speed": _entry(self.rated_speed, "rpm", f"rated speed: {self.motion}"),
+            "target_speed": _entry(self.rated_speed, "rad/s", f"rated speed: {self.motion}"),
         }  # fmt: skip
         limits = self.permissible_torque, self.permissible_output_torque
         if self._geared:
@@ -676,9 +676,7 @@ class DataSheet(ParameterSet):
         there = float(self._gear.to_output(value, unit))
         if unit == "rad":  # as catalogues give a backlash
             return _Entry(value, f'"{Units("arcmin").shown(there, unit):.9g} arcmin at output"', about)
-        text = shortest(there, unit, within=1e-12)
-        text = f"{there:.6g}" if len(text) > 15 else text  # computed
-        return _Entry(value, f'"{text if " " in text else f"{text} {unit}"} at output"', about)
+        return _Entry(value, f'"{_written(there, unit, 6)} at output"', about)
 
     def _torques(self) -> dict[str, _Entry]:
         """The torque of the load by its parts, and where a start begins that they decide."""
@@ -686,9 +684,9 @@ class DataSheet(ParameterSet):
         active, friction, hoist = of.active, of.friction, self.machine == "hoist"
 
         def torque(value: float, about: str) -> _Entry:
-            # "at output" divides by the efficiency, and a load that drives the motor is multiplied by it
+            # "at output" goes by the sign of the value itself, not by that of both parts together
             origin = f"{about or 'none'}; {self._through(value)}"
-            return self._there(value, "N*m", origin, behind=not of.overhauling)
+            return self._there(value, "N*m", origin, behind=(value < 0.0) == of.overhauling)
 
         if not active:
             unknown = _entry("unknown", "", "every figure is the worst of both flanks and mid-gap")
@@ -746,12 +744,21 @@ def _parts(values: Mapping[str, float]) -> str:
 
 
 def _entry(value: Any, unit: str = "", about: str = "") -> _Entry:
-    """A word or a number in SI, shown in this unit to five digits.
+    """A word or a number in SI, shown in this unit.
 
-    >>> _entry(149.75, "rpm").text, _entry("hanging").text, _entry(0.0123456, "kg*m^2").text
-    ('"1430.01 rpm"', '"hanging"', '"0.012346 kg*m^2"')
+    >>> _entry(147.65485471872029, "rad/s").text, _entry("hanging").text, _entry(2e3 / 3.0, "kW").text
+    ('"1410 rpm"', '"hanging"', '"0.66667 kW"')
     """
     if not unit or value is None:
         return _Entry(value, literal(value), about)
-    digits = 6 if unit == "rpm" else 5
-    return _Entry(value, f'"{value / SHOWN_IN.get(unit, 1.0):.{digits}g} {unit}"', about)
+    return _Entry(value, f'"{_written(value / SHOWN_IN.get(unit, 1.0), unit, 5)}"', about)
+
+
+def _written(value: float, unit: str, digits: int) -> str:
+    """A value as it was typed, whatever shaft it was brought to since; if computed, with so many digits.
+
+    >>> _written(0.1 + 0.2, "N*m", 5), _written(1.0 / 3.0, "N*m", 5)
+    ('0.3 N*m', '0.33333 N*m')
+    """
+    text = shortest(value, unit, within=1e-12)
+    return text if " " in text else f"{text if len(text) <= 15 else f'{value:.{digits}g}'} {unit}"

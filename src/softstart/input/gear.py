@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from softstart.quantities import RefusedError
 
 __all__ = ["BEHIND", "NO_GEAR", "OWN_SIDE", "Gear", "alike"]
@@ -29,11 +31,14 @@ class Gear(NamedTuple):
     """What lies between motor shaft and output: the ratio i (turns of the motor for one of the output), eta.
 
     A torque M at the output is M/(i eta) at the motor shaft; an inertia, a stiffness and a damping are
-    divided by i^2 eta, an angle and a speed multiplied by i. The efficiency is that while the motor drives.
+    divided by i^2 eta, an angle and a speed multiplied by i. A torque below 0 drives the motor: it is
+    M eta/i there.
 
     >>> gear = Gear(40.0, 0.8)
     >>> gear.to_motor(1600.0, "N*m"), gear.to_motor(0.01, "rad"), gear.to_output(25.0, "N*m/rad")
     (50.0, 0.4, 32000.0)
+    >>> gear.to_motor(-1600.0, "N*m"), gear.to_output(-32.0, "N*m")
+    (-32.0, -1600.0)
     """
 
     ratio: float
@@ -47,12 +52,19 @@ class Gear(NamedTuple):
     def to_motor(self, value: Any, unit: str) -> Any:
         """A value at the output, in its SI unit, at the motor shaft."""
         turns = POWERS[unit] == (-1, 0)
-        return value * self.ratio if turns else value / self.factor(unit)
+        return value * self.ratio if turns else value / self._factor(value, unit)
 
     def to_output(self, value: Any, unit: str) -> Any:
         """A value at the motor shaft, in its SI unit, at the output."""
         turns = POWERS[unit] == (-1, 0)
-        return value / self.ratio if turns else value * self.factor(unit)
+        return value / self.ratio if turns else value * self._factor(value, unit)
+
+    def _factor(self, value: Any, unit: str) -> Any:
+        """The factor of a value, which of a torque goes with its sign."""
+        if POWERS[unit] != (1, 1) or not np.any(np.asarray(value) < 0.0):
+            return self.factor(unit)
+        either = np.where(np.asarray(value) < 0.0, self.ratio / self.efficiency, self.factor(unit))
+        return either if either.ndim else float(either)
 
     @property
     def lossless(self) -> Gear:

@@ -20,7 +20,7 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.errors import InputError, Mistakes
 from softstart.input.gear import alike
-from softstart.input.parameters import Parameter, Wording, meant_by, read_value
+from softstart.input.parameters import Parameter, Wording, at_motor, meant_by, read_value
 from softstart.quantities import RefusedError, multiplied, nearest, show
 
 if TYPE_CHECKING:
@@ -150,9 +150,10 @@ class Subject:
                 return texts, "", parameter.meaning
             own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
             alike(values)
-            given = [multiplied(value, key, own) for value in values]
             through = self.machine.gear or self.machine.NO_GEAR
-            read = np.float64(read_value(parameter, given, batch=True, gear=through))
+            given = [multiplied(value, key, own) for value in values]
+            there = [at_motor(parameter, value, through) for value in given]
+            read = np.float64(read_value(parameter, there, batch=True))
         except RefusedError as reason:
             raise InputError(Wording(written={name: key}).refused(parameter, given, reason)) from None
         return read, parameter.unit, parameter.meaning

@@ -1,0 +1,257 @@
+"""The output of a gear: values there and back, limits there, and a machine of which either side is given."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softstart import Chain, DataSheet, Drive, InputError, compare, optimize, records, simulate, tune
+from softstart.chain import Mass, Motor, Shaft
+from softstart.controller.recipe import Recipe
+from softstart.drive import PARAMETERS
+from softstart.drive.doubts import doubts
+from softstart.drive.model import BY_PATH
+from softstart.reporting.document import data_of
+from softstart.reporting.project import Project
+from softstart.start.recommendation import Row
+from softstart.sweeping.grid import Subject
+from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
+from softstart.views.tuning import conclusions
+
+CRANE = Drive.load("crane-4amtkf")
+# at the output over at the motor shaft, by hand: exponents of the ratio and of the efficiency
+BY_HAND = {
+    "shaft.stiffness": (2, 1), "shaft.damping": (2, 1), "shaft.gap": (-1, 0), "load.inertia": (2, 1),
+    "load.torque": (1, 1), "load.friction": (1, 1), "load.viscous_friction": (2, 1),
+    "start.target_speed": (-1, 0), "start.position": (-1, 0), "start.initial_speed": (-1, 0),
+    "start.initial_load_speed": (-1, 0), "limits.shaft_torque": (1, 0), "limits.fatigue.torque": (1, 0),
+}  # fmt: skip
+AT_MOTOR = {  # of a drive, in SI
+    "shaft.stiffness": 400.0, "shaft.damping": 0.2, "shaft.gap": 0.3, "load.inertia": 0.2, "load.torque": 9.0,
+    "load.friction": 2.0, "load.viscous_friction": 0.01, "start.target_speed": 90.0, "start.position": 0.1,
+    "start.initial_speed": 4.0, "start.initial_load_speed": 3.0, "limits.shaft_torque": 130.0,
+    "limits.fatigue.torque": 80.0,
+}  # fmt: skip
+ratios = st.floats(math.log(0.05), math.log(500.0)).map(lambda x: float(f"{math.exp(x):.4g}"))
+efficiencies = st.floats(0.3, 1.0).map(lambda x: float(f"{x:.3g}"))
+typed = st.floats(0.5, 2.0)
+
+
+def geared(ratio: float, efficiency: float) -> Drive:
+    """The crane with a gear; of a limit of the life all that it takes."""
+    return CRANE.replace(
+        gear_ratio=ratio, gear_efficiency=efficiency, fatigue_slope=5, fatigue_torque=70, fatigue_cycles=1e6
+    )
+
+
+def test_the_keys_that_are_at_the_output_are_these() -> None:
+    assert {p.path for p in PARAMETERS.values() if p.at_output in ("value", "limit")} == BY_HAND.keys()
+    assert {p.path for p in PARAMETERS.values() if p.at_output == "here"} == {"limits.output_torque"}
+
+
+@given(ratios, efficiencies, typed, st.sampled_from(sorted(BY_HAND)))
+def test_a_value_at_the_output_is_that_at_the_motor_by_hand_and_comes_back(i, eta, share, path) -> None:
+    """As text, the drive as a file, and a drive that is given the same at the motor shaft."""
+    p, (of_ratio, of_efficiency) = PARAMETERS[BY_PATH[path]], BY_HAND[path]
+    there = float(f"{share * AT_MOTOR[path] * i**of_ratio * eta**of_efficiency:.6g}")  # as typed
+    moved = geared(i, eta).with_settings([f"{path}={there!r} {p.unit} at output"])
+    (value,) = getattr(moved, p.name) if p.many else (getattr(moved, p.name),)
+    assert value == pytest.approx(there / i**of_ratio / eta**of_efficiency, rel=1e-14)
+    for one in (moved, Drive.from_toml(moved.to_toml())):
+        (back,) = one.at_output[p.name] if p.many else (one.at_output[p.name],)
+        assert f"{back:.13g}" == f"{there:.13g}"
+    assert moved.replace(**{p.name: value}) == moved
+
+
+@given(ratios, efficiencies, st.floats(0.2, 5.0), st.floats(0.1, 2.0))
+def test_a_limit_at_the_output_is_judged_as_the_same_at_the_motor_without_losses(i, eta, most, share) -> None:
+    """M at the output permits M/i at the motor, whatever the losses; of two limits the stricter counts."""
+    there = 60.0 * i * most
+    drive = geared(i, eta)
+    run: Any = SimpleNamespace(
+        drive=drive,
+        k_dyn=1.0,
+        peak_torque=60.0 * most * share,
+        start_time=1.0,
+        used_torque=0.0,
+        controller=None,
+    )
+    as_limits = (
+        {"permissible_output_torque": there}, {"permissible_torque": f"{there!r} N*m at output"},
+        {"permissible_torque": there / i}, {"permissible_output_torque": there, "permissible_torque": 1e9},
+        {"permissible_output_torque": 1e9 * i, "permissible_torque": there / i},
+    )  # fmt: skip
+    judged = []
+    for limits in as_limits:
+        (margin,) = Row(run, None, worst_case=()).margins(drive.replace(**limits).limits)
+        judged.append((margin.share, margin.kept))
+        at_output = margin.name == "output torque"
+        assert at_output == (
+            "permissible_output_torque" in limits and limits.get("permissible_torque") in (None, 1e9)
+        )
+        assert margin.limit == pytest.approx(there if at_output else there / i, rel=1e-14)
+        assert margin.value == pytest.approx(run.peak_torque * (i if at_output else 1.0), rel=1e-14)
+    assert {kept for _, kept in judged} == {judged[0][1]}
+    assert [one for one, _ in judged] == pytest.approx([1.0 - share] * len(judged), abs=1e-12)
+
+
+@given(ratios, efficiencies, typed, st.integers(0, 2**16))
+def test_what_a_data_sheet_says_behind_the_gear_comes_back_as_typed(i, eta, share, seed) -> None:
+    """A rotor; up to six digits, in units of catalogues. By the drive, its file, and the report."""
+    moment = float(f"{30.0 * share * i**2:.{1 + seed % 6}g}")
+    sheet = {
+        "load.machine": "rotor", "motor.rated_power": "15 kW", "motor.rated_speed": "1460 rpm",
+        "motor.inertia": 20.0, "motor.starting_torque": "240 N*m", "gear.ratio": i, "gear.efficiency": eta,
+        "gear.stiffness": f"{float(f'{800.0 * share * i**2:.6g}')!r} N*m/rad",
+        "gear.backlash": f"{float(f'{300.0 * share / i:.4g}')!r} arcmin",
+        "load.inertia": moment, "load.friction": float(f"{60.0 * share * i * eta:.6g}"),
+        "limits.output_torque": float(f"{900.0 * share * i:.6g}"),
+    }  # fmt: skip
+    drive = DataSheet.from_settings(sheet).drive
+    there = {
+        "stiffness": float(sheet["gear.stiffness"].split()[0]),
+        "gap": math.radians(float(sheet["gear.backlash"].split()[0]) / 60.0), "load_inertia": moment,
+        "load_torque": sheet["load.friction"], "permissible_output_torque": sheet["limits.output_torque"],
+    }  # fmt: skip
+    for one in (drive, Drive.from_toml(drive.to_toml())):
+        assert {name: one.at_output[name] for name in there} == pytest.approx(there, rel=1e-12)
+    report: Any = SimpleNamespace(project=Project(), drive=drive.replace(units="arcmin, rpm"))
+    _, rows, _ = data_of(report)
+    shown = {row[0]: row[-1] for row in rows}
+    units = {"stiffness": "N m/rad", "load_inertia": "kg m²", "gap": "arcmin"}
+    for name, value in (there | {"gap": math.degrees(there["gap"]) * 60.0}).items():
+        said = f"{float(f'{value:.6g}'):.6g} {units.get(name, 'N m')}"
+        assert shown[PARAMETERS[name].meaning] == said, name
+
+
+def test_a_drive_with_its_gear_is_the_chain_that_has_the_gear_in_its_shaft() -> None:
+    """The kernel brings a chain to the motor shaft by itself; without losses both start alike."""
+    i, there = 38.1, {"gap": "9 arcmin at output", "stiffness": "35 kN*m/rad at output"}
+    motor: dict[str, Any] = {"starting_torque": 44.7, "rated_speed": "1410 rpm"}
+    drive = Drive(
+        motor_inertia=0.0083, load_inertia="161 kg*m^2 at output", load_torque="80 N*m at output", **motor,
+        damping="25 N*m*s/rad at output", load_kind="reactive", start_position="driving-flank", gear_ratio=i,
+        permissible_output_torque="1.6 kN*m", **there,
+    )  # fmt: skip
+    shaft = Shaft(
+        "35 kN*m/rad", gap="9 arcmin", damping=25.0, ratio=i, side="after", permissible_torque=1600.0
+    )
+    chain = Chain(
+        [Mass(0.0083), Mass(161.0, torque=80.0, kind="reactive")], [shaft], Motor(**motor),
+        position="driving-flank",
+    )  # fmt: skip
+    one, other = simulate(drive, "ramp"), simulate(chain, "ramp")
+    assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-10)
+    assert one.start_time == pytest.approx(other.start_time, rel=1e-10)
+    assert one.used_torque == pytest.approx(100.0 * one.peak_torque_at_output / 1600.0, rel=1e-12)
+    assert one.used_torque == pytest.approx(other.used_torque, rel=1e-10)
+
+
+def test_everything_that_takes_a_gap_takes_it_at_the_output() -> None:
+    drive = geared(38.1, 0.95).replace(gap="9 arcmin at output")
+    gap = math.radians(9 / 60) * 38.1
+    (least, own) = gaps_of(drive, ["4.5 arcmin at output", "1x"])
+    assert (least, own) == pytest.approx((gap / 2, gap), rel=1e-14)
+    assert inertias_of(drive, "290 kg*m^2 at output") == pytest.approx((290 / 38.1**2 / 0.95,), rel=1e-14)
+    (_, low, high) = scenarios_of(drive, {"gap": ["4.5 arcmin at output", "18 arcmin at output"]})
+    assert (low["gap"].offset, high["gap"].offset) == pytest.approx((gap / 2, 2 * gap), rel=1e-14)
+    (_, low, high) = scenarios_of(drive, {"gap": "1 arcmin at output"})
+    assert high["gap"].offset == pytest.approx(gap / 9, rel=1e-14) == -low["gap"].offset
+    both = records(drive, gap=["9 arcmin at output", "18 arcmin at output"])
+    assert both.fields["gap"] == pytest.approx([gap, 2 * gap])
+    axis = Subject(drive, Recipe("direct")).coordinate("shaft.gap", ["9 arcmin at output", "2x"])
+    assert axis.values == pytest.approx([gap, 2 * gap], rel=1e-14)
+    assert drive.with_gap("18 arcmin at output").gap == pytest.approx(2 * gap, rel=1e-14)
+
+
+CHAIN, GEARED = Chain.load("crane-4-mass"), geared(38.0, 1.0)
+AXIS = Subject(GEARED, Recipe("direct")).coordinate
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (lambda: CRANE.replace(gap="9 arcmin at output"), 'gap = "9 arcmin at output": without gear.ratio'),
+        (lambda: CRANE.replace(permissible_output_torque=2e3), "output_torque = 2000.0: without gear_ratio"),
+        (lambda: CRANE.replace(gear_efficiency=0.9), "gear_efficiency = 0.9: without gear_ratio there is no"),
+        (lambda: GEARED.replace(torque_lag="2 ms at output"), 'does not take "at output"; leave it out.'),
+        (lambda: GEARED.replace(motor_inertia="2 kg*m^2 at output"), "inertia of the motor does not take"),
+        (lambda: GEARED.replace(gap="-9 arcmin at output"), "the total angular gap must be 0 or more"),
+        (lambda: GEARED.replace(gap="9 kg at output"), "kg is a mass, not an angle"),
+        (lambda: geared(0, 1), "gear_ratio = 0: the turns of the motor for one of the output must be above"),
+        (lambda: GEARED.replace(permissible_output_torque=200), "load_torque = 7.16 N*m at the motor shaft"),
+        (lambda: gaps_of(CRANE, ["9 arcmin at output"]), 'gaps = "9 arcmin at output": without gear.ratio'),
+        (lambda: gaps_of(GEARED, ["4 arcmin", "9 arcmin at output"]), "behind some of the values only"),
+        (lambda: gaps_of(CHAIN, ["9 arcmin at output"]), "the gears of a chain are in its shafts"),
+        (lambda: records(CHAIN, gap=["9 arcmin at output"]), "the gears of a chain are in its shafts"),
+        (lambda: Shaft(100.0, gap="9 arcmin at output"), 'write side = "before" or "after"'),
+        (lambda: Mass("3 kg*m^2 at output"), 'inertia on its own shaft does not take "at output"'),
+        (lambda: simulate(GEARED, "ramp", parameters={"time": "1 s at output"}), "does not apply here"),
+        (lambda: AXIS("motor.inertia", ["1 kg*m^2 at output"]), 'does not take "at output"'),
+    ],
+)  # fmt: skip
+def test_where_there_is_no_output_that_is_said_in_one_sentence(made, says) -> None:
+    with pytest.raises(InputError) as told:
+        made()
+    (sentence,) = told.value.sentences
+    assert says in sentence
+
+
+def test_a_permissible_torque_that_no_start_comes_near_is_doubted() -> None:
+    """Over 10 Ms: of a drive that at the motor shaft, of a chain that of any shaft."""
+    for most, doubted in ((619.0, False), (621.0, True)):
+        shafts = [CHAIN.shafts[0], CHAIN.shafts[1].replace(permissible_torque=1e-9), *CHAIN.shafts[2:]]
+        scale = CHAIN.at_motor_shaft().torque_ratio[1]
+        shafts[1] = shafts[1].replace(permissible_torque=most / scale)
+        chain = Chain(CHAIN.masses, shafts, CHAIN.motor, load_mass=CHAIN.load_mass, target_speed=92)
+        for machine in (
+            CRANE.replace(permissible_torque=most),
+            CRANE.replace(gear_ratio=20, gear_efficiency=0.5, permissible_output_torque=20 * most),
+            chain,
+        ):
+            said = [one for one in doubts(machine) if one.startswith("permissible torque of ")]
+            assert len(said) == doubted
+            assert all("10.02 times the starting torque, where" in one for one in said)
+
+
+def test_a_tuning_that_leaves_the_drive_out_is_doubted() -> None:
+    quick: dict[str, Any] = {
+        "free": ["torque"],
+        "certified": False,
+        "generations": 1,
+        "restarts": 1,
+        "workers": 1,
+    }
+    drive = geared(38.1, 0.95).replace(gap="9 arcmin at output", load_inertia="200 kg*m^2 at output")
+    name = "reduced-first-stage"
+    beside = tune(drive, name, ["4.5 arcmin", "9 arcmin"], ["100 kg*m^2 at output"], **quick)
+    gap, inertia = beside.doubts
+    assert gap.startswith(
+        "the gap of the drive, 0.099746 rad, lies outside those tuned over, 0.001309 to 0.002618 rad:"
+    )
+    assert inertia.startswith("the load inertia of the drive, ")
+    assert [one[:14] for one in conclusions(beside)][:2] == ["Doubt: the gap", "Doubt: the loa"]
+    assert beside.summary()["doubts"] == beside.doubts
+    within = tune(drive, name, ["4.5 arcmin at output", "9 arcmin at output"], ["1x"], **quick)
+    assert within.doubts == []
+
+
+@pytest.mark.slow
+def test_optimum_and_comparison_keep_a_limit_at_the_output() -> None:
+    """The quickest start has the torque that the output permits, over the ratio, within 0.1 %."""
+    drive = Drive.load("hoist-15kw").replace(gear_ratio=45)
+    limited = drive.replace(permissible_output_torque=45 * 175.0)
+    best = optimize(limited, limits=True)
+    assert best.run.peak_torque == pytest.approx(175.0, rel=1e-3)
+    assert best.run.peak_torque <= 175.0
+    assert str(best.kept.margins[0]).startswith("output torque 787")
+    both = [
+        compare(one, ["direct", "s-curve"]).recommendation
+        for one in (limited, drive.replace(permissible_torque=175.0))
+    ]
+    assert both[0].text.replace("output torque", "shaft torque").split(".")[0] == both[1].text.split(".")[0]
