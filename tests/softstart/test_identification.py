@@ -28,7 +28,7 @@ from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.identification.fitting import Fitter, Sizes
 from softstart.identification.model import FILTER, LogModel, filtered
-from softstart.identification.planning import Bench, made_up_log, steps_of
+from softstart.identification.planning import Bench, Experiment, made_up_log, steps_of
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
@@ -202,6 +202,25 @@ def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it() -> N
     assert found["motor_friction"].known
     assert found["motor_friction"].lower < 1.0 < found["motor_friction"].upper
     assert len(found.notes) == 1  # nothing is left that the model has not
+
+
+@pytest.mark.slow
+def test_the_lift_and_the_friction_of_an_inclined_belt_are_told_apart_by_a_reversal() -> None:
+    belt = Drive.load("crane-4amtkf").replace(
+        load_kind="active", load_torque=8.0, load_friction=4.0, gap=0.08, damping=0.3, encoder_lines=1024,
+        start_position="mid-gap",
+    )  # fmt: skip
+    there_and_back = Experiment(
+        "", *steps_of(np.array([0.15, 0.15, 0.25]), np.array([40.0, 15.0, -30.0])), {}, 0.0, 0.0
+    )
+    log = made_up_log(belt, there_and_back, log_period=3e-3, ripple=1.0)
+    notes = identify(log, belt.replace(load_friction=0.0, load_torque=12.0), searches=1).notes
+    assert any("--free +load.friction" in note for note in notes)
+    found = identify(log, belt.replace(load_friction=2.0, load_torque=12.0), searches=2)
+    for name in ("load_torque", "load_friction", "gap", "load_inertia"):
+        one = found[name]
+        assert one.known, name
+        assert abs(one.value - float(getattr(belt, name))) < one.upper - one.lower, name  # twice the interval
 
 
 def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(log: Log) -> None:

@@ -15,6 +15,7 @@ from softstart.arrays import Vector
 from softstart.identification.fitting import Fitter
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
+from softstart.identification.solving import _directed
 from softstart.identification.unknowns import unknowns_of
 
 FREE = ["gap", "position"]
@@ -112,9 +113,11 @@ def test_a_clock_may_overflow_or_pass_midnight(sample: int, clock: tuple[float, 
 
 @given(st.sampled_from([0.25e-3, 0.4e-3, 0.5e-3, 0.7e-3]), st.sampled_from([np.floor, np.round]))
 def test_stamps_that_are_too_coarse_are_spread(period: float, rounded) -> None:  # type: ignore[no-untyped-def]
-    """Samples more often than the stamps change, of 1 ms: half a stamp a second is what stays unknown."""
+    """Samples more often than the stamps change, of 1 ms, some of them equal while the motor is at rest."""
     time = period * np.arange(1200)
-    log = Log(rounded(time / 1e-3) * 1e-3, np.full(1200, 40.0), angle=100.0 * time**2)
+    angle = 100.0 * np.maximum(time - 0.02, 0.0) ** 2
+    log = Log(rounded(time / 1e-3) * 1e-3, np.full(1200, 40.0), angle=angle)
+    assert log.time.size == 1200
     assert np.diff(log.time) == pytest.approx(period, rel=2e-3)
     assert any("stamps are rounded to 0.001 s" in note for note in log.notes)
 
@@ -134,6 +137,16 @@ def test_the_direction_of_rotation_does_not_matter_to_friction() -> None:
     assert_same(log)
     assert "both turned round" in log.notes[-1]
     assert LOG.forward() is LOG
+
+
+def test_a_load_that_drives_keeps_its_direction_and_that_is_said() -> None:
+    """Lowering, or a log that counts the other way: only the person knows."""
+    back = rebuilt(torque=-LOG.torque, angle=-LOG.values)
+    lift = TRUTH.replace(load_kind="active", start_position="hanging")
+    assert np.array_equal(_directed(back, lift).torque, back.torque)
+    assert "--columns torque=-NAME,angle=-NAME" in _directed(back, lift).notes[-1]
+    for alike in (TRUTH, lift.replace(load_torque=0.0, load_friction=7.16, start_position="mid-gap")):
+        assert np.array_equal(_directed(back, alike).torque, LOG.torque)
 
 
 def known(found: Identification) -> dict[str, tuple[float, float, float]]:

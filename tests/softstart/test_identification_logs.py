@@ -76,22 +76,17 @@ def test_columns_have_factors_signs_and_units_of_their_own(log: Log, tmp_path: P
 # ---- what the encoder tells -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("unit", "size"), [("turn", 2.0 * math.pi), ("deg", math.pi / 180.0)])
-def test_steps_of_the_encoder_in_another_unit_are_noticed(log: Log, unit: str, size: float) -> None:
-    """Turns or degrees that are called rad."""
-    wrong = Log(log.time, log.torque, angle=log.values / size, torque_is="demand")
-    with pytest.raises(InputError, match=rf"counts of 1024 encoder lines in {unit}; .*angle=NAME\[{unit}\]"):
+@pytest.mark.parametrize("unit", ["turn", "deg", "rpm"])
+def test_steps_of_the_encoder_in_another_unit_are_noticed(unit: str) -> None:
+    """Turns or degrees that are called rad, rpm that are called rad/s."""
+    kind, size = next((kind, sizes[unit]) for kind, sizes in SIZES.items() if unit in sizes)
+    log = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal=kind)  # type: ignore[arg-type]
+    wrong = Log(log.time, log.torque, **{kind: log.values / size}, torque_is="demand")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=rf"counts of 1024 encoder lines in {unit}; .*{kind}=NAME\[{unit}\]"):
         _check_step(wrong, 1024.0)
     for lines in (0.0, 1000.0, 4096.0):  # none, or another one
         _check_step(wrong, lines)
     _check_step(log, 1024.0)
-
-
-def test_steps_of_a_speed_in_another_unit_are_noticed() -> None:
-    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
-    wrong = Log(speed.time, speed.torque, speed=speed.values * 30.0 / math.pi, torque_is="demand")
-    with pytest.raises(InputError, match=r"counts of 1024 encoder lines in rpm; .*speed=NAME\[rpm\]"):
-        _check_step(wrong, 1024.0)
 
 
 # ---- files of inverters, scopes and spreadsheets -----------------------------------------------------------
@@ -117,6 +112,8 @@ LAYOUTS = {  # what stands above the numbers, a row, decimal mark, columns
         "time [ms];torque [N*m];angle [rad]\nof axis X; 2 channels\n", "{ms};{torque};{angle}", ",", {},
     ),
     "units below": ("time,torque,angle\ns,Nm,rad", "{s},{torque},{angle}", ".", {}),
+    "units of a current and of degrees below": ("t;strom;winkel\ns;A;°", "{s};{current};{deg}", ",",
+        {"time": "t", "torque": "1.2*strom[N*m]", "angle": "winkel"}),
     "units above": ("(ms);(Nm);(deg)\ntime;torque;angle", "{ms};{torque};{deg}", ",", {}),
     "units in names": ("t/ms;torque in Nm;angle_deg", "{ms};{torque};{deg}", ",", {}),
     "behind a mark": ("# time [ms] , torque [N*m] , angle [rad]", "{ms},{torque},{angle}", ".", {}),
@@ -156,6 +153,7 @@ def test_headings_clocks_and_shares_are_read(log: Log, kind: str, tmp_path: Path
         cells = {
             "s": f"{t:.6f}", "ms": f"{1e3 * t:.3f}", "torque": f"{u:.9f}", "angle": f"{a:.9f}",
             "clock": clock, "deg": f"{math.degrees(a):.9f}", "percent": f"{u / 0.12:.9f}",
+            "current": f"{u / 1.2:.9f}",
             "permille": f"{u / 0.012:.9f}", "counts": f"{1e6 * a / (2.0 * math.pi):.0f}",
         }  # fmt: skip
         rows.append(row.format(**{key: cell.replace(".", point) for key, cell in cells.items()}))
@@ -243,28 +241,15 @@ def test_a_motion_without_a_unit_is_a_question(kind: str, tmp_path: Path) -> Non
     assert read.notes == ('"t" has no unit and was taken for a time in s',)
 
 
-@pytest.mark.parametrize("unit", ["rad", "deg", "turn"])
-def test_the_unit_of_an_angle_is_told_by_its_derivative(unit: str, tmp_path: Path) -> None:
-    """A column of the speed, by any name, whose unit is stated."""
-    size = SIZES["angle"][unit]
-    columns = {
-        "time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0), "angle": ("angle", size),
-        "speed": ("n_act [rpm]", math.pi / 30.0),
-    }  # fmt: skip
-    read = Log.load(written(tmp_path / "a.csv", columns))
-    assert read.values == pytest.approx(SIGNALS["angle"], rel=1e-12, abs=1e-12)
-    assert f'"angle" has no unit; it is in {unit}, as the column "n_act [rpm]" tells' in read.notes
-
-
-@pytest.mark.parametrize("unit", ["rad/s", "rpm", "deg/s"])
-def test_the_unit_of_a_speed_is_told_by_its_integral(unit: str, tmp_path: Path) -> None:
-    columns = {
-        "time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0), "speed": ("speed", SIZES["speed"][unit]),
-        "angle": ("pos [deg]", math.pi / 180.0),
-    }  # fmt: skip
-    read = Log.load(written(tmp_path / "a.csv", columns))
-    assert read.values == pytest.approx(SPEED, rel=1e-12, abs=1e-12)
-    assert f'"speed" has no unit; it is in {unit}, as the column "pos [deg]" tells' in read.notes
+@pytest.mark.parametrize("unit", ["rad", "deg", "turn", "rad/s", "rpm", "deg/s"])
+def test_the_unit_of_a_motion_is_told_by_its_derivative_or_integral(unit: str, tmp_path: Path) -> None:
+    """A column of any name, whose unit is stated."""
+    kind, beside = ("angle", "n_act [rpm]") if unit in SIZES["angle"] else ("speed", "pos [deg]")
+    other = {"angle": ("speed", math.pi / 30.0), "speed": ("angle", math.pi / 180.0)}[kind]
+    columns = {"time": ("t [s]", 1.0), "torque": ("torque [Nm]", 1.0), kind: (kind, SIZES[kind][unit])}
+    read = Log.load(written(tmp_path / "a.csv", columns | {other[0]: (beside, other[1])}))
+    assert read.values == pytest.approx(SIGNALS[kind], rel=1e-12, abs=1e-12)
+    assert f'"{kind}" has no unit; it is in {unit}, as the column "{beside}" tells' in read.notes
 
 
 def test_two_units_without_a_name_and_units_that_contradict_are_questions(tmp_path: Path) -> None:
@@ -310,6 +295,7 @@ def test_a_torque_without_a_unit_is_taken_for_newton_metres_and_that_is_said(tmp
             r"angle=1/4096\*NAME \[turn\]. with the counts of a turn",
         ),
         ("time,torque,angle\n10:00:00,1,1\n10:00:0x,1,2", "this is no time of day"),
+        ("time;torque [‰];angle\n0;1;2\n1;1;2", r"of ‰, as .torque=NAME \[‰ of 35 N\*m\]"),
         ("torque\nnone", "no line of its first 400 has numbers in two columns"),
         ("0;1;2\n1;1;2", "no line above the numbers names the columns"),
         ("Name;torque;Name;n\n0;1;0;2\n1;1;1.5;2", "samples at other times than the first channel"),

@@ -397,9 +397,11 @@ def _in_si(unit: str, key: str, cell: str) -> float:
     except RefusedError as refusal:
         reason, ways = refusal.reason, f'"{key}=NAME [{si}]"'
         if COUNTS.fullmatch(unit.strip()):
-            ways = f'"{key}=1/4096*NAME [turn]" with the counts of a turn'
+            reason, ways = "a count has no size", f'"{key}=1/4096*NAME [turn]" with the counts of a turn'
         if key == "torque":
-            ways += '; of %, as "torque=NAME [% of 35 N*m]"; of a current in A, as "torque=1.2*NAME [N*m]"'
+            part = unit.strip() if unit.strip() in SHARES else "%"
+            ways += f'; of {part}, as "torque=NAME [{part} of 35 N*m]"'
+            ways += '; of a current in A, as "torque=1.2*NAME [N*m]"'
         raise RefusedError(
             f"{show(cell)}: {reason}; or name the unit that is meant, as --columns {ways}"
         ) from None

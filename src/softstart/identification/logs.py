@@ -292,11 +292,14 @@ def _check_times(time: Vector, name: str) -> None:
 
 
 def _once(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
-    """The columns without samples that repeat the one before, stamp and all."""
+    """The columns without samples that repeat the one before, if all that share its time stamp do.
+
+    Where some of them differ, the stamps are coarse, and a motor at rest has equal samples in them.
+    """
     rows = np.array(list(columns.values()))
-    again = np.zeros(rows.shape[1], dtype=bool)
-    again[1:] = np.all((rows[:, 1:] == rows[:, :-1]) | np.isnan(rows[:, 1:] + rows[:, :-1]), axis=0)
-    if not again.any():
+    equal = np.isclose(rows[:, 1:], rows[:, :-1], rtol=0.0, atol=0.0, equal_nan=True)
+    again = np.append(False, equal.all(axis=0))
+    if not again.any() or np.any(equal[0] & ~again[1:]):
         return columns
     count = int(again.sum())
     notes.append(f"{count} sample{'s' * (count > 1)} repeated the one before and {_were(count)} left out")

@@ -11,11 +11,12 @@ import numpy as np
 from scipy.optimize import minimize
 
 from softstart.arrays import Matrix, Vector
-from softstart.drive import FRICTIONS, Drive
+from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import Fitter, Point, Sizes
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
+from softstart.identification.result import FRICTIONS
 from softstart.identification.unknowns import (
     USUAL,
     chosen,

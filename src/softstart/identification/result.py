@@ -8,14 +8,15 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Matrix, Vector, plain_fields
 from softstart.chain.machines import records
-from softstart.drive import FRICTIONS, PARAMETERS, Drive
+from softstart.drive import FRICTIONS as OF_TWO
+from softstart.drive import PARAMETERS, Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.logs import Log
@@ -24,6 +25,7 @@ from softstart.notebook import Shown
 from softstart.quantities import RefusedError
 from softstart.start.comparison import INTERVAL
 
+FRICTIONS: Final = (*OF_TWO, "load_friction")  # what may be 0
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file

@@ -13,13 +13,13 @@ from scipy.stats import chi2
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
-from softstart.drive import FRICTIONS, PARAMETERS, Drive
+from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
 from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Sizes, Spot, agreeing
 from softstart.identification.log_files import MOTIONS, SIGNALS
 from softstart.identification.logs import TURN, Log
 from softstart.identification.model import FILTER, POSITION, LogModel
-from softstart.identification.result import AT_LIMIT, Estimate, Identification
+from softstart.identification.result import AT_LIMIT, FRICTIONS, Estimate, Identification
 from softstart.identification.unknowns import (
     FREE,
     Unknown,
@@ -158,7 +158,7 @@ def identify(
 def _directed(log: Log, drive: Drive) -> Log:
     """The log as the drive counts: where both directions are alike, the first one is forward."""
     turned = log.forward()
-    if turned is log or drive.load_kind == "reactive" or float(drive.Mc) == 0.0:
+    if turned is log or float(drive.active_torque) == 0.0:
         return turned
     told = (
         "the drive first turns backward, where the active load drives it; if the log counts the other way "
@@ -357,7 +357,8 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
     if shown:
         notes.append(
             "Something else moves this drive (another friction or load, cogging, a second gap, an elastic "
-            "part, a demand that was not realised), or the signals are filtered, clipped, cut or poor: "
+            "part, a demand that was not realised), or the signals are filtered, clipped, cut, poor or those "
+            "of another shaft: "
             f"{'; '.join(shown)}."
         )
     wider = [

@@ -10,11 +10,11 @@ from typing import Final, Literal
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.drive import FRICTIONS, PARAMETERS, Drive
+from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.identification.model import FILTER, POSITION
-from softstart.identification.result import WIDEST
+from softstart.identification.result import FRICTIONS, WIDEST
 from softstart.quantities import nearest, show
 
 USUAL: Final = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
@@ -137,7 +137,7 @@ def unknowns_of(
     for name in names:
         value, power = float(getattr(drive, name, 0.0)), POWERS.get(name)
         if name in FRICTIONS:
-            unit = torque if name == FRICTIONS[0] else torque / float(drive.target_speed)
+            unit = torque / float(drive.target_speed) if "viscous" in name else torque
             found.append(Unknown(name, "power", value / unit, 0.0, MOST_FRICTION, unit))
             continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %

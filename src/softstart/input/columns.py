@@ -147,12 +147,12 @@ def split_heading(cell: str) -> tuple[str, str]:
 def are_units(cells: Sequence[str]) -> bool:
     """Whether a line is one of units, below that of the names.
 
-    >>> are_units(["s", "Nm", "[rad/s]", "%"]), are_units(["t", "torque"]), are_units(["1", "1"])
+    >>> are_units(["s", "Nm", "[1/min]", "%"]), are_units(["t", "torque"]), are_units(["1", "1"])
     (True, False, False)
     """
     units = [cell.strip("[]() ") for cell in cells]
     known = (one in ("", "-", *SHARES) or not isinstance(read_unit(one), str) for one in units)
-    return any(units) and not any(map(_NUMBER.match, units)) and all(known)
+    return any(re.search(r"[^\W\d]|[%‰°]", one) for one in units) and all(known)
 
 
 def rows_of(lines: Sequence[tuple[int, str]], mark: str, where: str) -> list[Row]:

@@ -1,0 +1,188 @@
+"""Deviations, intervals and thresholds of identification, each against a calculation by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from scipy.stats import t as student
+from tests.softstart.test_identification import REVERSE, TRUTH, fit_of
+
+from softstart import InputError, Log
+from softstart.arrays import Vector
+from softstart.identification.fitting import RIPPLE, Fitter, Point, Sizes, Spot
+from softstart.identification.model import LogModel
+from softstart.identification.planning import made_up_log
+from softstart.identification.solving import (
+    _check_inertia,
+    _effects,
+    _other_scale,
+    _slow_torque,
+    _whiteness,
+    misfits,
+)
+from softstart.identification.unknowns import Unknown, unknowns_of
+
+PLACED = TRUTH.replace(start_position="mid-gap")
+
+
+def gaussian(shape: tuple[int, ...], seed: int = 7) -> Vector:
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+# ---- a straight line, whose intervals are known ---------------------------------------------------------
+
+
+def line(count: int, width: int, size: float) -> tuple[Fitter, Point]:
+    """Least squares with errors of one unknown size, as a fit whose V is the ripple squared.
+
+    `largest_torque` is such that the size expected beforehand is the true one.
+    """
+    jacobian = 100.0 * gaussian((count, width))
+    residual = gaussian((count,), 8)
+    residual -= jacobian @ np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+    residual *= size * math.sqrt((count - width) / float(residual @ residual))
+    spot = Spot(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), jacobian)
+    model: Any = SimpleNamespace(log=SimpleNamespace(torque=np.array([size / RIPPLE])))
+    fitter = Fitter([model], [Unknown("gap", "power", 0.0, -9.0, 9.0)] * width)
+    return fitter, Point(np.zeros(width), Sizes(0.0, size), (spot,))
+
+
+@pytest.mark.parametrize(("count", "width"), [(12, 3), (60, 5)])
+def test_intervals_of_a_straight_line_are_those_of_student(count: int, width: int) -> None:
+    """Half of each is t sqrt(s^2 (J'J)^-1), with s^2 and t of count - width degrees of freedom."""
+    size = 0.7
+    fitter, best = line(count, width, size)
+    # what is known of the size beforehand, a factor of 3, is worth half a degree of freedom: 0.5/ln(3)^2
+    freedom = count - width + 0.5 / math.log(3.0) ** 2
+    quantile = float(student.ppf(0.975, freedom))
+    expected = freedom * math.log1p(quantile**2 / freedom)
+    assert fitter.threshold(best) == pytest.approx(expected, rel=2e-3)  # of second differences over 0.1
+    jacobian = best.spots[0].jacobian
+    deviations = size * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    assert fitter.halves(best) == pytest.approx(quantile * deviations, rel=0.02)  # sizes in steps of 10 %
+    assert np.sqrt(np.diag(fitter.covariance(best))) == pytest.approx(deviations, rel=1e-3)
+
+
+def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
+    """Least squares of r + G e over the noise and of e over the ripple, with r about e = 0."""
+    response, residual, sizes = gaussian((9, 6)), gaussian((9,), 3), Sizes(1.3, 0.4)
+    eigenvalues, vectors = np.linalg.eigh(response @ response.T)
+    spot = Spot(np.zeros(6), vectors.T @ residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
+    normal = response.T @ response / 1.3**2 + np.eye(6) / 0.4**2
+    expected = -np.linalg.solve(normal, response.T @ residual / 1.3**2)
+    assert spot.likely_error(spot.residual, sizes) == pytest.approx(expected, rel=1e-9)
+
+
+def test_innovations_are_independent_of_unit_size_and_of_what_came_before() -> None:
+    response, sizes = gaussian((9, 6)), Sizes(1.3, 0.4)
+    eigenvalues, vectors = np.linalg.eigh(response @ response.T)
+    spot = Spot(np.zeros(6), np.zeros(9), vectors.T, np.maximum(eigenvalues, 0.0), response)
+    each = np.array([spot._replace(residual=column).innovations(sizes) for column in vectors]).T
+    covariance = 1.3**2 * np.eye(9) + 0.4**2 * response @ response.T
+    assert each @ covariance @ each.T == pytest.approx(np.eye(9), abs=1e-9)
+    assert np.triu(each, 1) == pytest.approx(0.0, abs=1e-9)
+
+
+# ---- what is known --------------------------------------------------------------------------------------
+
+
+def test_known_is_an_interval_below_a_factor_of_three() -> None:
+    """Upper over lower end is exp(2 half) of a logarithm; a gap, by its root, has twice the share of x."""
+    stiffness = Unknown("stiffness", "logarithm", 5.0, 3.0, 7.0)
+    assert stiffness.known(5.0, 0.5 * math.log(2.99))
+    assert not stiffness.known(5.0, 0.5 * math.log(3.01))
+    gap = Unknown("gap", "power", 1.0, 0.1, 3.0, 0.08, power=0.5)
+    assert gap.share(1.0, 0.1) == pytest.approx(0.2)
+    assert gap.known(1.0, 0.25 * math.log(2.99))
+    assert not gap.known(1.0, 0.25 * math.log(3.01))
+    place = Unknown("position", "position", 0.7, 0.0, 1.0)
+    assert place.known(0.7, 0.249)
+    assert not place.known(0.7, 0.251)
+    friction = Unknown("motor_friction", "power", 0.5, 0.0, 3.0)
+    assert friction.known(0.5, 0.499)
+    assert not friction.known(0.5, 0.501)
+    assert [stiffness.limited(x) for x in (3.003, 3.005, 6.997, 6.995)] == [True, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("share", "refused"), [(0.99 / 25, True), (1.01 / 25, False), (24.9, False), (25.1, True)]
+)
+def test_an_inertia_is_believed_within_a_factor_of_25(share: float, refused: bool) -> None:
+    """Of the rotor alone, and of rotor and load: 40 N m and a constant acceleration."""
+    whole = float(TRUTH.J1 if share < 1.0 else TRUTH.J1 + TRUTH.J2)
+    time = np.arange(100) * 1e-3
+    log = Log(time, np.full(100, 40.0), speed=40.0 / (share * whole) * time)
+    if not refused:
+        return _check_inertia(log, TRUTH)
+    with pytest.raises(InputError, match="look at the units of its columns"):
+        _check_inertia(log, TRUTH)
+    return None
+
+
+@pytest.mark.parametrize(("ratio", "doubted"), [(0.199, True), (0.201, False), (4.98, False), (5.02, True)])
+def test_inertias_five_times_off_are_doubted(ratio: float, doubted: bool) -> None:
+    found = TRUTH.replace(motor_inertia=ratio * TRUTH.J1, load_inertia=ratio * TRUTH.J2)
+    assert bool(_other_scale(TRUTH, found)) == doubted
+
+
+# ---- what the model has not -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("share", "stated"), [(0.05, True), (0.073, False)])
+def test_a_torque_error_above_six_per_cent_is_no_ripple(share: float, stated: bool) -> None:
+    """Of 40.3 N m, at the true drive; 146 samples tell its size within 6 %."""
+    log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=40.3 * share, seed=4)
+    fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
+    point = fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 2.0))
+    point = fitter.derived(point, None)
+    assert point.sizes.ripple == pytest.approx(40.3 * share, rel=0.1)
+    assert any("a torque error of" in note for note in misfits(fitter, point)) != stated
+
+
+@pytest.mark.parametrize(("deviations", "named"), [(3.9, False), (4.1, True)])
+def test_an_effect_of_four_deviations_is_named_with_its_size(deviations: float, named: bool) -> None:
+    """An offset of the torque: what is left is its shape, so many deviations of its size."""
+    log = made_up_log(PLACED, REVERSE, log_period=8e-3, ripple=1.0, seed=3)
+    unknowns = unknowns_of(["gap", "load_inertia"], PLACED, [log], [False])
+    fitter = Fitter([LogModel.of(log, PLACED)], unknowns)
+    x = np.array([one.guess for one in unknowns])
+    point = fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0))
+    point = fitter.derived(point, point)
+    spot = point.spots[0]
+    root = np.sqrt(spot.variance(point.sizes))
+    jacobian = point.white[1]
+    # a torque of 1 N m in all samples, less what the parameters explain of it
+    shape = spot.rotation @ spot.response @ np.ones(log.time.size) / root
+    shape -= jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
+    deviation = 1.0 / float(np.linalg.norm(shape))
+    left = spot._replace(residual=-deviations * deviation * shape * root)
+    notes = _effects(fitter, point._replace(spots=(left,)))
+    assert bool(notes) == named
+    if named:
+        size, error = deviations * deviation, 2.0 * deviation
+        assert f"an offset of the torque signal of {size:.3g} +- {error:.2g} N m" in notes[0]
+        turned = replace(fitter, models=[replace(fitter.models[0], log=log.changed(sign=-1.0))])
+        # of a log that was turned round the signal has the other sign
+        assert f"of {-size:.3g} +-" in _effects(turned, point._replace(spots=(left,)))[0]
+
+
+def test_the_chance_of_correlations_is_that_of_ljung_and_box() -> None:
+    """Of 1, -1, 1, ...: r_k = (-1)^k (n - k)/n, so Q = (n + 2)/n sum(n - k), of two lags for n = 8."""
+    left = np.tile([1.0, -1.0], 4)
+    assert _whiteness(left) == pytest.approx(math.exp(-0.5 * 10.0 / 8.0 * (7.0 + 6.0)), rel=1e-12)
+
+
+def test_the_chance_of_a_slow_torque_is_that_of_its_waves() -> None:
+    """Of 100 samples that answer to their own torque alone: twenty waves, and one of 50 explains the rest."""
+    count, sizes = 100, Sizes(0.0, 2.0)
+    waves = np.cos(math.pi * np.outer(np.arange(count) + 0.5, [3.0, 50.0]) / count)
+    waves /= np.linalg.norm(waves, axis=0)
+    residual = 2.0 * (5.0 * waves[:, 0] + 30.0 * waves[:, 1])
+    spot = Spot(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), waves[:, 1:])
+    assert _slow_torque(spot, sizes) == pytest.approx(float(chi2.sf(25.0, 20)), rel=1e-6)
