@@ -25,7 +25,7 @@ from softstart.notebook import Shown
 from softstart.quantities import RefusedError
 from softstart.start.comparison import INTERVAL
 
-FRICTIONS: Final = (*OF_TWO, "load_friction")  # what may be 0
+FRICTIONS: Final[tuple[str, ...]] = (*OF_TWO, "load_friction")  # what may be 0
 AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file
