@@ -10,8 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softstart.errors import InputError
 from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
-from softstart.quantities import RefusedError, Value, nearest, parse, show, without_powers
+from softstart.quantities import RefusedError, Value, nearest, parse, show, values_in, without_powers
 
 __all__ = [
     "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "at_motor", "bare", "meant_by",
@@ -279,6 +280,8 @@ def read_value(
 
     >>> read_value(Parameter("gap", "rad", "total gap", '"0.5 rad"', "0 or more"), "500 mrad")
     0.5
+    >>> read_value(Parameter("torque", "N*m", "torque", '"90 N*m"', many=True), "[200, 0.09 kN*m]")
+    (200.0, 90.0)
     >>> read_value(Parameter("kind", "", "kind", '"active"', choices=("active", "reactive")), "activ")
     Traceback (most recent call last):
     softstart.quantities.RefusedError: the kind is "active" or "reactive"; did you mean "active"?
@@ -288,6 +291,12 @@ def read_value(
         return _read_choice(p, value)
     if not p.unit:
         return _read_text(p, value)
+    if p.many and isinstance(value, str):  # of --set, or of a field of the page
+        try:
+            parts = values_in(value.strip("[] "), p.meaning)
+            value = parts if len(parts) > 1 else parts[0]
+        except InputError as error:
+            raise RefusedError(error.sentences[0].rpartition(": ")[2].rstrip(".")) from None
     number = parse(at_motor(p, value, gear), p.unit, infinite=p.infinite)
     if p.many:
         number = np.atleast_1d(number)

@@ -198,7 +198,8 @@ def document(report: Report) -> str:
         "chains": chains, "lives": lives,
         "output": "|#at the output, N m" if drive.gear else "", "strategies": strategies,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
-        "drive_lines": drives.drive_lines, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
+        "drive_lines": drives.drive_lines, "curves": list(drives.curves(drive)),
+        "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
         "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
         "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
     }  # fmt: skip
@@ -240,20 +241,28 @@ def there_of(gear: Gear | None, parameter: Parameter, numbers: list[float]) -> s
     return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)
 
 
+def of_part(drive: Any, path: str, parameter: Parameter) -> str:
+    """What a parameter means, of a chain with the mass or shaft that has it: "fan: load torque"."""
+    table, _, number = path.partition("]")[0].partition("[")
+    names = {"mass": drive.mass_names, "shaft": drive.shaft_names}.get(table, ())
+    return f"{names[int(number) - 1]}: {parameter.meaning}" if number else parameter.meaning
+
+
 def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
     project, units, gear = report.project, units_of(report.drive), report.drive.gear
     rows, absent = list[list[str]](), list[str]()
     for path, (parameter, value) in report.drive.by_path().items():
-        source, si = project.source_of(path), parameter.unit
+        source, si, meaning = project.source_of(path), parameter.unit, of_part(report.drive, path, parameter)
         if value is None or value == "" or parameter.name in HIDDEN:
             continue
         if value == parameter.default and not source:
-            absent += [parameter.meaning] if value == 0.0 else []
+            absent += [meaning] if value == 0.0 else []
             continue
         of, other, text, there = unit(units.of(si)), "", str(value), ""
         values = value if isinstance(value, tuple) else (value,)
-        numbers = [float(units.shown(v, si)) for v in values if isinstance(v, float)]
+        exact = [v for v in values if isinstance(v, float)]
+        numbers = [float(units.shown(v, si)) for v in exact]
         if numbers:
             text, there = ", ".join(map(short, numbers)), there_of(gear, parameter, numbers)
             if parameter.at_output == "here":  # and the motor shaft is the other one
@@ -262,12 +271,12 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
             hours = value / 3600.0
             text, of, other = digits(hours / fatigue.HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
         elif numbers and of != unit(si):
-            other = f"{digits(value)} {unit(si)}"
+            other = f"{', '.join(map(digits, exact))} {unit(si)}"
         elif numbers and si == "rad/s":
-            other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
+            other = f"{', '.join(short(float(f'{v * RPM:.6g}')) for v in exact)} rpm"
         elif numbers and si == "rad":
-            other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
-        cells = [parameter.meaning, parameter.symbol, text, of if numbers else "", other]
+            other = ", ".join(f"{short(float(f'{math.degrees(v):.4g}'))}°" for v in exact)
+        cells = [meaning, parameter.symbol, text, of if numbers else "", other]
         cells += [f"{there} {of}" if there else ""] if gear else []
         rows.append([*cells, source or "not stated"] if project.sources else cells)
     heads = "parameter|symbol|#value|unit|#that is" + ("|#at the output shaft" if gear else "")

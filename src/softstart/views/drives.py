@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from softstart.chain.model import Chain
 from softstart.drive import INFORMATIVE_TABLES
 from softstart.views.numbers import RPM, printable, short
 
@@ -82,8 +83,18 @@ def _also(machine: Any) -> Iterator[str]:
         value = float(getattr(motor, name))
         if value and math.isfinite(value):
             yield f"{words} {short(value)} {unit}"
+    yield from curves(machine)
     if w1 or w2:
         yield f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s"
+
+
+def curves(machine: Any) -> Iterator[str]:
+    """The load curves of a chain, in words."""
+    for mass in machine.masses if isinstance(machine, Chain) else ():
+        if mass.curve is not None:
+            points, _, by_angle = mass.curve
+            name, over = printable(mass.name), "angle" if by_angle else "speed"
+            yield f"load curve of {name} over its {over}, {len(points)} points"
 
 
 def controllers_set_up(machine: Any, fitted_to: Any) -> str:
