@@ -98,7 +98,7 @@ class _Answers:
 
     def keep(self) -> None:
         """Write the file: whole, or as it was before."""
-        values = self.values()
+        values = sheets.answered(self.values()) if "friction" in self.seen else self.values()
         left = [PARAMETERS[name].path for name in self.seen if PARAMETERS[name].path not in values]
         lines = [HEAD, *([EMPTY + ", ".join(left)] if left else [])]
         for table in DataSheet.TABLES:
@@ -122,7 +122,7 @@ def asked(given: Mapping[str, object], file: Path) -> DataSheet:
             for p in iter(lambda: next((p for p in QUESTIONS if _open(p, answers)), None), None):
                 _ask(p, answers, kept)
             try:
-                sheet = DataSheet.from_settings(answers.values())
+                sheet = DataSheet.from_settings(sheets.answered(answers.values()))
                 _ = sheet.drive
                 return sheet
             except InputError as error:

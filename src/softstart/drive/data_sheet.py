@@ -359,7 +359,7 @@ class DataSheet(ParameterSet):
             yield (
                 f"{of['active_torque'].place} = {self.active_torque:.5g} N*m: does it act always, as a lift, "
                 "wind or an imbalance, or only against the motion? If always, write friction = 0 as well, or "
-                "what friction there is; if it is friction, write friction in place of torque."
+                f"what friction there is; if it is friction, write it as {of['friction'].place}."
             )
         if self.rise and self.length and abs(self.rise) >= self.length:
             yield (

@@ -12,7 +12,7 @@ from softstart.quantities import RefusedError
 
 __all__ = [
     "ABOUT", "INSTEAD", "MACHINES", "NEEDED", "ROPE", "STIFFNESSES", "TYPICAL", "USUAL", "Machine",
-    "converted", "echo", "if_empty", "in_usual_unit", "typed",
+    "answered", "converted", "echo", "if_empty", "in_usual_unit", "typed",
 ]  # fmt: skip
 
 Machine = Literal["hoist", "travel", "belt", "rotor"]
@@ -111,6 +111,18 @@ def typed(p: Parameter, text: str) -> str:
     if p.name == "efficiency" and number and float(number) >= 10.0:
         unit = "%"
     return f"{number} {unit}" if number and unit not in ("", "1") else text.strip()
+
+
+def answered(settings: Mapping[str, object]) -> dict[str, object]:
+    """Values by path of a dialog or form, which asks for friction and for what acts always: "" is none.
+
+    In a file a torque alone may be either (`DataSheet` asks).
+
+    >>> answered({"load.torque": "7 kN*m"})
+    {'load.torque': '7 kN*m', 'load.friction': 0}
+    """
+    torque = "load.torque" in settings and "load.friction" not in settings
+    return {**settings, **({"load.friction": 0} if torque else {})}
 
 
 def in_usual_unit(p: Parameter, refusal: RefusedError) -> RefusedError:

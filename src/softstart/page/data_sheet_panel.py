@@ -13,6 +13,7 @@ from softstart.drive.data_sheet_words import (
     MACHINES,
     TYPICAL,
     USUAL,
+    answered,
     echo,
     if_empty,
     in_usual_unit,
@@ -85,7 +86,7 @@ class DataSheetPanel:
         found: DataSheet | None = None
         reveal(self._answer, "nearest")
         try:
-            found = DataSheet.from_settings(written)
+            found = DataSheet.from_settings(answered(written))
             title, sentences = "Check these values.", found.doubts
         except InputError as error:
             found, title, sentences = None, "There is no drive yet.", list(error.sentences)

@@ -9,10 +9,12 @@ import signal
 import subprocess
 import sys
 import tomllib
+import types
 
 import pytest
 
 from softstart import DataSheet, Drive
+from softstart.cli import asking
 
 ANSWERS = [
     "gantry", "", "travel", "3", "1430", "0.0119", "0.0066", "", "2.2", "", "2.6", "2 ms", "1500", "0",
@@ -186,14 +188,55 @@ def test_the_template_is_a_sheet_that_can_be_filled_in(run, place, as_json):
     assert Drive.from_toml(half).Mc < 0.51 * sheet.drive.Mc
 
 
-def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
-    """Prompt, --set, data sheet given to a command, and form."""
-    typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
-          "", "290", "900", "", "", "", "", "")  # fmt: skip
-    assert run("init", "--ask", "--out", "asked.toml").code == 0
-    settings = [word for path, text in (SLEWING | UNITS).items() for word in ("--set", f"{path}={text}")]
+# as typed, and by hand J2, c, gap, torque against forward motion
+TROLLEY = {
+    "load.machine": "trolley", "motor.rated_power": "3", "motor.rated_speed": "1410",
+    "motor.inertia": "0.0062", "gear.ratio": "38.1", "gear.efficiency": "95",
+    "gear.stiffness": "35 kN*m/rad", "gear.backlash": "9",
+    "load.mass": "6.5 t", "load.diameter": "315", "load.slope": "3 %", "limits.output_torque": "1.6 kN*m",
+}  # fmt: skip
+UPHILL = 6500 * 9.80665 * (0.03 + 0.008) / math.sqrt(1 + 0.03**2) * 0.1575
+BELT = {
+    "load.machine": "belt conveyor", "motor.rated_power": "75", "motor.rated_speed": "1485",
+    "motor.inertia": "0.9", "gear.ratio": "25", "gear.efficiency": "0.94", "gear.stiffness": "400 N*m/arcmin",
+    "gear.backlash": "10", "load.mass": "12 t", "load.radius": "0.4", "load.torque": "7000",
+}  # fmt: skip
+LIFTED = 7000 + 0.02 * 12000 * 9.80665 * 0.4
+USUAL = {"motor.rated_power": "kW", "motor.rated_speed": "rpm", "gear.backlash": "arcmin",
+         "load.diameter": "mm", "gear.efficiency": "%"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("typed", "by_hand"),
+    [
+        (SLEWING, (290 / 38**2, 1.1e6 / 38**2, math.radians(8 / 60) * 38, 900 / 38)),
+        (TROLLEY, (6500 * 0.1575**2 / (38.1**2 * 0.95), 35e3 / (38.1**2 * 0.95), math.radians(9 / 60) * 38.1,
+                   UPHILL / (38.1 * 0.95))),
+        (BELT, (12000 * 0.16 / (625 * 0.94), 400 * 60 * 180 / math.pi / (625 * 0.94),
+                math.radians(10 / 60) * 25, LIFTED / (25 * 0.94))),
+    ],
+    ids=["slewing crane", "trolley uphill", "inclined belt"],
+)  # fmt: skip
+def test_a_machine_is_the_same_by_every_way_in(run, monkeypatch, place, typed, by_hand):
+    """Prompt, --set, data sheet given to a command, form, and Python."""
+    asks = []
+    question = asking.question
+    monkeypatch.setattr(asking, "question", lambda p, *rest: asks.append(p) or question(p, *rest))
+    dialog = types.SimpleNamespace(isatty=lambda: True, readline=lambda: f"{typed.get(asks[-1].path, '')}\n")
+    monkeypatch.setattr(sys, "stdin", dialog)
+    assert run("init", "--out", "asked.toml").code == 0
+
+    def unit(path: str) -> str:
+        share = path == "gear.efficiency" and float(typed[path]) <= 1.0
+        return f" {USUAL[path]}" if path in USUAL and typed[path].isdecimal() and not share else ""
+
+    written = {path: text + unit(path) for path, text in typed.items()}
+    if "load.torque" in written:  # which the prompt and the form ask for beside the friction
+        written["load.friction"] = "0"
+    settings = [word for path, text in written.items() for word in ("--set", f"{path}={text}")]
     assert run("init", *settings, "--out", "set.toml").code == 0
-    (place / "sheet.toml").write_text(DataSheet.from_settings(SLEWING | UNITS).to_toml())
+    sheet = DataSheet(**{p.name: written[p.path] for p in DataSheet.PARAMETERS.values() if p.path in written})
+    (place / "sheet.toml").write_text(sheet.to_toml())
     pytest.importorskip("nicegui")
     from nicegui import Client
     from nicegui.page import page
@@ -204,14 +247,38 @@ def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
     with Client(page("/never-opened")) as client:
         panel = DataSheetPanel(Session(controllers=["direct"]), "A")
         for name, p in DataSheet.PARAMETERS.items():
-            panel._fields[name].value = SLEWING.get(p.path, "")
+            panel._fields[name].value = sheet.machine if p.choices else typed.get(p.path, "")
         (place / "form.toml").write_text(panel.sheet().drive_toml())
         client.delete()
-    for name in ("asked", "set", "sheet", "form"):
-        drive = Drive.load(f"{name}.toml")
-        by_hand = 290 / 38**2, 1.1e6 / 38**2, math.radians(8 / 60) * 38, 900 / 38
-        assert (drive.J2, drive.c, drive.gap, drive.Mc) == pytest.approx(by_hand, rel=1e-12)
-        assert drive.assumed == "damping ratio 0.02"
+    drives = {name: Drive.load(f"{name}.toml") for name in ("asked", "set", "sheet", "form")}
+    assert drives["sheet"] == sheet.drive
+    assert (place / "form.toml").read_text() == (place / "set.toml").read_text() == sheet.drive_toml()
+    for drive in drives.values():
+        assert (drive.J2, drive.c, drive.gap, drive.Mc) == pytest.approx(by_hand, rel=1e-5)
+        assert drive.assumed == sheet.drive.assumed
+        assert drive.limits.output_torque == sheet.permissible_output_torque
+
+
+def test_the_form_speaks_of_the_unit_that_it_reads():
+    """Beside a word in place of a speed: a bare number is in rpm there."""
+    pytest.importorskip("nicegui")
+    from nicegui import Client
+    from nicegui.page import page
+
+    from softstart.page.data_sheet_panel import made
+
+    with Client(page("/never-opened")) as client:
+        for name, unit in (
+            ("rated_speed", "rpm"),
+            ("backlash", "arcmin"),
+            ("diameter", "mm"),
+            ("mass", "kg"),
+        ):
+            field = made(DataSheet.PARAMETERS[name])
+            field.value = "fast"
+            notes = [one.text for one in field.parent_slot.parent.descendants() if hasattr(one, "text")]
+            assert any(f"or as a bare number in {unit}" in str(note) for note in notes), name
+        client.delete()
 
 
 def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):

@@ -190,7 +190,7 @@ def test_a_word_for_two_machines_or_none_is_asked(words):
         (TROLLEY, {"load.rise": "6 m", "load.length": "6 m"}, "a track of 6 m cannot rise so far"),
         (TROLLEY, {"load.counterweight": 100}, "[load] counterweight is for a hoist"),
         (TROLLEY, {"load.torque": 100}, "does it act always, as a lift, wind or an imbalance"),
-        (BELT, {"load.torque": "7000 N*m"}, "if it is friction, write friction in place of torque"),
+        (BELT, {"load.torque": "7000 N*m"}, "if it is friction, write it as [load] friction"),
         (BELT, {"load.goods": "4 t"}, "says nothing without a slope"),
         (BELT, {"load.goods": "40 t", "load.slope": "3 deg"}, "is more than [load] mass = 12000 kg"),
         (BELT, {"shaft.elastic_frequency": "8 Hz"}, "and gears are given as well; leave out"),
