@@ -405,8 +405,25 @@ def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
 # ---- writing --------------------------------------------------------------------------------------------
 
 
-def robust_text(saved: RobustFile, about: Mapping[str, Any] | None = None) -> str:
-    """The TOML text of a robust set; `about` says where it comes from and is not read.
+def meanings_of(controller: Controller) -> dict[str, str]:
+    """What each parameter of a controller is, with its unit, as a comment.
+
+    >>> meanings_of(make_controller("ramp"))["time"]
+    's: duration of the rise'
+    """
+    about = {one.name: one.metadata for one in fields(controller)}
+    units = {name: one.get("unit", "") for name, one in about.items()}
+    return {
+        name: f"{units[name]}: {one['meaning']}" if units[name] not in ("", "1") else one["meaning"]
+        for name, one in about.items()
+        if "meaning" in one
+    }
+
+
+def robust_text(
+    saved: RobustFile, about: Mapping[str, Any] | None = None, meanings: Mapping[str, str] | None = None
+) -> str:
+    """The TOML text of a robust set; `about` says where it comes from and is not read, nor are `meanings`.
 
     >>> from pathlib import Path
     >>> saved = RobustFile("ramp", {"time": 0.12}, Drive.load("crane-4amtkf"))
@@ -416,25 +433,29 @@ def robust_text(saved: RobustFile, about: Mapping[str, Any] | None = None) -> st
     blocks = [
         f"# softstart simulate DRIVE --controller FILE plays it\nkind = {literal(ROBUST)}\n"
         f"controller = {literal(saved.controller)}",
-        _table("parameters", saved.parameters),
+        _table("parameters", saved.parameters, meanings),
         *([_table("about", about)] if about else []),
         _nested(saved.drive),
     ]
     return "\n\n".join(blocks) + "\n"
 
 
-def schedule_text(saved: ScheduleFile, about: Mapping[str, Any] | None = None) -> str:
-    """The TOML text of a schedule; `about` says where it comes from and is not read."""
+def schedule_text(
+    saved: ScheduleFile, about: Mapping[str, Any] | None = None, meanings: Mapping[str, str] | None = None
+) -> str:
+    """The TOML text of a schedule; `about` says where it comes from and is not read, nor are `meanings`."""
+    said = meanings or {}
     blocks = [
         "# softstart simulate DRIVE --controller FILE plays it, with the gap and load inertia that DRIVE "
         f"declares\nkind = {literal(SCHEDULE)}\ncontroller = {literal(saved.controller)}\n"
         f"gaps = {literal(saved.gaps)}  # rad, the rows of each table of values\n"
         f"load_inertias = {literal(saved.load_inertias)}  # kg*m^2, its columns",
-        *([_table("fixed", saved.fixed)] if saved.fixed else []),
+        *([_table("fixed", saved.fixed, said)] if saved.fixed else []),
     ]
     for name, gain in saved.gains.items():
         rows = "".join(f"    {literal(row)},\n" for row in gain.values)
-        blocks.append(f"[gains.{name}]\nscale = {literal(gain.scale)}\nvalues = [\n{rows}]")
+        what = f"  # {said[name]}" if name in said else ""
+        blocks.append(f"[gains.{name}]{what}\nscale = {literal(gain.scale)}\nvalues = [\n{rows}]")
     if about:
         blocks.append(_table("about", about))
     return "\n\n".join(blocks) + "\n"
@@ -465,8 +486,11 @@ def _cell(value: Any) -> str:
     return str(plain)
 
 
-def _table(name: str, values: Mapping[str, Any]) -> str:
-    lines = [f"{key} = {literal(value)}" for key, value in values.items() if value is not None]
+def _table(name: str, values: Mapping[str, Any], meanings: Mapping[str, str] | None = None) -> str:
+    said = {key: f"  # {what}" for key, what in (meanings or {}).items()}
+    lines = [
+        f"{key} = {literal(value)}{said.get(key, '')}" for key, value in values.items() if value is not None
+    ]
     return "\n".join([f"[{name}]", *lines])
 
 

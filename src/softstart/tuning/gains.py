@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -21,6 +22,8 @@ SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
 EQUALLY_GOOD = 1e-3  # share of the metric that smoothness may cost
 WIDER = 2  # times the population of a cell: a worst case over many starts is rougher than one start
+DIGITS = (6, 9, 12)  # of the parameters of one set
+ROUNDED = 1e-4  # share of the metric that their rounding may cost
 KEPT_EACH = 1.0  # s, after which an unfinished search is written down again
 
 
@@ -75,7 +78,8 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
     places, found = (part[best] for part in last.best)
     if not trials.robust:
         places = _smooth(trials, costs, places, found)
-    return _settled(trials, places, restart_costs)
+    settled = _settled(trials, places, restart_costs)
+    return _rounded(trials, settled) if trials.robust else settled
 
 
 def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None) -> Populations:
@@ -166,3 +170,23 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
     values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
     judged = Judged(*(np.where(back[:, None], *both) for both in zip(default, tuned, strict=True)))
     return Found(values, judged, np.where(back, before, ours), restart_costs)
+
+
+def _rounded(trials: Trials, found: Found) -> Found:
+    """One set with few digits in all its parameters, the derived ones too: as its file has them.
+
+    What it reaches is what the rounded values reach: in time as before, never worse than the defaults, and no
+    more than `ROUNDED` above the exact ones; else they have more digits, or all.
+    """
+    job = np.zeros(1, dtype=np.int64)
+    exact = replace(trials.controller, **{name: float(value[0]) for name, value in found.values.items()})
+    parameters = exact.set_up(trials.drives[0])[0].parameters
+    numbers = {k: v for k, v in parameters.items() if isinstance(v, float) and math.isfinite(v)}
+    ours, before = float(found.costs[0]), float(trials.cost(job, trials.default)[0])
+    for digits in DIGITS:
+        values = {name: np.array([float(f"{value:.{digits}g}")]) for name, value in numbers.items()}
+        judged = trials.judged(job, values, to_the_end=True)
+        cost = trials.cost(job, judged)
+        if cost[0] <= max(ours, min(before, (1.0 + ROUNDED) * ours)):
+            return Found(values, judged, cost, found.restart_costs)
+    return found

@@ -18,6 +18,7 @@ from softstart.controller.tuned import (
     RobustFile,
     RobustGains,
     ScheduleFile,
+    meanings_of,
     robust_text,
     schedule_csv,
     schedule_text,
@@ -186,13 +187,14 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
         """
         about = {"softstart": __version__, **self._asked(), "free": list(self.question.names)}
         if what == "schedule" or (what is None and self.schedule is not None):
-            text = schedule_text(self._schedule_file(), about)
+            text = schedule_text(self._schedule_file(), about, meanings_of(self.question.recipe.make()))
         elif (one := self.robust) is None:
             raise InputError("robust: no robust set was tuned; call tune with robust=True.")
         else:
             saved = RobustFile(self._name(), one.parameters, one.controller.nominal)
-            told = {"worst": one.worst, "worst_default": one.worst_default, "in_time": one.feasible}
-            text = robust_text(saved, about | told)
+            worst, before = (float(f"{value:.6g}") for value in (one.worst, one.worst_default))
+            told = {"worst": worst, "worst_default": before, "in_time": one.feasible}
+            text = robust_text(saved, about | told, meanings_of(one.controller.controller))
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def to_csv(self, path: str | Path) -> None:

@@ -46,13 +46,15 @@ def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
 def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     """The robust set with what it reaches."""
     quantile = trials.question.quantile
-    gains = {name: float(value[0]) for name, value in found.values.items()}
-    ready, own = replace(trials.controller, **gains).set_up(trials.drives[0])
+    values = {name: float(value[0]) for name, value in found.values.items()}
+    ready, own = replace(trials.controller, **values).set_up(trials.drives[0])
+    if len(trials.question.drive.positions) > 1:  # controllers are set up for mid-gap; the drive has no such
+        own = own.replace(start_position="unknown")
     both = found.judged, trials.default
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
     return RobustSet(
         parameters=ready.parameters,
-        gains=gains,
+        gains={name: values[name] for name in trials.question.names},
         defaults={name: float(value[0]) for name, value in trials.defaults.items()},
         worst=worst,
         worst_default=worst_default,

@@ -227,6 +227,27 @@ def test_what_is_later_than_allowed_is_not_set_beside_an_optimum_in_time():
     assert "1 of 1 cells not in time" in " ".join(conclusions(tuned))
 
 
+def test_one_set_is_written_with_few_digits_and_units_and_is_what_was_promised(tmp_path):
+    """Parameters of at most nine digits, each with its unit, the position of the drive; K_dyn to the bit."""
+    drive = CRANE.replace(load_kind="reactive", start_position="unknown")
+    found = tune(drive, "ramp", [0.5], ["5 J1"], schedule=False, **SMALL)
+    found.to_toml(path := tmp_path / "robust.toml", "robust")
+    text = path.read_text("utf-8")
+    assert 'position = "unknown"' in text
+    lines = text.partition("[parameters]\n")[2].partition("\n\n")[0].splitlines()
+    assert [line.split(" = ")[0] for line in lines] == ["initial", "time", "full_torque", "period"]
+    for line, unit in zip(lines, ("N*m", "s", "N*m", "s"), strict=True):
+        number, _, comment = line.partition(" = ")[2].partition("  # ")
+        assert comment.startswith(f"{unit}: ")
+        assert number == repr(float(f"{float(number):.9g}"))
+    assert simulate(drive, str(path)).k_dyn == found.robust.worst
+    assert found.robust.worst <= found.robust.worst_default
+    assert f"worst = {found.robust.worst:.6g}\n" in text
+    player = make_controller(str(path))
+    assert player.nominal == drive.replace(start_position="unknown")
+    assert player.parameters == found.robust.parameters
+
+
 # bad input ------------------------------------------------------------------------------------------------
 
 BAD = {
