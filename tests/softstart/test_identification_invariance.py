@@ -85,6 +85,11 @@ def test_an_angle_may_wrap_at_any_number_of_full_turns(turns: int, first: float)
     assert_same(rebuilt(angle=np.mod(LOG.values + first, 2.0 * math.pi * turns)))
 
 
+def test_a_motor_that_turns_by_two_counts_does_not_jump() -> None:
+    angle = 0.1 * np.round(np.sin(np.linspace(0.0, 3.0, 60)))
+    assert Log(np.arange(60.0), np.full(60, 1.0), angle=angle).values == pytest.approx(angle)
+
+
 def test_a_jump_that_no_counter_explains_is_a_question() -> None:
     angle = LOG.values + np.where(LOG.time > 0.2, 50.0, 0.0)
     with pytest.raises(InputError, match=r"jumps from .* rad at 0.204 s.*cut the log there"):
@@ -122,10 +127,18 @@ def test_stamps_that_are_too_coarse_are_spread(period: float, rounded) -> None: 
     assert any("stamps are rounded to 0.001 s" in note for note in log.notes)
 
 
-def test_stamps_that_tell_no_period_are_a_question() -> None:
-    time = LOG.time**1.2
+@pytest.mark.parametrize(
+    "time",
+    [LOG.time**1.2, LOG.time + np.where(LOG.time > 0.3, 0.012, 0.0)],
+    ids=["uneven", "a piece is missing"],
+)
+def test_stamps_that_tell_no_period_are_a_question(time: Vector) -> None:
+    time = time.copy()
     time[70] = time[69]
     with pytest.raises(InputError, match=r"time goes from .* at sample 71; it must rise"):
+        rebuilt(time=time)
+    time = np.floor(LOG.time / 0.01) * 0.01  # stamps that leave the period open by 2 %
+    with pytest.raises(InputError, match="it must rise"):
         rebuilt(time=time)
 
 
@@ -136,6 +149,7 @@ def test_the_direction_of_rotation_does_not_matter_to_friction() -> None:
     log = rebuilt(torque=-LOG.torque, angle=-LOG.values).forward()
     assert_same(log)
     assert "both turned round" in log.notes[-1]
+    assert (log.sign, LOG.sign) == (-1.0, 1.0)  # of what is not friction, as an offset of the torque
     assert LOG.forward() is LOG
 
 

@@ -127,8 +127,8 @@ def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, di
     first, width, count = marks[mark]
     if not count:
         raise RefusedError(
-            f"no line of its first {SEARCHED} has numbers in two columns or more; write them below a line of "
-            f"names, as {FORM}"
+            f"no line of its first {SEARCHED} has numbers in two columns or more, divided by semicolons, "
+            f"tabs or commas; write them below a line of names, as {FORM}"
         )
     last = max(i for i in rows if sum(map(bool, _cells(lines[i], mark))) > 1)  # behind it words, as EOF
     numbers = rows_of([(i + 1, lines[i]) for i in rows if first <= i <= last], mark, where)

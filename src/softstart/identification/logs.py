@@ -345,7 +345,9 @@ def _even(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
 def _continuous(time: Vector, values: Vector, name: str, notes: list[str]) -> Vector:
     """An angle without the jumps of a counter that overflows, or of an encoder that counts within a turn."""
     steps = np.diff(values)
-    jumps = np.abs(steps) > 0.5 * float(np.ptp(values))
+    least = float(np.min(np.abs(steps), where=steps != 0.0, initial=math.inf))
+    # a motor that turns by a few counts of its encoder jumps by one of them
+    jumps = np.abs(steps) > max(0.5 * float(np.ptp(values)), 4.0 * least)
     if not jumps.any():
         return values
     count = _count(steps[~jumps])
