@@ -326,6 +326,24 @@ def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -
         Log(time, torque, angle=angle, torque_is="demand")
 
 
+@pytest.mark.parametrize(
+    ("periods", "first", "refused"), [(19, 0.19, False), (21, 0.0, True), (1, 0.21, True)]
+)
+def test_holes_of_20_periods_and_a_fifth_of_the_speed_are_too_much(
+    periods: int, first: float, refused: bool
+) -> None:
+    time = np.arange(200) * 1e-3
+    time[100:] += (periods - 1) * 1e-3
+    speed = 100.0 * np.maximum(time / time[-1], first)
+    if not refused:
+        assert Log(time, np.full(200, 40.0), speed=speed).time.size == 200
+        return
+    with pytest.raises(
+        InputError, match="there is no sample from" if periods > 1 else "the motor turns at 21"
+    ):
+        Log(time, np.full(200, 40.0), speed=speed)
+
+
 def test_what_cannot_be_found_is_refused(log: Log) -> None:
     demand, measured, slow = (
         Log(factor * log.time, log.torque, angle=log.values, torque_is=torque_is)  # type: ignore[arg-type]

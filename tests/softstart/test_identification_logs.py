@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,10 +144,10 @@ LAYOUTS = {  # what stands above the numbers, a row, decimal mark, columns
 
 @pytest.mark.parametrize("kind", LAYOUTS)
 def test_headings_clocks_and_shares_are_read(log: Log, kind: str, tmp_path: Path) -> None:
-    """The same signals in each file, from a quarter second before midnight on."""
+    """The same signals in each file, from a quarter second before midnight to two seconds after it."""
     above, row, point, columns = LAYOUTS[kind]
-    rows = []
-    for t, u, a in zip(log.time, log.torque, log.values, strict=True):
+    rows, time = [], 4.0 * log.time
+    for t, u, a in zip(time, log.torque, log.values, strict=True):
         day = 86399.75 + t
         minutes, seconds = divmod(day % 86400.0, 60.0)
         clock = f"{int(minutes // 60):02}:{int(minutes % 60):02}:{seconds:09.6f}"
@@ -160,7 +161,7 @@ def test_headings_clocks_and_shares_are_read(log: Log, kind: str, tmp_path: Path
     path = tmp_path / "trace.csv"
     path.write_text("\n".join([above, *rows, "EOF"]), encoding="utf-8")
     read = Log.load(path, columns=columns)
-    assert read.time - read.time[0] == pytest.approx(log.time, abs=1e-9)
+    assert read.time - read.time[0] == pytest.approx(time, abs=1e-9)
     assert read.torque == pytest.approx(log.torque, abs=1e-7)
     assert read.values - read.values[0] == pytest.approx(log.values - log.values[0], abs=4e-6)
 
@@ -199,7 +200,7 @@ TORQUE, SPEED = np.linspace(20.0, 40.0, 40), 900.0 * TIME**1.1
 SIGNALS = {"time": TIME, "torque": TORQUE, "angle": 900.0 / 2.1 * TIME**2.1, "speed": SPEED}
 
 
-def written(path: Path, columns: dict[str, tuple[str, float]]) -> Path:
+def written(path: Path, columns: dict[str, tuple[str, Any]]) -> Path:
     """A file with these signals, each under a heading and in a unit of this size."""
     rows = zip(*(SIGNALS[key] / size for key, (_, size) in columns.items()), strict=True)
     heading = ";".join(name for name, _ in columns.values())
@@ -268,6 +269,11 @@ def test_two_units_without_a_name_and_units_that_contradict_are_questions(tmp_pa
     ):
         with pytest.raises(InputError, match=rf"cannot both be right.*{right}"):
             Log.load(written(path, columns | wrong))
+    # a column that is nearly its derivative tells nothing
+    swaying = 1.0 + 0.3 * np.sin(40.0 * TIME)
+    columns_like = columns | {"angle": ("angle", 1.0), "speed": ("n_set [rpm]", rpm * swaying)}
+    with pytest.raises(InputError, match='"angle", the angle, has no unit'):
+        Log.load(written(path, columns_like))
     # a column beside it that belongs behind a gear is none
     geared = columns | {"angle": ("angle [rad]", 1.0), "speed": ("n_load [rpm]", 38.1 * rpm)}
     assert Log.load(written(path, geared)).values == pytest.approx(SIGNALS["angle"], rel=1e-12, abs=1e-12)
