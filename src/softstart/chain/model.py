@@ -48,6 +48,11 @@ BRANCHES = (
     "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "
     "inertias, stiffnesses and torques add (docs/howto/reduce-a-driveline.md)."
 )
+OF_A_DRIVE = re.compile(r"(^|: )\[?(limits|gear)[\].].*no such (key|table)")
+OWN_LIMITS = (
+    " The gears of a chain are in its shafts, and each shaft has a permissible torque of its own, on the "
+    "side of its gear that it names: shaft[N].permissible_torque and shaft[N].side."
+)
 BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joins|ends|parent)\b)")
 
 
@@ -180,7 +185,8 @@ class Chain(Words):
             found = read_document(text, TABLES, "a chain", where=where, also=also)
         except InputError as error:
             branched = [BRANCHES] if any(map(BRANCHING.search, error.sentences)) else []
-            raise InputError([*error.sentences, *branched]) from None
+            told = [one + OWN_LIMITS * bool(OF_A_DRIVE.search(one)) for one in error.sentences]
+            raise InputError([*told, *branched]) from None
         before = f"{where}: " if where else ""
         wrong: list[str] = []
         start: dict[str, Any] = found["start"] or {}

@@ -8,6 +8,7 @@ from typing import Any
 
 from softstart.chain.model import Chain
 from softstart.drive import INFORMATIVE_TABLES
+from softstart.quantities import Units
 from softstart.views.numbers import RPM, printable, short
 
 MOST = 6  # differences that are told
@@ -38,6 +39,7 @@ def drive_lines(machine: Any) -> list[str]:
             f"  shaft  c = {c} N m/rad, gap = {gap} rad, contact law {machine.contact_laws[0]}",
             f"  load   J2 = {J2} kg m2, Mc = {Mc} N m, {two.kind}",
             *([named] if masses != ("motor", "load") else []),
+            *_there(machine),
         ]
     else:
         count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().moving_J.sum())
@@ -60,6 +62,18 @@ def drive_lines(machine: Any) -> list[str]:
         *(["  also   " + ", ".join(also)] if also else []),
         *([f"  assumed: {printable(machine.assumed)}"] if machine.assumed else []),
     ]
+
+
+def _there(machine: Any) -> Iterator[str]:
+    """The same at the output of a gear."""
+    if (gear := machine.gear) is not None:
+        two, places = machine.lumped, (("c", "N*m/rad"), ("gap", "rad"), ("J2", "kg*m^2"), ("Mc", "N*m"))
+        c, gap, J2, Mc = (float(gear.to_output(getattr(two, name), si)) for name, si in places)
+        yield (
+            f"  output c = {short(c)} N m/rad, gap = {short(Units('arcmin').shown(gap, 'rad'))} arcmin, "
+            f"J2 = {short(J2)} kg m2, Mc = {short(Mc)} N m; "
+            f"i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}"
+        )
 
 
 def _also(machine: Any) -> Iterator[str]:

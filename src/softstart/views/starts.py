@@ -63,11 +63,13 @@ def figure_rows(run: Run) -> list[list[str]]:
     first, second = run.stage_durations
     of_one = f" from {run.position}" if run.positions else ""
     names, clipped = run.drive.shaft_names, clipped_torque(run)
+    there = with_unit(run.peak_torque_at_output, "N m")
     where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)}{where}"],
         ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
         ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
+        *([["the same at the output", there]] if run.drive.gear else []),
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
         ["shaft torque settled after", with_unit(run.settling_time(), "s")],

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from softstart import simulate
+from softstart import InputError, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.drive.doubts import doubts
@@ -450,6 +450,36 @@ def test_a_limit_is_given_and_taken_back_by_an_empty_field(machine, path, text):
     assert not screen.mistakes
     assert session.machine == before
     assert not session.machine.limits
+
+
+def test_fields_take_values_at_the_output_of_a_gear_and_its_permissible_torque():
+    """Without a ratio that is one sentence beside the field; the line of the traces is M/i at the motor."""
+    session = Session("crane-4amtkf", controllers=["direct"])
+    controls, screen = controls_of(session)
+
+    def edit(path: str, text: str) -> None:
+        controls.take({"what": "edit", "path": path, "text": text})
+
+    edit("shaft.gap", "9 arcmin at output")
+    (said,) = screen.mistakes.values()
+    assert "without gear.ratio" in said
+    assert session.machine == session.origin
+    for path, text in (
+        ("gear.ratio", "38.1"), ("gear.efficiency", "95 %"), ("shaft.gap", "9 arcmin at output"),
+        ("limits.output_torque", "5 kN*m"),
+    ):  # fmt: skip
+        edit(path, text)
+    assert not screen.mistakes
+    assert session.machine.gap == pytest.approx(math.radians(9 / 60) * 38.1, rel=1e-14)
+    first = screen.first()
+    assert first["fields"]["shaft.gap"]["text"].startswith("9 arcmin")
+    assert first["traces"]["direct"]["allowed"] == pytest.approx(5000 / 38.1, rel=1e-14)
+    run = session.result("direct").run
+    assert first["figure"]["output_torque"] == pytest.approx(38.1 * 0.95 * run.peak_torque, rel=1e-12)
+    grid = grid_of(session.machine, "4.5 arcmin at output, 1x", "290 kg*m^2 at output")
+    assert grid[0] == pytest.approx([session.machine.gap / 2, session.machine.gap], rel=1e-14)
+    with pytest.raises(InputError, match="behind some of the values only"):
+        grid_of(session.machine, "4.5 arcmin, 9 arcmin at output", "1x")
 
 
 WHATS = [
