@@ -6,13 +6,13 @@ under [tool.softstart.entry-points] what is not part of the wheel (the benchmark
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from softstart.errors import InputError
+from softstart.hints import did_you_mean
 
 CONTROLLERS, STUDIES = "softstart.controllers", "softstart.studies"  # the groups
 CHECKOUT = Path(__file__).resolve().parents[2] / "pyproject.toml"  # elsewhere in an installed package
@@ -51,8 +51,7 @@ def load(group: str, kind: str, name: str, lists: str) -> object:
     """
     known = registered(group)
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f'did you mean "{near[0]}"?' if near else f"`{lists}` lists them."
+        hint = did_you_mean(name, known, otherwise=f"`{lists}` lists them.", quote='"')
         raise InputError(f'{kind} = "{name}": there is no {kind} of this name; {hint}')
     try:
         found: object = known[name].load()

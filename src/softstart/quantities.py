@@ -8,7 +8,6 @@ imported only when a string has a unit that is not an ordinary one.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 import math
@@ -25,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
+from softstart.hints import nearest
 
 if TYPE_CHECKING:
     import pint
@@ -222,19 +222,6 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
-def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """The valid name that `name` was probably meant to be, or None; upper and lower case count as one.
-
-    >>> nearest("RPM", ["rad/s", "rpm"]), nearest("zzz", ["rad/s", "rpm"])
-    ('rpm', None)
-    """
-    if len(name) > 60:  # to compare long names takes long, and nothing here has one
-        return None
-    folded = {v.casefold(): v for v in reversed(list(valid))}
-    close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
-    return folded[close[0]] if close else None
-
-
 # ---- reading a quantity ---------------------------------------------------------------------------------
 
 # 350x10^-4, 3.5·10⁻² and, of a text that lost its superscripts, 350x10-4
@@ -295,6 +282,21 @@ def to_si(value: object, unit: str, name: str = "value", *, infinite: bool = Fal
         place = "" if refusal.index is None else f"[{', '.join(map(str, refusal.index))}]"
         shown = value if refusal.index is None else refusal.value
         raise InputError(f"{name}{place} = {show(shown)}: {refusal.reason}.") from None
+
+
+def number_in(unit: str, value: object, name: str) -> float:
+    """A single quantity in the SI unit `unit`, as `to_si` reads it; a list or an array is refused.
+
+    >>> number_in("s", "20 ms", "until")
+    0.02
+    >>> number_in("s", [0.1, 0.2], "until")
+    Traceback (most recent call last):
+    softstart.errors.InputError: until = [0.1, 0.2]: this is a list; give a single value.
+    """
+    found = to_si(value, unit, name=name)
+    if isinstance(found, float):
+        return found
+    raise InputError(f"{name} = {show(value)}: this is a list; give a single value.")
 
 
 def multiple(value: object, name: str, endings: Iterable[str] = ("x",)) -> tuple[float, str] | None:

@@ -121,8 +121,8 @@ def natural_vibration(chain: Chain) -> Vibration:
 
     Parameters
     ----------
-    chain : Chain
-        A chain of N masses; a motor is not needed.
+    chain : Chain, str or path
+        A chain of N masses, or its name or file; a motor is not needed.
 
     Returns
     -------
@@ -320,9 +320,10 @@ class Reduction(OneLine):
     def to_drive(self) -> Drive:
         """The two-mass drive, for `compare`, `optimize` and `tune`.
 
-        All load torques and frictions act on its load; damping to the ground and the efficiencies of gears,
-        which a drive does not have, are left out. It starts where the chain does, in mid-gap if the chain
-        does not say otherwise.
+        All load torques and frictions act on its load; where the motor alone could not move them, less what
+        load curves that drive the chain carry at standstill; damping to the ground and the efficiencies of
+        gears, which a drive does not have, are left out. It starts where the chain does, in mid-gap if the
+        chain does not say otherwise.
 
         >>> from softstart import Chain
         >>> drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
@@ -335,6 +336,9 @@ class Reduction(OneLine):
         if chain.target_speed is None:
             raise InputError("[start] target_speed is missing: a drive needs it; add it to the chain.")
         active, friction = float(arrays.active.sum()), float(arrays.friction.sum())
+        if chain.motor.starting_torque <= (load := active + friction):  # curves carry it, or nothing does
+            left = min(max(1.0 + chain.curve_torque / load, 0.0), 1.0)
+            active, friction = left * active, left * friction
         twist = float(arrays.theta0.sum()) * (1.0 if arrays.motor < arrays.load else -1.0)
         speed = float(arrays.J @ arrays.w0) / self.whole.inertia
         law = chain.freed.shafts[0].contact_law
@@ -393,8 +397,8 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
 
     Parameters
     ----------
-    chain : Chain
-        The whole chain; a motor is needed by `Reduction.to_drive` only.
+    chain : Chain, str or path
+        The whole chain, or its name or file; a motor is needed by `Reduction.to_drive` only.
     factor : float
         Smallest allowed (w/Omega)^2, 1 or more: w is the frequency of the second mode, or of a piece between
         two gaps; Omega that of the first mode.

@@ -16,6 +16,7 @@ with a second shaft, or counterweights at the ends of the crank, the other half 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,8 +28,9 @@ from softstart.arrays import Complex, Vector
 from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, largest, shaking_of_shafts
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
+from softstart.input.files import object_of
 from softstart.notebook import OneLine
-from softstart.quantities import to_si
+from softstart.quantities import number_in, to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -271,7 +273,7 @@ class Balance(OneLine):
 
 
 def balance(
-    engine: Engine,
+    engine: Engine | str | os.PathLike[str],
     speeds: Sequence[float | str] | None = None,
     *,
     load: float | None = None,
@@ -281,8 +283,8 @@ def balance(
 
     Parameters
     ----------
-    engine : Engine
-        The engine.
+    engine : Engine, str or path
+        The engine, or its name or file.
     speeds : sequence of float or str, optional
         Speeds to be shown: rad/s, or text with a unit. By default round ones over the range.
     load : float, optional
@@ -312,10 +314,10 @@ def balance(
     >>> [round(float(one.first_order_moment[found.tuning_index]), 1) for one in found.residuals]
     [149.5, 123.4, 55.1, 55.1, 0.0, 0.0]
     """
+    engine = object_of(engine, Engine, Engine.load, "engine: give one Engine")
     operation = engine.operation
-    tuning = float(
-        to_si(engine.tuning_speed if tuning_speed is None else tuning_speed, "rad/s", "tuning_speed")
-    )
+    own_speed = engine.tuning_speed if tuning_speed is None else tuning_speed
+    tuning = number_in("rad/s", own_speed, "tuning_speed")
     if speeds is None:
         asked = _round_speeds(operation.lowest_speed, operation.highest_speed)
     else:

@@ -11,8 +11,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from softstart.chain.elements import Mass, Motor, Shaft
-from softstart.chain.model import Chain, ChainArrays
-from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
+from softstart.chain.model import Chain, ChainArrays, by_name
+from softstart.vibration import Reduction, Vibration
+from softstart.vibration import natural_vibration as _natural_vibration
+from softstart.vibration import reduce_chain as _reduce_chain
 
 if TYPE_CHECKING:
     from softstart.chain.two_masses import TwoMassError, Verification, two_mass_error, verify_on_chain
@@ -32,6 +34,8 @@ __all__ = [
     "two_mass_error",
     "verify_on_chain",
 ]
+
+natural_vibration, reduce_chain = by_name(_natural_vibration), by_name(_reduce_chain)
 
 # loaded when first used: they need compiled code
 _HOME = {

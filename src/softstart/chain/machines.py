@@ -12,27 +12,26 @@ import numpy as np
 from softstart.chain.model import Chain, load_machine
 from softstart.drive import Drive
 from softstart.drive.checks import BROADCAST
-from softstart.drive.records import Columns, Records, is_machine
+from softstart.drive.records import Columns, Records
 from softstart.errors import InputError
+from softstart.input.files import object_of
 from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, read_value
-from softstart.quantities import RefusedError, nearest, parse, show
+from softstart.quantities import RefusedError, parse, show
 
 Machine = Drive | Chain
+MachineLike = Machine | str | os.PathLike[str]  # one, or its name or file
 SINGLE = "records: all fields are single values; give a list for one, as gap=[0.5, 2.0]."
 Values = dict[str, tuple[Parameter, Any]]  # by path
 
 
-def one_machine(given: Machine | str | os.PathLike[str]) -> Machine:
-    """The drive or chain, or that of a name or file; InputError for anything else.
+def one_machine(given: MachineLike, name: str = "drive") -> Machine:
+    """The drive or chain, or that of a name or file; InputError for anything else. `name` is the argument's.
 
     >>> one_machine("crane-4-mass").name == Chain.load("crane-4-mass").name
     True
     """
-    machine = load_machine(given) if isinstance(given, str | os.PathLike) else given
-    if is_machine(machine):
-        return machine
-    raise InputError("drive: give one Drive or Chain, the path of its file, or the name of a shipped one.")
+    return object_of(given, (Drive, Chain), load_machine, f"{name}: give one Drive or Chain")
 
 
 def records(machine: Machine | Records | str, **fields: Any) -> Records:
@@ -140,10 +139,7 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     for key, value in values.items():
         found = chain.knob(key)
         if found is None:
-            words = [named.name for path in chain.knobs() if (named := chain.knob(path)) is not None]
-            near = nearest(key, words)
-            hint = f"did you mean {near}?" if near else f"its words are {', '.join(words)}."
-            wrong.append(f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}")
+            wrong.append(chain.no_such(key, value))
             continue
         try:
             read[found.name] = read_value(found.parameter, value, batch=True, gear=chain.NO_GEAR)

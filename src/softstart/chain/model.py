@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar, Self
+from functools import cached_property, wraps
+from typing import Any, ClassVar, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ from softstart.drive.checks import wrong_units
 from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document
-from softstart.input.files import ABSENT, read_text, refusal_of
+from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.parameters import Wording, read_values, sentences_of
 from softstart.quantities import RefusedError, nearest, show
 
@@ -275,6 +275,21 @@ class Chain(Words):
         return self.at_motor_shaft().mean_torque(self.motor.starting_torque)
 
     @property
+    def curve_torque(self) -> float:
+        """What the load curves over speed brake with at standstill, N m at the motor shaft; < 0: they drive.
+
+        >>> Chain([Mass(1, curve_speed=[0, 10], curve_torque=[-5, 0]), Mass(1)], [Shaft(9)]).curve_torque
+        -5.0
+        """
+        curves = zip(self.masses, self.speed_ratios(self.motor_index), strict=True)
+        at_rest = (
+            ratio * float(np.interp(0.0, mass.curve_speed, mass.curve_torque or ()))
+            for mass, ratio in curves
+            if mass.curve_speed is not None
+        )
+        return sum(at_rest, 0.0)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what the chain leaves out that decides its shaft torques.
 
@@ -286,6 +301,11 @@ class Chain(Words):
             f"{name} stays at rest: strategies are set up for the two masses of the chain without it."
             for name in held
         ]
+        if self.motor is not None and self.motor.starting_torque <= float(self.at_motor_shaft().Mc.sum()):
+            fixed.append(
+                "The starting torque is not above the load torque: K_dyn, which refers to it, says little. "
+                "For a motor torque over speed see docs/howto/motor-torque-over-speed.md."
+            )
         damped = any(s.damping or s.damping_ratio or s.efficiency < 1.0 for s in self.shafts)
         inelastic = any(s.restitution is not None and s.restitution < 1.0 for s in self.shafts)
         if damped or inelastic or any(mass.damping for mass in self.masses):
@@ -782,6 +802,27 @@ def _twists(chain: Chain, gap: Vector, c: Vector, pulls: Vector) -> Vector:
     behind = np.cumsum(pulls)[:-1]
     behind[motor:] = np.cumsum(pulls[::-1])[::-1][1 + motor :]
     return np.sign(behind) * drives * (0.5 * gap + np.abs(behind) / c)
+
+
+def one_chain(given: Chain | str | os.PathLike[str]) -> Chain:
+    """The chain itself, or that of a name or file; InputError for anything else."""
+    return object_of(given, Chain, Chain.load, "chain: give one Chain")
+
+
+Rest = ParamSpec("Rest")
+Result = TypeVar("Result")
+
+
+def by_name(
+    function: Callable[Concatenate[Chain, Rest], Result],
+) -> Callable[Concatenate[Chain | str | os.PathLike[str], Rest], Result]:
+    """The same function of a chain or of its name or file."""
+
+    @wraps(function)
+    def named(chain: Chain | str | os.PathLike[str], *rest: Rest.args, **options: Rest.kwargs) -> Result:
+        return function(one_chain(chain), *rest, **options)
+
+    return named  # type: ignore[return-value]  # `chain` may be given by its name as well
 
 
 def load_machine(given: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Drive | Chain:

@@ -17,7 +17,9 @@ from softstart.chain.elements import START, TOP, Mass, Motor, Shaft
 from softstart.drive import PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
+from softstart.hints import did_you_mean
 from softstart.input.parameters import Knob, Parameter
+from softstart.quantities import show
 
 PART = re.compile(r"(mass|shaft)(?:\[(.+)\]\.|_(\d+)_)(\w+)")
 POSITION = next(one for one in START.parameters if one.name == "position")  # a word: there are several gaps
@@ -164,23 +166,36 @@ class Words:
         yield from (path for path in self.by_path() if path.startswith(("mass[", "shaft[", "motor.")))
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
-        """The chain with these values, by the words of their parameters.
+        """The chain with these values, by the words of their parameters, as in a file or in Python.
 
         >>> from softstart.chain import Chain
-        >>> Chain.load("crane-4-mass").with_values({"gap": 1.0, "shaft_2_stiffness": 4e5}).shafts[2].gap
+        >>> Chain.load("crane-4-mass").with_values({"gap": 1.0, "shaft[2].stiffness": 4e5}).shafts[2].gap
         0.02
         """
-        chain = self
-        for name, value in values.items():
+        chain, of_motor, wrong = self, {}, []
+        for key, value in values.items():
+            if (found := chain.knob(key)) is None:
+                wrong.append(chain.no_such(key, value))
+                continue
+            name = found.name
             if (part := PART.fullmatch(name)) is not None:
                 kind, _, number, word = part.groups()
                 chain = chain._with_part(kind, int(number) - 1, word, value)
             elif name in SHARED:
                 chain = SHARED[name][1](chain, value)
             else:
-                assert chain.motor is not None
-                chain = chain._replaced(motor=chain.motor.replace(**{name: value}))
-        return chain
+                of_motor[name] = value
+        if wrong:
+            raise InputError(wrong)
+        if chain.motor is None or not of_motor:
+            return chain
+        return chain._replaced(motor=chain.motor.replace(**of_motor))  # at once: one bounds the other
+
+    def no_such(self, key: str, value: object) -> str:
+        """The sentence on a key that names no parameter."""
+        words = [named.name for path in self.knobs() if (named := self.knob(path)) is not None]
+        hint = did_you_mean(key, [*self.knobs(), *words], otherwise=f"its words are {', '.join(words)}.")
+        return f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}"
 
     def _number(self, kind: str, named: str) -> int:
         """The number of a mass or shaft, from 1, by that number or by its name; 0 where there is none."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
 from importlib import import_module
 
 import click
 from click.shell_completion import CompletionItem
 
 from softstart import __version__
-from softstart.errors import listed
+from softstart.hints import did_you_mean
 
 # by purpose: the name of a command, the module in this package that defines it, the beginning of its help
 PURPOSES = {
@@ -130,19 +128,6 @@ def cli(context: click.Context) -> None:
 def short_help(name: str, limit: int = 45) -> str:
     """The help of a command in at most `limit` characters, as click shortens it."""
     return click.Command(name, help=COMMANDS[name][1]).get_short_help_str(limit)
-
-
-def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
-    """The end of a sentence about an unknown name: the nearest valid one, or all of them.
-
-    >>> did_you_mean("compre", ["compare", "drives"], "softstart ")
-    'did you mean softstart compare?'
-    >>> did_you_mean("zzz", ["compare", "drives"])
-    'there are compare and drives.'
-    """
-    known = list(valid)
-    near = get_close_matches(name.lower(), known, n=1, cutoff=0.5)
-    return f"did you mean {before}{near[0]}?" if near else f"there are {listed(known)}."
 
 
 def usage_sentence(error: click.UsageError, command: str = "") -> str:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import one_of
 from softstart.cli.options import check_name, controller_names, drive_names
 from softstart.cli.running import Answer, answers, attributed, option_value, working
 from softstart.drive import Drive, library
 from softstart.errors import InputError, Mistakes
+from softstart.hints import did_you_mean
 from softstart.plugins import STUDIES, registered
 from softstart.study import Study, StudyResult, find_study
 from softstart.study import Table as Results

@@ -12,7 +12,6 @@ from softstart.balancing import balance as compute
 from softstart.balancing.engine import LIBRARY as ENGINES
 from softstart.balancing.engine import TABLES
 from softstart.cli import options
-from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import one_of
 from softstart.cli.options import count, reading
 from softstart.cli.running import Answer, answers, working
@@ -20,6 +19,7 @@ from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.laws import read_law
 from softstart.clutch.model import LIBRARY as CLUTCHES
 from softstart.errors import InputError
+from softstart.hints import did_you_mean
 from softstart.input.parameters import bare
 from softstart.quantities import to_si
 

@@ -17,11 +17,11 @@ import numpy as np
 
 from softstart.chain.elements import LIBRARY as CHAINS
 from softstart.chain.model import Chain, is_chain
-from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, SimulationError
+from softstart.hints import did_you_mean
 from softstart.input.documents import Table, parsed
 from softstart.input.files import ABSENT, Library, read_text, refusal_of
 from softstart.input.parameter_set import read_settings

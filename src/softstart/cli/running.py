@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import folders
 from softstart.cli.options import Decorator, code_allowed, command_line, json_option, named_as_options
 from softstart.errors import InputError, SimulationError
+from softstart.hints import did_you_mean
 from softstart.parallel import LOADED_FROM_FILE
 from softstart.plugins import CONTROLLERS, registered
 from softstart.stopping import at_stop

@@ -77,7 +77,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     if not (chosen.recommended or comparison.rows[0].intervals):
         known = len(comparison.drive.positions) == 1
         steps.append(("optimize", [], "the lowest possible K_dyn" if known else "the best fixed profile"))
-    if best is not None and best.name in options.controller_names() and tunable(best.run.controller):
+    if best is not None and best.name in options.controller_names() and tunable(best.controller):
         steps.append(("tune", ["--controller", best.name], "gains for other gaps and loads"))
     steps.append(("report", ["--out", "report.html"], "all results in one file"))
     return [(shlex.join(["softstart", name, *machine, *more]), gives) for name, more, gives in steps]
@@ -99,17 +99,20 @@ def simulate(
     """Simulate one start of a drive or a chain.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like).
+    tractor-like). For a motor torque over speed (DOL, star-delta) see
+    docs/howto/motor-torque-over-speed.md.
     """
     with working("starting the drive ..."), attributed():
         (made,) = make_controllers([controller], params, several=False)
         run: Any = softstart.simulate(drive, made, until, fitted_to=fitted_to)
         _ = run.settled_time  # it may ask the controller on
+    from softstart.start.recommendation import margins_of
     from softstart.views.starts import run_sheet
 
     data = {
         **run.summary(),
         "fitted_to": fitted_to.name if fitted_to else None,
+        "limits": [one.summary() for one in margins_of(run)],
         "stages": [{**asdict(stage), "duration": stage.duration} for stage in run.stages],
         "events": [event._asdict() for event in run.events],
     }

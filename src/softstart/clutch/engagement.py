@@ -7,6 +7,7 @@ A step ends at the end of a piece of the law, at the end of the run, or where an
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -32,8 +33,9 @@ from softstart.clutch.motion import (
     values,
 )
 from softstart.errors import InputError, SimulationError
+from softstart.input.files import object_of
 from softstart.notebook import OneLine
-from softstart.quantities import to_si
+from softstart.quantities import number_in
 
 MOST_STEPS = 400_000
 MOST_AT_ONCE = 40
@@ -198,7 +200,7 @@ class Engagement(OneLine):
         return views.engagement_figure([self], self.clutch.name)
 
 
-def engage(clutch: Clutch, *, until: float | str | None = None) -> Engagement:
+def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None = None) -> Engagement:
     """Engage the clutch from rest, the shaft in the middle of its gap.
 
     Times of events, peaks and work are exact to about 1e-12 of their size: Taylor series of the 24th order,
@@ -206,8 +208,8 @@ def engage(clutch: Clutch, *, until: float | str | None = None) -> Engagement:
 
     Parameters
     ----------
-    clutch : Clutch
-        The clutch, with its engagement law.
+    clutch : Clutch, str or path
+        The clutch, with its engagement law, or its name or file.
     until : float or str, optional
         End of the run: s, or text with a unit. By default one elastic period 2 pi sqrt(Ic/cp) after the first
         lock-up (with a gap not before the twist has reversed twice, and not while the clutch slips again), so
@@ -236,9 +238,10 @@ def engage(clutch: Clutch, *, until: float | str | None = None) -> Engagement:
     >>> run.status, round(run.slip_time, 4), round(run.peak_ratio, 4), run.energy.residual < 1e-12
     ('LOCKED', 4.1527, 1.2123, True)
     """
+    clutch = object_of(clutch, Clutch, Clutch.load, "clutch: give one Clutch")
     end: float | None = None
     if until is not None:
-        end = float(to_si(until, "s", name="until"))
+        end = number_in("s", until, "until")
         if not end > 0.0:
             raise InputError(f"until = {until!r}: the end of the run is a time above 0 s.")
     law = clutch.friction

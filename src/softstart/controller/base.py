@@ -300,9 +300,25 @@ class Controller:
         """The controller with every parameter a number, and the drive whose numbers it works with.
 
         That is `fitted(drive)` and the same drive; gains that were tuned for another drive bring that one.
+        Raises InputError for a parameter that is an array: `set_ups` takes those.
         """
+        if arrays := self._arrays():
+            name, values = next(iter(arrays.items()))
+            raise InputError(
+                f"{name} = {show(values)}: this is a list, and one start has a single value; give that, or "
+                "`records` with as many machines, or vary it in a sweep."
+            )
         drive = drive.design_drive
         return self.fitted(drive), drive
+
+    def _arrays(self) -> dict[str, Any]:
+        """The parameters that are arrays: one value for each of many starts."""
+        return {
+            f.name: value
+            for f in fields(self)
+            if isinstance(value := getattr(self, f.name), np.ndarray)
+            and f.metadata.get("kind", "quantity") == "quantity"
+        }
 
     def set_ups(self, drives: Any) -> Iterator[SetUp]:
         """`set_up` for each machine of records or a list, last index fastest, or for a single one.
@@ -316,12 +332,7 @@ class Controller:
         >>> [(ready.parameters["initial"], own == crane) for ready, own in batch]
         [(1.0, True), (2.0, True)]
         """
-        arrays = {
-            f.name: value
-            for f in fields(self)
-            if isinstance(value := getattr(self, f.name), np.ndarray)
-            and f.metadata.get("kind", "quantity") == "quantity"
-        }
+        arrays = self._arrays()
         given: Iterable[Any]
         if isinstance(drives, Records):
             given, shape = drives.elements(), drives.shape

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 import inspect
 import sys
@@ -14,6 +13,7 @@ from typing import Any
 
 from softstart.controller.base import Controller
 from softstart.errors import InputError
+from softstart.hints import did_you_mean
 from softstart.input.files import refusal_of
 from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
@@ -132,8 +132,9 @@ def _values(
     wrong: list[str] = []
     for key, value in parameters.items():
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
-            hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(known) or 'no parameters'}."
+            hint = did_you_mean(
+                key, known, otherwise=f"it has {', '.join(known) or 'no parameters'}.", quote='"'
+            )
             if key in getattr(cls, "__annotations__", {}):
                 hint = "its class names it, but is not a @dataclass(frozen=True)."
             wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
@@ -216,8 +217,9 @@ def _from_file(text: str) -> type[Controller]:
             )
         return own[0]
     if class_name not in classes:
-        near = difflib.get_close_matches(class_name, classes, n=1, cutoff=0.4)
-        hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(classes) or 'none'}."
+        hint = did_you_mean(
+            class_name, classes, otherwise=f"it has {', '.join(classes) or 'none'}.", quote='"'
+        )
         raise InputError(f'controller = "{text}": {path} has no class {class_name}; {hint}')
     return _checked(classes[class_name], text)
 

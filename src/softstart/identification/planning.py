@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -25,10 +26,11 @@ from softstart.identification.unknowns import (
     usual,
     values_of,
 )
+from softstart.input.files import object_of
 from softstart.kernel.records import S_PHI
 from softstart.notebook import OneLine, Shown
 from softstart.profile import TorqueProfile
-from softstart.quantities import show, to_si
+from softstart.quantities import number_in, show
 from softstart.start.comparison import INTERVAL
 
 LEVEL: Final = 0.65  # of the starting torque
@@ -105,7 +107,7 @@ class Plan(Shown, sheet="identification.plan_sheet"):
 
 
 def plan_experiments(
-    drive: Drive | str,
+    drive: Drive | str | os.PathLike[str],
     *,
     log_period: float | str = "4 ms",
     ripple: float | str | None = None,
@@ -129,7 +131,7 @@ def plan_experiments(
 
     Parameters
     ----------
-    drive : Drive or str
+    drive : Drive, str or path
         The drive as it is thought to be.
     log_period : float or str
         Sample period of the log, s.
@@ -170,7 +172,7 @@ def plan_experiments(
     ----------
     A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992; docs/identification.md.
     """
-    drive = Drive.load(drive) if isinstance(drive, str) else drive
+    drive = object_of(drive, Drive, Drive.load, "drive: give one Drive")
     standard = standard_levels(drive)
     longest = min(float(np.sum(durations)) for durations, _ in standard.values()) / FEWEST
     period = _between("log_period", log_period, "s", longest, f"a fit needs {FEWEST} samples of each log")
@@ -193,7 +195,7 @@ def plan_experiments(
 
 def _between(name: str, given: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
     """A number above 0 and at most this."""
-    value = float(to_si(given, unit, name=name))
+    value = number_in(unit, given, name)
     if not 0.0 < value <= most:
         limit = f" and at most {most:.3g} {unit}: {why}" if why else ""
         raise InputError(f"{name} = {show(given)}: give a value above 0{limit}.")

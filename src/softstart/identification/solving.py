@@ -12,7 +12,8 @@ from scipy.linalg import orth
 from scipy.stats import chi2
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.model import Chain, load_machine
+from softstart.chain.machines import MachineLike, one_machine
+from softstart.chain.model import Chain
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
 from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Sizes, Spot, agreeing
@@ -49,7 +50,7 @@ SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong uni
 @on_one_thread
 def identify(
     logs: Log | Sequence[Log],
-    drive: Drive | Chain | str,
+    drive: MachineLike,
     *,
     free: Iterable[str] | None = None,
     searches: int = 12,
@@ -66,7 +67,7 @@ def identify(
     ----------
     logs : Log or sequence of Log
         Logs of one drive, each beginning at standstill; `Log.load` reads them from CSV files.
-    drive : Drive, Chain or str
+    drive : Drive, Chain, str or path
         The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
         dominant gap the two masses that stand for it are found. The
         position in the gap is free for each log where friction holds the load or the drive says "unknown".
@@ -105,8 +106,8 @@ def identify(
     D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
     Analysis, 1988; docs/identification.md.
     """
-    drive = load_machine(drive) if isinstance(drive, str) else drive
-    machine, drive = drive, reduced_drive(drive)
+    machine = one_machine(drive)
+    drive = reduced_drive(machine)
     each = [logs] if isinstance(logs, Log) else logs
     read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in each]
     if not read or searches < 1:

@@ -17,7 +17,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
 from softstart.notebook import Shown
-from softstart.quantities import show, to_si
+from softstart.quantities import number_in, show
 from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
@@ -207,7 +207,7 @@ def follow_wear(
         np.array([one.value for one in gaps]),
         np.array([_deviation(one) for one in gaps]),
     )
-    worn = None if limit is None else float(to_si(limit, "rad", name="limit"))
+    worn = None if limit is None else number_in("rad", limit, "limit")
     if worn is not None and not worn > 0.0:
         raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
     return Wear(each, names, days, line, worn, tuple(_notes(each, line)))

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softstart.errors import MOST, InputError
+from softstart.hints import did_you_mean, term
 from softstart.input.parameters import (
     Mistake,
     Parameter,
@@ -193,8 +194,7 @@ def changed(
     for path, value in changes.items():
         plain = re.sub(r"\[.*\]", "", path)
         if plain not in paths:
-            meant = nearest(plain, paths)
-            remedy = f"did you mean {meant}?" if meant else f"it has {', '.join(paths)}."
+            remedy = did_you_mean(plain, paths, otherwise=f"it has {', '.join(paths)}.")
             yield f"{path}: {what} file has no such key; {remedy}"
             continue
         table, p = paths[plain]
@@ -292,7 +292,8 @@ def _unknown(
         return p.key if p.table == table.name else elsewhere
 
     listed = [*table.by_key, *(one.bracket for one in tables if one.name and not table.name)]
-    remedy = f"did you mean {' or '.join(map(called, meant))}?" if meant else f"it has {', '.join(listed)}"
+    other = term(key) or f"it has {', '.join(listed)}"
+    remedy = f"did you mean {' or '.join(map(called, meant))}?" if meant else other
     reason = f"{f'[{table.name}]' if table.name else f'{what} file'} has no key {key}; {remedy}"
     sentence = wording.sentence(f"{place}{key} = {wording.show(value)}", reason)
     return Mistake(sentence, (), tuple(p.path for p in meant) if len(meant) == 1 else ())

@@ -10,13 +10,13 @@ from functools import cached_property, partial
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar, cast
 
 from softstart.errors import InputError
 from softstart.quantities import RefusedError, nearest, show
 from softstart.stopping import at_stop
 
-__all__ = ["ABSENT", "Library", "read_text", "refusal_of", "text_of", "write_whole"]
+__all__ = ["ABSENT", "Library", "object_of", "read_text", "refusal_of", "text_of", "write_whole"]
 
 
 class Library:
@@ -77,6 +77,28 @@ class Library:
                 remedy = f"did you mean {meant}?" if meant else shipped
                 reason = f"{ABSENT}, and no shipped {noun} of this name; {remedy}"
             raise InputError(f"{show(path)}: {reason}") from None
+
+
+Thing = TypeVar("Thing")
+
+
+def object_of(
+    given: object,
+    kinds: type[Any] | tuple[type[Any], ...],
+    load: Callable[[str | os.PathLike[str]], Thing],
+    wanted: str,
+) -> Thing:
+    """An object itself, or the one that `load` reads from a file or by its name; anything else is refused.
+
+    >>> object_of(2, str, str, "clutch: give one Clutch")
+    Traceback (most recent call last):
+    softstart.errors.InputError: clutch: give one Clutch, the path of its file, or the name of a shipped one.
+    """
+    if isinstance(given, kinds):
+        return cast("Thing", given)
+    if isinstance(given, str | os.PathLike):
+        return load(given)
+    raise InputError(f"{wanted}, the path of its file, or the name of a shipped one.")
 
 
 ABSENT, FOLDER = "there is no such file", "this is a directory"

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from softstart.errors import InputError
+from softstart.hints import term
 from softstart.input.documents import Table, changed, placed
 from softstart.input.gear import NO_GEAR, Gear
 from softstart.input.parameters import (
@@ -145,7 +146,8 @@ class ParameterSet:
             free = [p for p in parameters.values() if p.name not in given]
             meant = meant_by(name, parameters.values(), free)
             names = " or ".join(p.name for p in meant)
-            remedy = f"did you mean {names}?" if meant else f"the names are {', '.join(parameters)}"
+            other = term(name) or f"the names are {', '.join(parameters)}"
+            remedy = f"did you mean {names}?" if meant else other
             reason = f"{self.WHAT} has no parameter {show(name)}; {remedy}"
             alone = tuple(p.path for p in meant) if len(meant) == 1 else ()
             wrong.append(
@@ -313,7 +315,5 @@ def _remedy(key: str, by_path: Mapping[str, Parameter], parameters: Mapping[str,
     within = [path for path in by_path if path.startswith(f"{key}.")]
     if within:
         return f"{key} is a table, name one of its keys, such as {within[0]}"
-    meant = meant_by(key, parameters.values())
-    return (
-        f"did you mean {' or '.join(p.path for p in meant)}?" if meant else f"there are {', '.join(by_path)}"
-    )
+    meant, other = meant_by(key, parameters.values()), term(key) or f"there are {', '.join(by_path)}"
+    return f"did you mean {' or '.join(p.path for p in meant)}?" if meant else other

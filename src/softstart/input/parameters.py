@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.errors import InputError
+from softstart.hints import term
 from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
 from softstart.quantities import RefusedError, Value, nearest, parse, show, values_in, without_powers
 
@@ -196,7 +197,7 @@ def meant_by(name: str, parameters: Iterable[Parameter], near: Sequence[Paramete
     for group in groups:
         if same := [p for p in group if name in (p.key, p.symbol, p.name, p.path)]:
             return same
-    for group in groups:
+    for group in groups if term(name) is None else ():
         spelt = {spelling: p for p in group for spelling in (p.key, p.path, p.name)}
         if close := nearest(name, spelt):
             return [spelt[close]]

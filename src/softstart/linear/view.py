@@ -18,11 +18,9 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from softstart.chain.machines import Machine
-from softstart.chain.model import load_machine
+from softstart.chain.machines import Machine, MachineLike, one_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
-from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
 from softstart.linear.limit_cycles import Cycle, limit_cycles
@@ -172,7 +170,7 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
 
 
 def linear_view(
-    drive: Machine | str,
+    drive: MachineLike,
     controller: str | Controller,
     parameters: Mapping[str, object] | None = None,
     *,
@@ -185,7 +183,7 @@ def linear_view(
 
     Parameters
     ----------
-    drive : Drive, Chain or str
+    drive : Drive, Chain, str or path
         A drive or chain, or the name or file of one.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or a Controller object, built in or not.
@@ -218,12 +216,9 @@ def linear_view(
     >>> linear_view("crane-4amtkf", "ramp").kind
     'open loop'
     """
-    if isinstance(drive, str):
-        drive = load_machine(drive)
-    made = make_controller(controller, parameters)
+    drive, made = one_machine(drive), make_controller(controller, parameters)
+    fitted_to = None if fitted_to is None else one_machine(fitted_to, "fitted_to")
     for one in (drive, fitted_to or drive):
-        if not is_machine(one):
-            raise InputError(f"drive = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
         if one.motor is None or one.target_speed is None:
             raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")
     start = SampledStart.of(single(drive), made, fitted_to or drive)

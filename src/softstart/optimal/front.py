@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import Machine
+from softstart.chain.machines import Machine, MachineLike, one_machine
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.errors import InputError
 from softstart.input.files import write_whole
@@ -228,7 +228,7 @@ class Front(Shown, sheet="optima.front_sheet"):
 
 
 def pareto(
-    drive: Machine,
+    drive: MachineLike,
     start_times: Sequence[float] | None = None,
     *,
     terminal: Terminal = "reached",
@@ -250,8 +250,8 @@ def pareto(
 
     Parameters
     ----------
-    drive : Drive or Chain
-        The machine.
+    drive : Drive, Chain, str or path
+        The machine, or its name or file.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
     terminal, torque_speed, smoothness, base : optional
@@ -295,7 +295,8 @@ def pareto(
     docs/optimal-starts.md; each point: `optimize`.
     """
     options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
-    Problem(drive, 1.0, terminal, **options)
+    options["base"] = base = Problem(drive, 1.0, terminal, **options).base
+    drive = one_machine(drive)
     tell = progress or (lambda doing: None)
     times = None if start_times is None else _checked(start_times)
     names = ready_controller_names() if controllers is None else controllers

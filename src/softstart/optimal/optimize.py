@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from softstart.chain.machines import Machine, listed_of, one_machine, quantity_of
+from softstart.chain.machines import Machine, MachineLike, listed_of, one_machine, quantity_of
 from softstart.controller import ready_controller_names
 from softstart.drive import Limits
 from softstart.drive.limits import Limit
@@ -56,7 +56,7 @@ TIGHT = 1e-5  # a bound within this share needs no other one
 
 @on_one_thread
 def optimize(
-    drive: Machine | str,
+    drive: MachineLike,
     start_time: float | str | None = None,
     *,
     terminal: Terminal | None = None,
@@ -81,7 +81,7 @@ def optimize(
 
     Parameters
     ----------
-    drive : Drive, Chain or str
+    drive : Drive, Chain, str or path
         The machine, or the name or file of one.
     start_time : float or str, optional
         Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
@@ -392,22 +392,18 @@ def _certifiable(problem: Problem, method: Method) -> bool:
 
 
 def _alone(problem: Problem) -> dict[str, Optimum]:
-    """The optimum of each machine by itself."""
-    names = [name for one in (problem.drive, *problem.scenarios) for name in _names(problem, one)]
+    """The optimum of each machine by itself, of equal ones once."""
+    names = dict[Machine, str]()
+    for number, each in enumerate((problem.drive, *problem.scenarios), start=1):
+        scenario = f"scenario {number}" if problem.scenarios else ""
+        for place, machine in each.positions.items():
+            names.setdefault(machine, f"{scenario} {place if len(each.positions) > 1 else ''}".strip())
     found = {}
-    for name, machine in zip(names, problem.machines, strict=True):
+    for machine, name in names.items():
         one = replace(problem, drive=machine, base=problem.base or problem.drive, scenarios=())
         with suppress(InfeasibleError, OptimumError, SimulationError):
             found[name] = _by_formula(one, time.perf_counter()) or _by_descent(one, None, time.perf_counter())
     return found
-
-
-def _names(problem: Problem, machine: Machine) -> list[str]:
-    places = list(machine.positions) if len(machine.positions) > 1 else [""]
-    if not problem.scenarios:
-        return places
-    number = (problem.drive, *problem.scenarios).index(machine) + 1
-    return [f"scenario {number} {place}".strip() for place in places]
 
 
 def _confirmed(best: Optimum) -> Optimum:
@@ -709,6 +705,7 @@ def scenarios_of(
     ----------
     docs/optimal-starts.md.
     """
+    drive = one_machine(drive)
     given = {"gap": gaps, "load_inertia": inertias, "load_torque": load_torques}
     names = dict(zip(given, ("gaps", "inertias", "load_torques"), strict=True))
     axes = {key: _values(drive, key, names[key], values) for key, values in given.items()}

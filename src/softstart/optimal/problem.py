@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from softstart.chain.machines import one_machine
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
 from softstart.quantities import multiple, to_si
@@ -164,12 +165,10 @@ class Problem:
 
     def __post_init__(self) -> None:
         wrong: list[str] = []
-        if not is_machine(self.drive):
-            raise InputError(
-                f"drive = {self.drive!r}: give a Drive or a Chain; Drive.load reads one from a file."
-            )
-        object.__setattr__(self, "drive", _without_delay(self.drive))
-        object.__setattr__(self, "scenarios", tuple(map(_without_delay, self.scenarios)))
+        others = [one_machine(one, "scenarios") for one in self.scenarios]
+        object.__setattr__(self, "drive", _without_delay(one_machine(self.drive)))
+        object.__setattr__(self, "base", None if self.base is None else one_machine(self.base, "base"))
+        object.__setattr__(self, "scenarios", tuple(map(_without_delay, others)))
         for name, choices in (("terminal", TERMINALS), ("minimise", OBJECTIVES)):
             if getattr(self, name) not in (*choices, None):
                 wrong.append(f"{name} = {getattr(self, name)!r}: choose one of {', '.join(choices)}.")

@@ -385,7 +385,7 @@ def figure(session: Session, found: Strategy, units: Units) -> Frame:
             "reached": math.isfinite(run.start_time),
             "output_torque": number(run.peak_torque_at_output),
             "contacts": run.contacts,
-            "impact_speed": number(units.shown(getattr(run, "impact_speed", math.nan), "rad/s")),
+            "impact_speed": number(units.shown(run.impact_speed, "rad/s")),
             "position": "".join(position_notes([run])),
         }
     return facts
@@ -472,7 +472,7 @@ def drawn(
             "motor": machine.motor_index,
             "load": machine.load_index,
             "target": units.shown(machine.target_speed, "rad/s"),
-            "allowed": machine.limits.shaft_torque,
+            "allowed": number(run.permissible_torque),
             "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "turn": units.size("rad/s")},
         }
     return picture

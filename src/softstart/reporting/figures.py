@@ -114,8 +114,7 @@ def _torques(panel: Axes, run: Run) -> None:
     for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
         panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], lw=1.1, label=name)
     panel.plot([run.peak_time], [_peak(run)], "o", ms=3.0, color=SHAFTS[run.worst_shaft % len(SHAFTS)])
-    permissible = run.drive.limits.shaft_torque
-    if permissible is not None:
+    if not math.isnan(permissible := run.permissible_torque):
         panel.axhline(permissible, color=RED, lw=0.9, ls=":", label="permissible torque")
 
 
@@ -147,10 +146,8 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
             torque.plot(run.t, worst, color=colour, lw=width, label=name)
             torque.plot([run.peak_time], [_peak(run)], "o", ms=4, color=colour)
             speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, lw=width)
-        if drive.limits.shaft_torque is not None:
-            torque.axhline(
-                drive.limits.shaft_torque, color=RED, lw=1.4, ls=DASHES[1], label="permissible torque"
-            )
+        if not math.isnan(permissible := runs[0].permissible_torque):
+            torque.axhline(permissible, color=RED, lw=1.4, ls=DASHES[1], label="permissible torque")
         torque.set_ylim(bottom=min(0.0, torque.get_ylim()[0]))  # "15 % less" is seen as that
         for panel, what in ((torque, "shaft torque, N m"), (speed, f"load speed, {units.speed}")):
             panel.set_xlim(0.0, 1.1 * longest)

@@ -16,12 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from softstart import __version__
-from softstart.chain.model import Chain, load_machine
+from softstart.chain.machines import MachineLike, one_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
-from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
-from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.input.files import write_whole
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
@@ -137,7 +135,7 @@ class Report:
 
     def row(self, name: str) -> Row | None:
         """The row of a strategy."""
-        return next((row for row in self.comparison.rows if label_of(row.run.controller) == name), None)
+        return next((row for row in self.comparison.rows if label_of(row.controller) == name), None)
 
     def lower_bound(self, row: Row) -> float | None:
         """The K_dyn that no start as quick as this one can go below."""
@@ -235,7 +233,7 @@ class Report:
 
 
 def report(
-    drive: Drive | Chain | Uncertain | DataSheet | UnknownStiffness | str,
+    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
     *,
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -249,7 +247,7 @@ def report(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification, DataSheet or str
+    drive : Drive, Chain, Identification, DataSheet, str or path
         A drive or chain, or the name or file of one, or an identification, whose figures have intervals. Of
         a data sheet without any stiffness both ends of what is usual are compared (`compare`). With several
         gaps there are no maps, and each shaft has its figures.
@@ -296,11 +294,7 @@ def report(
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
     known, drawn, soft = as_far_as_known(drive)
-    machine: Any = load_machine(known) if isinstance(known, str | Path) else known
-    if not is_machine(machine):
-        raise InputError(
-            f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or a shipped name."
-        )
+    machine: Any = one_machine(known)
     if budget is None:
         budget = SHAFTS_BUDGET if len(machine.shaft_names) > 1 else BUDGET
     mapped = "load.inertia" in machine.by_path()  # what a map varies is a parameter of the file

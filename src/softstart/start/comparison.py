@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from softstart.chain.machines import Machine, one_machine
+from softstart.chain.machines import Machine, MachineLike, one_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
@@ -165,7 +165,7 @@ class Comparison:
 
 
 def compare(
-    drive: Machine | Uncertain | DataSheet | UnknownStiffness | str = DEFAULT_DRIVE,
+    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -177,7 +177,7 @@ def compare(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification, DataSheet or str
+    drive : Drive, Chain, Identification, DataSheet, str or path
         One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
         in `simulate`. Of a data sheet without any stiffness the stiff end of what is usual counts; limits
         must be kept at the soft end as well, and `soft_end` compares the strategies as set up for that. With

@@ -15,7 +15,7 @@ from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.notebook import OneLine, Shown
-from softstart.quantities import to_si
+from softstart.quantities import number_in
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -536,7 +536,7 @@ def _curve(machine: Any, slope: float | None) -> tuple[SNCurve, bool]:
     own = machine.limits.fatigue
     if slope is None:
         return (own, True) if own is not None else (SNCurve(DEFAULT_SLOPE), False)
-    m = float(to_si(slope, "1", name="slope"))
+    m = number_in("1", slope, "slope")
     if not 0.0 < m < 100.0:
         raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
     if own is not None and own.slope is None:

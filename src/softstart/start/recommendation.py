@@ -14,10 +14,10 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any, Final
 
-from softstart.controller.base import Effort, effort_of, label_of
+from softstart.controller.base import Controller, Effort, effort_of, label_of
 from softstart.drive import Limit, Limits
 from softstart.notebook import OneLine
-from softstart.start.fatigue import worst_damage
+from softstart.start.fatigue import undamped, worst_damage
 from softstart.start.run import Run
 
 SLOW: Final = 2.0  # times the time of `direct`
@@ -57,7 +57,6 @@ class Case:
             return Case(math.nan, math.nan, math.nan, math.nan, math.nan)
         limits, used = checked_limits(run.drive), 0.0
         if limits.life is not None and limits.fatigue is not None:
-            assert isinstance(run, Run)  # chains have no limit of life
             used = 100.0 * (limits.starts or 0.0) * worst_damage(run, limits.fatigue).damage
         return Case(run.k_dyn, run.peak_torque, run.start_time, used, run.used_torque)
 
@@ -139,7 +138,7 @@ class Row(OneLine):
     `cases` that must keep the limits, besides the drive as it is.
     """
 
-    run: Any  # Run, or Run
+    run: Run
     direct: Run | None
     cases: Mapping[str, Case] = field(default_factory=dict)
     worst_case: tuple[str, ...] = CASES
@@ -147,9 +146,15 @@ class Row(OneLine):
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
+    def controller(self) -> Controller:
+        """The strategy as it was set up."""
+        assert self.run.controller is not None
+        return self.run.controller
+
+    @property
     def name(self) -> str:
         """Name of the strategy in tables."""
-        return self.label or label_of(self.run.controller)
+        return self.label or label_of(self.controller)
 
     @property
     def marked(self) -> str:
@@ -160,7 +165,7 @@ class Row(OneLine):
     @property
     def effort(self) -> Effort:
         """What it takes to build it."""
-        return effort_of(self.run.controller)
+        return effort_of(self.controller)
 
     @property
     def time_lost(self) -> float:
@@ -336,6 +341,17 @@ def checked_limits(drive: Any) -> Limits:
     return replace(limits, life=None) if unchecked_life(drive) else limits
 
 
+def margins_of(run: Run) -> tuple[Margin, ...]:
+    """The margin of one start to each limit of its machine that is checked.
+
+    >>> from softstart import Drive, simulate
+    >>> drive = Drive.load("crane-4amtkf").replace(permissible_torque=200.0)
+    >>> print(*margins_of(simulate(drive, "direct")))
+    shaft torque 164.8 N m of 200 N m (margin 17.6 %)
+    """
+    return Row(run, None, worst_case=()).margins(checked_limits(run.drive))
+
+
 def unchecked_life(drive: Any) -> str:
     """Why the life that is asked for is not checked; "" if it is, or if none is."""
     limits = drive.limits
@@ -343,8 +359,8 @@ def unchecked_life(drive: Any) -> str:
         return ""
     if limits.fatigue is None or not limits.fatigue.points:
         return "The life is not checked: [limits.fatigue] has no point of an S-N curve."
-    damped = drive.d > 0.0
-    return "" if damped else "The life is not checked: without damping the shaft swings for all time."
+    swings = "The life is not checked: without damping the shaft swings for all time."
+    return swings if undamped(drive) else ""
 
 
 def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:

@@ -238,8 +238,26 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     heavier = 1.0 / arrays.efficiency_from_motor
     left = motor.starting_torque - float((arrays.Mc * heavier).sum())
     speeds = float(named["target"][0]) + float(np.abs(arrays.w0).sum())
-    stiff = float((arrays.moving_J * heavier).sum()) * speeds / left if left > 0.0 else math.inf
-    return made, np.array([stiff])
+    inertia = float((arrays.moving_J * heavier).sum())
+    if left > 0.0:
+        return made, np.array([inertia * speeds / left])
+    return made, np.array([inertia * _driven_by_curves(made, left, heavier, speeds)])
+
+
+def _driven_by_curves(made: Rows, left: float, heavier: Vector, speeds: float) -> float:
+    """The integral of dw/(sum of the torques) up to a speed: infinite where load curves do not drive it on.
+
+    `left` is what the other torques leave, N m. A curve over speed drives where it is negative; its power
+    loses in gears what that of the motor does.
+    """
+    w = np.linspace(0.0, speeds, 1001)
+    torque = np.full(w.shape, left)
+    for curve in made.curves[0].view(at.CURVE)[:, 0]:
+        if not curve["by_angle"]:
+            points, through = int(curve["points"]), heavier[int(curve["mass"])]
+            brakes = np.interp(w, curve["at"][:points], curve["torque"][:points])
+            torque -= np.where(brakes > 0.0, brakes * through, brakes / through)
+    return speeds * float(np.mean(1.0 / torque)) if torque.min() > 0.0 else math.inf
 
 
 def _welded(arrays: ChainArrays) -> NDArray[np.bool_]:

@@ -269,7 +269,7 @@ class Run(Shown, sheet="starts.run_sheet"):
 
     @property
     def _has_base(self) -> bool:
-        return self.base is not None or getattr(self.drive, "motor", True) is not None
+        return self.base is not None or self.drive.motor is not None
 
     @property
     def base_torque(self) -> float:
@@ -312,6 +312,11 @@ class Run(Shown, sheet="starts.run_sheet"):
         """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
         found: Vector = self.peak_torques / self.drive.permissible_torques
         return found
+
+    @property
+    def permissible_torque(self) -> float:
+        """What the shaft permits that is loaded most, N m at the motor shaft; NaN where it is not given."""
+        return float(self.drive.permissible_torques[self.worst_shaft])
 
     @property
     def used_torque(self) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, overload
 
-from softstart.chain.machines import Machine
+from softstart.chain.machines import Machine, MachineLike
 from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 @overload
 def simulate(
-    drive: Machine | str,
+    drive: MachineLike,
     controller: str | Controller | None,
     until: float | None = ...,
     *,
@@ -76,7 +77,7 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, Chain, Records, sequence of machines or str
+    drive : Drive, Chain, Records, sequence of machines, str or path
         A drive, a chain, `records` of one, a list of drives or of chains (with the same number of masses,
         their motors and loads on the same ones), or the name or file of a drive or chain.
     controller : str, Controller or None
@@ -130,7 +131,7 @@ def simulate(
     K_dyn: [G] (16), docs/theory/stages.md; everything at one shaft: [R], docs/theory/reduction.md; why no
     event is missed, and accuracy: docs/theory/numerics.md.
     """
-    if isinstance(drive, str):
+    if isinstance(drive, str | os.PathLike):
         drive = load_machine(drive)
     made = None if controller is None else make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
@@ -179,8 +180,7 @@ def _check_other(name: str, other: object, drive: object) -> None:
 
 def check_end(machine: Any, controller: object, until: float | None, rows: Rows) -> None:
     """A run needs an end, and a controller a motor."""
-    motor = getattr(machine, "motor", True)
-    if controller is not None and motor is None:
+    if controller is not None and machine.motor is None:
         raise InputError(
             "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
         )
@@ -193,7 +193,8 @@ def check_end(machine: Any, controller: object, until: float | None, rows: Rows)
     arrays = machine.at_motor_shaft()
     load = float((arrays.Mc / arrays.efficiency_from_motor).sum())
     lossy = " and through its gears" if (arrays.efficiency < 1.0).any() else ""
+    curves = ", nor do load curves over speed drive it" if rows.curves.size else ""
     raise InputError(
         f"starting_torque: it is not above the load torques, {load:.6g} N*m at the motor "
-        f"shaft{lossy}, so the load may never reach its target speed; give until or time_limit."
+        f"shaft{lossy}{curves}, so the load may never reach its target speed; give until or time_limit."
     )

@@ -15,7 +15,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine, one_machine
+from softstart.chain.machines import Machine, MachineLike, one_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.records import is_machine
@@ -36,7 +36,7 @@ OF_LIMITS = ("margin", "keeps_limits")  # figures of a drive with limits
 
 
 def sweep(
-    drive: Machine | str,
+    drive: MachineLike,
     controller: str | Controller | None,
     grid: Mapping[str, Any],
     *,
@@ -55,7 +55,7 @@ def sweep(
 
     Parameters
     ----------
-    drive : Drive, Chain or str
+    drive : Drive, Chain, str or path
         The drive or chain, or its name or file; it has what the grid does not vary.
     controller : str, Controller or None
         A name, `path/to/file.py:ClassName` or an object; None where controllers are an axis.

@@ -11,7 +11,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
 from softstart.errors import InputError, Mistakes
-from softstart.quantities import multiple, nearest, to_si
+from softstart.quantities import multiple, nearest, number_in
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 
@@ -151,7 +151,7 @@ def _named(field: Field[Any], ends: Any) -> Range:
     name, unit = field.name, field.metadata.get("unit", "")
     both = [] if isinstance(ends, str) or not isinstance(ends, Iterable) else list(ends)
     multiples = [found[0] for end in both if (found := multiple(end, name))]
-    values = multiples or [float(to_si(end, unit or "1", name=name)) for end in both]
+    values = multiples or [number_in(unit or "1", end, name) for end in both]
     if len(both) != 2 or len(values) != 2 or not values[0] < values[1] or (multiples and values[0] <= 0.0):
         raise InputError(
             f"{name} = {ends!r}: give its lowest and highest value in this order, or both as multiples "

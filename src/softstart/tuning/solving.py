@@ -7,7 +7,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from softstart.chain.machines import Machine, one_machine
+from softstart.chain.machines import MachineLike, one_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError, Mistakes
@@ -45,7 +45,7 @@ SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
 
 def tune(
-    drive: Machine | Uncertain | str,
+    drive: MachineLike | Uncertain,
     controller: str | Controller,
     gaps: Iterable[Any] | Any | None = None,
     inertias: Iterable[Any] | Any | None = None,
@@ -78,7 +78,7 @@ def tune(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification or str
+    drive : Drive, Chain, Identification, str or path
         The nominal drive or chain, or its name or file. A chain starts itself, and the controller is set up
         for its two masses. With an identification every candidate is judged by the drive found and by 100
         drives that its logs leave possible; gaps and inertias are then those of the drive, if none are given.

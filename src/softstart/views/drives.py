@@ -9,7 +9,7 @@ from typing import Any
 from softstart.chain.model import Chain
 from softstart.drive import INFORMATIVE_TABLES
 from softstart.quantities import Units
-from softstart.views.numbers import RPM, printable, short
+from softstart.views.numbers import RPM, plural, printable, short
 
 MOST = 6  # differences that are told
 POSITIONS = {
@@ -44,7 +44,7 @@ def drive_lines(machine: Any) -> list[str]:
     else:
         count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().moving_J.sum())
         parts = [
-            f"  {len(masses)} masses, {count} gap{'' if count == 1 else 's'}; at the motor shaft J = "
+            f"  {len(masses)} masses, {plural(count, 'gap')}; at the motor shaft J = "
             f"{short(inertia)} kg m2, gaps {short(float(machine.gaps.sum()))} rad, load torque {Mc} N m",
             named,
         ]

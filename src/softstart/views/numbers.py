@@ -121,6 +121,15 @@ def short(value: float) -> str:
     return NOTHING if math.isnan(value) else f"{value:.6g}"
 
 
+def plural(count: int, noun: str) -> str:
+    """A count and its noun.
+
+    >>> plural(1, "start"), plural(2000, "start"), plural(0, "gap")
+    ('1 start', '2,000 starts', '0 gaps')
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
 def with_unit(value: float, unit: str) -> str:
     """A number and its unit; a dash for a missing value.
 

@@ -11,7 +11,7 @@ import numpy as np
 from softstart.optimal.front import Front
 from softstart.optimal.problem import REACTS, best_k_dyn, best_start
 from softstart.optimal.result import Kept, Optimum
-from softstart.start.recommendation import Row, checked_limits
+from softstart.start.recommendation import margins_of
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, mark_points, new_figure, plain_ticks
 from softstart.views.numbers import NOTHING, Table, column_of, number, short, with_unit
@@ -134,7 +134,7 @@ def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
     def keeps(run: Run) -> bool:
         if not limits:
             return not math.isnan(run.start_time) and run.k_dyn <= (best.problem.k_dyn or math.inf)
-        return all(one.kept for one in Row(run, None, worst_case=()).margins(checked_limits(run.drive)))
+        return all(one.kept for one in margins_of(run))
 
     what = "keeps them" if limits else "keeps it" if kept.margins else "reaches the target speed"
     first = min(filter(keeps, others), key=lambda run: run.start_time, default=None)
@@ -221,9 +221,9 @@ def optimum_figure(best: Optimum) -> Any:
             least = best.bound.k_dyn * problem.base_torque
             axes.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
             title += f", at least {best.bound.k_dyn:.4f}"
-        limit = problem.drive.limits.shaft_torque if _by_limits(best) else None
+        limit = run.permissible_torque if _by_limits(best) else math.nan
         most = limit if problem.k_dyn is None else problem.k_dyn * problem.base_torque
-        if most is not None:
+        if not math.isnan(most):
             axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))  # "15 % less" is seen as that
         head(axes, title, "torque, N m")

@@ -12,8 +12,8 @@ from softstart.drive.data_sheet import BAND
 from softstart.drive.doubts import doubts
 from softstart.start.comparison import SOFT_END, Comparison
 from softstart.start.metrics import SETTLED_BAND
-from softstart.start.recommendation import Recommendation, Row, checked_limits
-from softstart.start.run import SETTLING_PERIODS, Run
+from softstart.start.recommendation import Recommendation, Row, checked_limits, margins_of
+from softstart.start.run import SETTLING_PERIODS, Run, Stage
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -80,6 +80,7 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["contacts", f"{run.contacts}{of_one}"],
         ["end of the run", f"{with_unit(run.end_time, 's')}{of_one}"],
         *([["torque cut off", clipped]] if clipped else []),
+        *([["limits", "; ".join(map(str, margins))]] if (margins := margins_of(run)) else []),
         *(
             []
             if math.isnan(run.release_time)
@@ -128,9 +129,14 @@ def outcome(run: Run) -> str:
     return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value
 
 
+def _gap_in(stage: Stage) -> str:
+    """On which flank the gap is; without a gap on none, and never open."""
+    return SIDES[stage.side] if stage.side or stage.number % 2 else "closed"
+
+
 def stage_rows(run: Run) -> list[list[Any]]:
     """The stages, full numbers."""
-    return [[s.number, SIDES[s.side], s.start, s.duration, s.peak_torque, s.peak_time] for s in run.stages]
+    return [[s.number, _gap_in(s), s.start, s.duration, s.peak_torque, s.peak_time] for s in run.stages]
 
 
 def event_rows(run: Run) -> list[list[Any]]:
@@ -143,7 +149,7 @@ def event_rows(run: Run) -> list[list[Any]]:
 
 
 def _start_tables(run: Run) -> list[Table]:
-    """The shafts, if there are several, the stages, and the events: time, what happened, and where."""
+    """The shafts of a chain, the stages, and the events: time, what happened, and where."""
     several, rows = len(run.drive.shaft_names) > 1, event_rows(run)
     stages: dict[str, Any] = dict(zip(STAGE_COLUMNS, zip(*stage_rows(run), strict=True), strict=False))
     for name in stages.keys() - {"stage", "gap"}:
@@ -152,7 +158,7 @@ def _start_tables(run: Run) -> list[Table]:
     events = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
     events |= {"at": [row[2] for row in rows]} if several else {}
     return [
-        *([shaft_table(run)] if several else []),
+        *([] if isinstance(run.drive, Drive) else [shaft_table(run)]),
         Table.of("Stages", stages, ("gap",), most=SHOWN),
         Table.of("Events", events, ("event", "at"), most=SHOWN),
     ]
@@ -205,6 +211,8 @@ def run_figure(run: Run) -> Any:
     def torques(axes: Axes, run: Run) -> None:
         axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
         shaft_torques(axes, run)
+        if not math.isnan(run.permissible_torque):
+            axes.axhline(run.permissible_torque, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
         head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
 
     return over_time(run, (torques, speeds, twists), f"{run.drive.name}: {run.controller_name}")

@@ -14,7 +14,7 @@ from softstart.start.status import Status
 from softstart.sweeping.summary import SHARES, pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number
+from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number, plural
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
 
@@ -234,7 +234,7 @@ def pace(last: Progress) -> str:
     """How many starts were made, and how fast."""
     made, before = last.done - last.before, f", of which {last.before:,} were finished before"
     speed = f"; {made / last.seconds:,.0f} starts/s in {last.seconds:.1f} s" if made and last.seconds else ""
-    return f"{last.starts:,} starts{before if last.before else ''}{speed}."
+    return f"{plural(last.starts, 'start')}{before if last.before else ''}{speed}."
 
 
 def sweep_sheet(
@@ -250,12 +250,12 @@ def sweep_sheet(
     if summary.starts <= MOST_WRITTEN:
         files[FILE] = partial(_write_cells, results)
     return Sheet(
-        f"{drive.name}: {summary.starts:,} starts",
+        f"{drive.name}: {plural(summary.starts, 'start')}",
         [*machine_lines(drive), *([f"  {controllers_set_up(None, fitted_to)}"] if fitted_to else [])],
         tables=_tables(results, summary),
         found=[conclusion(results, summary)],
         notes=[
-            f"{count:,} starts: {Status[name].value}"
+            f"{plural(count, 'start')}: {Status[name].value}"
             for name, count in summary.statuses.items()
             if name != Status.REACHED.name
         ],

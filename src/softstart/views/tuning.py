@@ -12,7 +12,7 @@ import numpy as np
 from softstart.errors import InputError
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
-from softstart.views.numbers import Column, Table, at_output, column_of, gear_in_words, label, short
+from softstart.views.numbers import Column, Table, at_output, column_of, gear_in_words, label, plural, short
 from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
 
@@ -241,7 +241,7 @@ def notes(tuning: Tuning) -> list[str]:
         found.append(
             f"Gaps at the output: {gaps} rad, load inertias there: {inertias} kg m2. {gear_in_words(drive)}"
         )
-    return [*found, *([f"{tuning.starts:,} starts."] if tuning.starts else [])]
+    return [*found, *([f"{plural(tuning.starts, 'start')}."] if tuning.starts else [])]
 
 
 def tuning_sheet(tuning: Tuning) -> Sheet:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, compare, simulate
-from softstart.chain import Chain, Mass, Shaft
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.reporting.figures import start_figure, traces_figure
+from softstart.views.starts import figure_rows, run_sheet
 
 DAMPED = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
 CHAIN = Chain.load("crane-4-mass", also=DAMPED)
@@ -75,6 +77,33 @@ def test_permissible_torques_are_limits():
         assert margin.value == max(cases)
         assert margin.kept == (max(cases) <= 100.0)
     assert table.recommendation.recommended is table.rows[1]
+
+
+def test_a_permissible_torque_is_seen_wherever_the_start_is():
+    """A chain of two masses; 20 kN m at the slow side of 57:1 are 350.877 N m at the motor."""
+    truck = Chain(
+        [Mass(0.625), Mass(6250.0, torque=1500.0, kind="reactive")],
+        [Shaft(75e3, damping=1e3, gap="0.5 deg", ratio=57, side="after", permissible_torque="20 kN*m")],
+        Motor(300.0), target_speed=114.0,
+    )  # fmt: skip
+    for chain in (truck, truck.brought_to("motor")):
+        run = simulate(chain, "direct")
+        used = 100.0 * run.peak_torque / (20e3 / 57)
+        assert used == pytest.approx(125.3, abs=0.05)
+        said = f"permissible torque {used:.4g} % of 100 % ({used - 100.0:.3g} % over)"
+        assert dict(figure_rows(run))["limits"] == said
+        (table,) = (one for one in run_sheet(run).tables if one.title == "Shafts")
+        assert table.rows[0][-1] == f"{used:.1f}"
+        assert said in run._repr_html_()
+        assert said in compare(chain, ["direct"], worst_case=()).recommendation.text
+        for figure in (run.plot(), start_figure(run), traces_figure(compare(chain, ["direct"]).rows)):
+            lines = [float(line.get_ydata()[0]) for line in figure.axes[0].lines]
+            assert run.permissible_torque in lines
+        assert run.permissible_torque == pytest.approx(20e3 / 57, rel=1e-12)
+    crane = simulate(CRANE.replace(permissible_torque=150.0, permissible_start_time=0.3), "direct")
+    assert dict(figure_rows(crane))["limits"].startswith(
+        "shaft torque 164.8 N m of 150 N m (9.87 % over); start"
+    )
 
 
 @pytest.mark.parametrize("controller", ["direct", "state-feedback"])

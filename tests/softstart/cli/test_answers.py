@@ -95,7 +95,7 @@ def test_json_of_a_start_has_summary_stages_and_events(as_json):
     start = ("simulate", "crane-4amtkf", "--controller", "reduced-two-stage", "--until", "0.3")
     told = as_json(*start, "--param", "torque=15.5")
     wanted = simulate(CRANE, "reduced-two-stage", 0.3, parameters={"torque": 15.5})
-    assert told.keys() == {*wanted.summary(), "fitted_to", "stages", "events"}
+    assert told.keys() == {*wanted.summary(), "fitted_to", "limits", "stages", "events"}
     assert (told["k_dyn"], told["start_time"], told["fitted_to"]) == (wanted.k_dyn, None, None)
     assert [stage["peak_torque"] for stage in told["stages"]] == [s.peak_torque for s in wanted.stages]
     assert [(e["time"], e["kind"]) for e in told["events"]] == [(e.time, e.kind) for e in wanted.events]

@@ -40,7 +40,7 @@ TOML = [
     ("gap = 0.5", "gap = 0.5 rad", "line 7, column 11, 'gap = 0.5 rad': ", 'in quotes: gap = "0.5 rad"'),
     ("gap = 0.5", "gap = 0,5 rad # flanks", "line ", 'use a decimal point: "0.5 rad")'),
     ("gap = 0.5", "gap = 1,500", "line ", 'write "1.500" with a decimal point, or "1500")'),
-    ("[load]", "[lode]", "[lode]: ", "did you mean [load]?"),
+    ("[load]", "[laod]", "[laod]: ", "did you mean [load]?"),
     ("[load]", "[[load]]", 'load = [{"inertia": 0.175', "one table, not a list of tables"),
     ("[load]", "[clutch]\ntorque = 3\n[load]", "[clutch]: ", "its tables are [motor], [gear], [shaft], "),
     ("[motor]", "gap = 0.5\n[motor]", "gap = 0.5: ", "did you mean [shaft] gap?"),

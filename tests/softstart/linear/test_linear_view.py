@@ -169,7 +169,7 @@ class Broken(PlainController):
 
 
 def test_bad_input():
-    with pytest.raises(InputError, match="give a Drive"):
+    with pytest.raises(InputError, match="give one Drive"):
         linear_view(5, "ramp")  # type: ignore[arg-type]
     with pytest.raises(SimulationError, match="failed at t = 0 s"):
         linear_view(CRANE, Broken())

@@ -207,7 +207,7 @@ def test_points_of_other_inputs_are_refused_and_kept(
         ({"start_times": []}, "the list is empty"),
         ({"start_times": [0.3, -1.0, math.nan]}, "start_times = -1.0"),
         ({"controllers": ["dirct"]}, "did you mean"),
-        ({"drive": "crane-4amtkf"}, "give a Drive"),
+        ({"drive": 5}, "give one Drive"),
     ],
 )
 def test_bad_input(options: dict[str, Any], says: str) -> None:

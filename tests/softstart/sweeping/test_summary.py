@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import Drive, Status, simulate, sweep
+from softstart.sweeping.entry import Progress
 from softstart.sweeping.summary import SHARES, spread, summarise
-from softstart.views.sweeps import sweep_figure
+from softstart.views.sweeps import pace, sweep_figure
 
 CRANE = Drive.load("crane-4amtkf")
 NUMBERS = st.lists(st.floats(-1e300, 1e300) | st.just(np.nan), min_size=1, max_size=40)
@@ -91,3 +92,8 @@ def test_starts_without_a_figure_leave_a_hole():
     figure = sweep_figure(results)
     assert np.ma.getmaskarray(figure.axes[0].collections[0].get_array()).reshape(3, 3)[:, 0].all()
     assert "grey: no figure" in figure.get_suptitle()
+
+
+def test_one_start_is_no_starts():
+    assert pace(Progress(1, 1, 0, 0.01)) == "1 start; 100 starts/s in 0.0 s."
+    assert pace(Progress(4000, 4000, 500, 2.0)).startswith("4,000 starts, of which 500 were finished before")

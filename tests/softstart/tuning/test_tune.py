@@ -253,7 +253,7 @@ def test_one_set_is_written_with_few_digits_and_units_and_is_what_was_promised(t
 BAD = {
     "gap": ({"gaps": [0.5, "2 kg"]}, ["gaps", "2 kg"]),
     "inertia": ({"inertias": ["0 J1"]}, ["inertias: load_inertia = 0"]),
-    "parameter": ({"free": ["tork"]}, ["no parameter tork", "did you mean torque?"]),
+    "parameter": ({"free": ["torqe"]}, ["no parameter torqe", "did you mean torque?"]),
     "no range": ({"free": ["drop"]}, ["gives no range for drop"]),
     "ends": ({"free": {"torque": (20, 10)}}, ["lowest and highest value in this order"]),
     "mixed ends": ({"free": {"torque": ("1x", 20)}}, ["both as multiples"]),
