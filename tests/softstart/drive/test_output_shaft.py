@@ -120,13 +120,23 @@ def test_what_a_data_sheet_says_behind_the_gear_comes_back_as_typed(i, eta, shar
     }  # fmt: skip
     for one in (drive, Drive.from_toml(drive.to_toml())):
         assert {name: one.at_output[name] for name in there} == pytest.approx(there, rel=1e-12)
-    report: Any = SimpleNamespace(project=Project(), drive=drive.replace(units="arcmin, rpm"))
+    shown_drive = drive.replace(units="arcmin, rpm", permissible_torque=1e5)
+    there["permissible_torque"] = 1e5 * i  # a limit goes without losses
+    report: Any = SimpleNamespace(project=Project(), drive=shown_drive)
     _, rows, _ = data_of(report)
     shown = {row[0]: row[-1] for row in rows}
     units = {"stiffness": "N m/rad", "load_inertia": "kg m²", "gap": "arcmin"}
     for name, value in (there | {"gap": math.degrees(there["gap"]) * 60.0}).items():
         said = f"{float(f'{value:.6g}'):.6g} {units.get(name, 'N m')}"
         assert shown[PARAMETERS[name].meaning] == said, name
+
+
+def test_a_torque_that_drives_the_motor_loses_on_its_way_there() -> None:
+    """Of the power M w at the output eta M w comes to the motor, which turns i times as fast: eta M/i."""
+    drive = geared(40.0, 0.8).replace(load_torque="-160 N*m at output")
+    assert (drive.load_torque, drive.at_output["load_torque"]) == (-3.2, -160.0)
+    many = records(geared(40.0, 0.8), load_torque=["-160 N*m at output", "160 N*m at output"])
+    assert many.fields["load_torque"].tolist() == [-3.2, 5.0]
 
 
 def test_a_drive_with_its_gear_is_the_chain_that_has_the_gear_in_its_shaft() -> None:
