@@ -27,7 +27,7 @@ from softstart.page.machines import changed
 from softstart.page.sentences import plain
 from softstart.parallel import Progress
 from softstart.quantities import show
-from softstart.start.comparison import compare
+from softstart.start.comparison import Comparison, compare
 from softstart.start.fatigue import fatigue
 from softstart.start.simulation import simulate
 
@@ -59,12 +59,12 @@ class Answer:
     drive: Machine | None = None
 
 
-def shown(*sheets: Sheet) -> str:
-    """The sheets of a terminal as HTML with their figures, without words of the command line."""
+def shown(*sheets: Sheet, first: bool = False) -> str:
+    """The sheets of a terminal as HTML, figures `first` or last, without words of the command line."""
     from softstart.views.sheet import as_html
 
     each = (replace(one, found=[*map(plain, one.found)], notes=[*map(plain, one.notes)]) for one in sheets)
-    return "\n".join(as_html(one, len(one.figures)) for one in each)
+    return "\n".join(as_html(one, len(one.figures), first=first) for one in each)
 
 
 def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> Answer:
@@ -132,7 +132,7 @@ def curve(
 
         found = front.pareto(drive, times, terminal=terminal, controllers=controllers, progress=doing)
     name = file_name(drive.name, "limit", suffix=".csv")
-    return Answer(shown(front_sheet(found)), {name: text_of(found.to_csv, ".csv")})
+    return Answer(shown(front_sheet(found), first=True), {name: text_of(found.to_csv, ".csv")})
 
 
 @contextmanager
@@ -256,12 +256,11 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress
     from softstart.views import optima
     from softstart.views.fatigue import fatigue_sheet
     from softstart.views.sheet import Sheet
-    from softstart.views.starts import comparison_sheet
 
     progress(0.0, "limits")
     compared = compare(machine, list(controllers.values()))
     progress(0.3, "start positions")
-    sheets = [replace(comparison_sheet(compared), figures={}), _positions(machine, controllers)]
+    sheets = [_positions(machine, controllers), _margins(compared)]
     progress(0.6, "life of the shaft line")
     try:
         sheets.append(fatigue_sheet(fatigue([row.run for row in compared.rows])))
@@ -304,6 +303,26 @@ def _positions(machine: Machine, controllers: Mapping[str, Controller]) -> Sheet
     names = (one.replace("-", " ") for one in UNKNOWN_POSITIONS)
     rows.sort(key=lambda row: float(row[-1]))
     return Sheet(title, tables=[Table.of_rows("", ("strategy",), (*names, "worst"), rows)])
+
+
+def _margins(compared: Comparison) -> Sheet:
+    """The worst figure of each strategy beside each limit, and the margin that decides; the largest first."""
+    from softstart.views.numbers import Table, short
+    from softstart.views.sheet import Sheet
+
+    title, limits = "Margins to the limits", compared.recommendation.limits
+    if not limits:
+        return Sheet(title, notes=["No limits are given: enter them under Limits, on the left."])
+    each = [(row, row.margins(limits), row.least_margin) for row in compared.rows]
+    each.sort(key=lambda one: math.inf if one[2] is None or math.isnan(one[2].share) else -one[2].share)
+    rows = [
+        [row.name, row.against_limits, (least.case if least else "") or "as it is",
+         *(short(float(f"{margin.value:.4g}")) for margin in margins)]
+        for row, margins, least in each
+    ]  # fmt: skip
+    heads = [f"{one.name}\n{one.unit}, at most {one.limit:.4g}" for one in each[0][1]]
+    table = Table.of_rows("", ("strategy", "least margin", "worst with"), heads, rows)
+    return Sheet(title, tables=[table])  # what is recommended stands on the page already
 
 
 def report(

@@ -201,15 +201,21 @@ def _parameters(machine: Any) -> Table:
 # notebook --------------------------------------------------------------------------------------------------
 
 
-def as_html(sheet: Sheet, figures: int = 1) -> str:
-    """A sheet in a notebook or on a page: what came out, facts, tables, the first figures, notes."""
+def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False) -> str:
+    """A sheet in a notebook or on a page: what came out, facts, tables, the first figures, notes.
+
+    `first`: figures before the tables, where the picture is what was asked for.
+    """
     facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
     parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found) if text]
-    parts += [_html(table) for table in (*facts, *sheet.tables) if table.rows]
-    for stem, draw in tuple(sheet.figures.items())[:figures]:
-        name = html.escape(f"{sheet.title}: {stem}")
-        parts.append(f'<figure tabindex="0" role="img" aria-label="{name}">{_svg(draw())}</figure>')
+    tables = [_html(table) for table in (*facts, *sheet.tables) if table.rows]
+    pictures = [
+        f'<figure tabindex="0" role="img" aria-label="{html.escape(f"{sheet.title}: {stem}")}">'
+        f"{_svg(draw())}</figure>"
+        for stem, draw in tuple(sheet.figures.items())[:figures]
+    ]
+    parts += [*pictures, *tables] if first else [*tables, *pictures]
     parts += [f"<p>{html.escape(text)}</p>" for text in sheet.notes]
     return "\n".join(parts)
 

@@ -84,6 +84,12 @@ def test_checks_are_those_of_compare_fatigue_and_optimize(tmp_path: Path) -> Non
         assert " ".join([label, *(f"{k:.3f}" for k in (*each, unknown.k_dyn))]) in " ".join(text.split())
     rows = compare(drive, list(controllers)).rows
     assert all(row.against_limits in text for row in rows)
+    # what the tab promises comes first, and the table that the page has already does not come again
+    promised = ("K_dyn by start position", "Margins to the limits", "life of the shaft line")
+    places = [text.index(title) for title in promised]
+    assert places == sorted(places)
+    assert places[0] < 20
+    assert "strategies compared" not in text
     lives = fatigue([row.run for row in rows])
     assert f"{float(f'{lives.ranked[0].relative:.3g}'):g}" in text  # three digits are shown
     best = optimize(drive, limits=True)
