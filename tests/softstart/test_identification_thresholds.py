@@ -64,6 +64,9 @@ def test_intervals_of_a_straight_line_are_those_of_student(count: int, width: in
     quantile = float(student.ppf(0.975, freedom))
     expected = freedom * math.log1p(quantile**2 / freedom)
     assert fitter.threshold(best) == pytest.approx(expected, rel=2e-3)  # of second differences over 0.1
+    # of three times that size: 1 for what is known beforehand, and ln V and squares of each degree
+    more = fitter.restricted(best.spots, Sizes(0.0, 3.0 * size)) - fitter.restricted(best.spots, best.sizes)
+    assert more == pytest.approx(1.0 + (count - width) * (2.0 * math.log(3.0) - 8.0 / 9.0), rel=1e-6)
     jacobian = best.spots[0].jacobian
     deviations = size * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     assert fitter.halves(best) == pytest.approx(quantile * deviations, rel=0.02)  # sizes in steps of 10 %
