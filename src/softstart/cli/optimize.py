@@ -87,7 +87,7 @@ def _terminal_option(usual: str, default: str | None = None) -> options.Decorato
 torque_speed_option = click.option(
     "--torque-speed", metavar="SPEED:TORQUE,...", callback=reading(_corners),
     help="Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 "
-    "N*m'.",
+    "N*m': two or more, concave, above the load torque up to the target speed; the last piece goes on.",
 )  # fmt: skip
 
 
@@ -205,7 +205,8 @@ def pareto(
     ):
         from softstart.optimal.optimize import start_time_of_direct
 
-        made, direct = make_controllers(controllers, {}), cache(lambda: start_time_of_direct(drive))
+        made, curve = make_controllers(controllers, {}), tuple(given.get("torque_speed", ()))
+        direct = cache(lambda: start_time_of_direct(drive, curve))
         times = None if start_times is None else [one.seconds(direct) for one in start_times]
         found = softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)
     if not any(point.found for point in found.points):

@@ -71,6 +71,7 @@ TASTE, HOPEFUL = 8, 1.03  # steps from a demand around, and the merit up to whic
 STRETCH, BUMPS, HEIGHT = 0.15, 10, 0.15  # of time; their number; of the highest torque
 CLOSE = 0.25  # of the highest torque below the torque-speed curve: looked at
 BETWEEN = 5e-5  # of the highest torque: kept from the curve for what happens between the instants
+CURVE_TOLERANCE = 1e-4  # of a step, by which the torque may lie beyond the curve in a program
 IN_LAG = 0.04  # of a torque lag, between instants at which a curve limits the torque
 FARTHEST = 0.2  # of t_f, that it moves in a step
 CALM = 1e-5  # weight of the total variation of the torque, in highest torques
@@ -656,7 +657,9 @@ class Model:
             x = solved
             most = float(x[count]) + max(LET_THROUGH * (peak - float(x[count])), self.search.fine * peak)
             new = self.shafts.over(x[:count], most if limited else math.inf, shafts)
-            beyond = self.curve.over(x[:count], float(x[curve]) + 1e-7, over)
+            # a long step is wrong by more than this anyway, and each round solves the whole program again
+            close = max(1e-6, CURVE_TOLERANCE * float(np.abs(x[:count]).max()))
+            beyond = self.curve.over(x[:count], float(x[curve]) + close, over)
             if new.size + beyond.size == 0 and not self._cut_short(x, cost):
                 break
             self.cuts.append(x[:count])

@@ -30,6 +30,7 @@ from softstart.optimal.result import (
     Trial,
     Verdict,
 )
+from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve, rigid_start_time
 from softstart.parallel import on_one_thread
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
@@ -44,6 +45,9 @@ TRIES = 1500  # knots in all starts around one, where one torque serves several 
 ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
 SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
 SCAN = 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9  # between its bound and a start: where others are looked for
+# under a torque-speed curve no start is looked for that is shorter than that of a rigid drive by more than
+SWING, SWUNG = 0.5, 0.2  # so much of a period; so much of its time where the load alone has to be quick
+NARROW = 0.1  # between a bound and a start: then no other starts are looked for
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 NO_SHARE = 1e-9  # of a limit: its logarithm is taken, as a life falls with a power of the torque
@@ -85,7 +89,8 @@ def optimize(
         The machine, or the name or file of one.
     start_time : float or str, optional
         Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
-        ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
+        ("1.2x"; under a torque-speed curve of that of a rigid drive, if it is longer). By default 1.2x, and
+        `why` says so; none where the start time is minimised.
     terminal : {"synchronous", "steady", "reached"}, optional
         What holds at t_f: all masses have the target speed; also every shaft the torque that it carries then;
         or only the load has its speed. By default synchronous for two masses, where it is possible in that
@@ -149,6 +154,7 @@ def optimize(
     problem = Problem(
         machine, some, terminal, minimise, k_dyn, heat, corners, smoothness, base, tuple(scenarios)
     )
+    refuse_weak_curve(problem)
     if confirm and len(problem.machines) > 1:
         raise InputError("confirm: the CasADi problem is for one start; give one position and no scenarios.")
     if confirm and minimise == "start_time":
@@ -163,7 +169,8 @@ def optimize(
             )
         return _within_limits(problem, known)
     if asked_for is not None:
-        problem = replace(problem, start_time=asked_for.seconds(lambda: start_time_of_direct(machine)))
+        end = asked_for.seconds(lambda: start_time_of_direct(machine, corners))
+        problem = replace(problem, start_time=end)
     why = f"; no start time given: {asked_for} that of direct" if usual else ""
     try:
         best = solve(problem, known, confirm)
@@ -192,6 +199,7 @@ def solve(
     assert problem.start_time is not None
     if problem.start_time < momentum_shortest_time(problem):
         raise _too_short(problem, shortest_start_time(problem))
+    refuse_weak_curve(problem)
     best = _by_formula(problem, began)
     if best is None and near is not None and follow:
         best = _followed(problem, near, problem.start_time / follow, began)
@@ -212,7 +220,8 @@ def _by_formula(problem: Problem, began: float) -> Optimum | None:
 
 
 def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> Optimum:
-    found = searched(problem, near)
+    assert problem.start_time is not None
+    found = None if problem.start_time < _hardly_shorter(problem) else searched(problem, near)
     if found is None or found[1].missed > MISSED:
         found = _sooner(problem)
     return _answer(problem, *found, began)
@@ -255,9 +264,9 @@ def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
 def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Found, TorqueProfile]:
     """The gentlest start in the shortest time, in which a demand ends; else that of the demand itself."""
     assert problem.start_time is not None
-    found = searched(problem, demand)
+    search = Descent(problem)
+    found = None if _too_long(search) else searched(problem, demand)
     if found is None or found[1].missed > MISSED:
-        search = Descent(problem)
         search.apart = APART
         start = search.into(demand, problem.start_time)
         start = None if start is None else search.finished(start)
@@ -269,6 +278,11 @@ def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Found, T
             "bounds, though one exists; ask for more time."
         )
     return "the shortest start found", *found[1:]
+
+
+def _too_long(search: Descent) -> bool:
+    """Whether a descent takes minutes and ends worse than it began: many knots under a torque-speed curve."""
+    return bool(search.problem.torque_speed) and search.even.size > MANY
 
 
 def searched(
@@ -441,8 +455,10 @@ def whole_run(best: Optimum) -> Run:
 # the shortest start ----------------------------------------------------------------------------------------
 
 
-def start_time_of_direct(machine: Machine) -> float:
+def start_time_of_direct(machine: Machine, torque_speed: Corners = ()) -> float:
     """Start time under the constant starting torque, s. Raises SimulationError where there is none.
+
+    Under a torque-speed curve that of a rigid drive, if it is longer: the motor does not have that torque.
 
     >>> from softstart import Drive
     >>> round(start_time_of_direct(Drive.load("crane-4amtkf")), 4)
@@ -454,7 +470,10 @@ def start_time_of_direct(machine: Machine) -> float:
             f"direct does not bring this load to its target speed ({run.status.value[:-1]}); "
             "give start times in s instead of multiples."
         )
-    return float(run.start_time)
+    if not torque_speed:
+        return float(run.start_time)
+    refuse_weak_curve(Problem(machine, 1.0, torque_speed=torque_speed))
+    return max(float(run.start_time), RigidStart(machine, torque_speed).time)
 
 
 def shortest_start_time(problem: Problem) -> float:
@@ -469,12 +488,21 @@ def shortest_start_time(problem: Problem) -> float:
     return math.inf if found is None else found[0]
 
 
+def _hardly_shorter(problem: Problem) -> float:
+    """A time in s below which no start under a torque-speed curve is looked for; 0 without one."""
+    rigid = rigid_start_time(problem)
+    if problem.terminal == "reached":
+        return (1.0 - SWUNG) * rigid
+    return rigid - SWING * max(float(machine.elastic_period) for machine in problem.machines)
+
+
 def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[float, TorqueProfile] | None:
     """The shortest t_f in s within which a start was found, by halving, and that start."""
-    low = momentum_shortest_time(problem)
+    refuse_weak_curve(problem)
+    low, rigid = max(momentum_shortest_time(problem), _hardly_shorter(problem)), rigid_start_time(problem)
     period = max(float(machine.elastic_period) for machine in problem.machines)
     longest = LONGEST * (low + period)
-    high = low + 0.2 * period
+    high = max(low, rigid) + 0.2 * period
     with suppress(SimulationError):
         high = max(high, *(start_time_of_direct(one) for one in problem.machines))
     timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
@@ -487,7 +515,8 @@ def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[floa
             low, high = high, 1.3 * high + 0.1 * period
             if high > longest:
                 return None
-    for middle in (low + share * (high - low) for share in SCAN):  # starts unlike that one may be shorter
+    scan = SCAN if low < (1.0 - NARROW) * high else ()  # starts unlike that one may be shorter
+    for middle in (low + share * (high - low) for share in scan):
         found = searched(replace(timed, start_time=middle), quick=True)
         if found is not None and found[1].missed <= MISSED:
             high, demand = middle, found[2]
@@ -530,7 +559,8 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
                 break
         else:
             raise OptimumError(f"No start near the shortest found, {found[0]:.6g} s, keeps all bounds.")
-        why = f"the shortest start found, the gentlest of these; {best.why}"
+        gentle = "" if _too_long(Descent(timed)) else ", the gentlest of these"
+        why = f"the shortest start found{gentle}; {best.why}"
         best = replace(best, problem=problem, why=why)
         return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
     bound = Limit("K_dyn", "1", "k_dyn", problem.k_dyn)

@@ -362,6 +362,11 @@ def _check_corners(corners: Sequence[Sequence[float]]) -> list[str]:
         return [f"{shown}: give two corners or more, in order of rising speed."]
     if any(not math.isfinite(number) for point in points for number in point):
         return [f"{shown}: give finite numbers."]
+    if low := next((point for point in points if point[1] < 0.0), None):
+        return [
+            f"{shown}: {low[1]:g} N m at {low[0]:g} rad/s: a limit of the torque is 0 or more; end the curve "
+            "where it comes to 0."
+        ]
     slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points)]
     if any(b > a + 1e-12 * abs(a) for a, b in pairwise(slopes)):
         return [

@@ -42,6 +42,7 @@ REFUSED = [
     ("optimize --start-time=-2x", '"-2x"', "a multiple"),
     ("optimize --terminal steedy", "--terminal", "'synchronous', 'steady', 'reached'"),
     ("optimize --start-time 1x --torque-speed 62", "--torque-speed", "speed:torque"),
+    ("optimize --torque-speed 0:62,90:-5", "--torque-speed", "-5 N m at 90 rad/s", "0 or more"),
     ("optimize --start-time 1x --smoothness -1", "--smoothness", "0 or more"),
     ("optimize --start-time 1.2x --gaps 0.5,,1", "--gaps", "empty"),
     ("pareto --start-times ''", "--start-times", "empty"),
