@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
@@ -138,3 +140,39 @@ def test_an_inclined_belt_on_its_backstop() -> None:
         assert run.peak_torque == pytest.approx(with_damping, abs=0.1)
     friction = damped.replace(load_kind="reactive", brake="none", start_position="unknown")
     assert simulate(friction, "direct").peak_torque == pytest.approx(1358.5, abs=0.1)
+
+
+def test_a_load_on_the_ground_is_lifted_from_rest_and_does_not_fall_through_the_gap() -> None:
+    """A hoist in mid-gap with its load set down: the ground carries it until the shaft torque exceeds Mc.
+
+    The motor crosses half the gap alone, winds up the shaft against a load at rest, then lifts it.
+    """
+    hoist = Drive.load("hoist-15kw").replace(start_position="mid-gap", brake="none", load_kind="reactive")
+    J1, J2, c, d, Ms, Mc = (getattr(hoist, name) for name in ("J1", "J2", "c", "d", "Ms", "Mc"))
+
+    def torque(x: Any) -> Any:  # x: compression of the shaft, speeds of motor and load
+        return c * x[0] + d * (x[1] - x[2])
+
+    def lifted(_: float, x: Any) -> float:
+        return float(torque(x) - Mc)
+
+    def at_its_peak(_: float, x: Any) -> float:
+        return float(c * (x[1] - x[2]) + d * ((Ms - torque(x)) / J1 - (torque(x) - Mc) / J2))
+
+    lifted.terminal = at_its_peak.terminal = True  # type: ignore[attr-defined]
+    lifted.direction, at_its_peak.direction = 1.0, -1.0  # type: ignore[attr-defined]
+    tight = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+    wound = solve_ivp(
+        lambda t, x: (x[1], (Ms - torque(x)) / J1, 0.0),
+        (0.0, 1.0), (0.0, math.sqrt(Ms / J1 * hoist.gap), 0.0), events=lifted, **tight,
+    )  # fmt: skip
+    peak = solve_ivp(
+        lambda t, x: (x[1] - x[2], (Ms - torque(x)) / J1, (torque(x) - Mc) / J2),
+        (0.0, 1.0), wound.y[:, -1], events=at_its_peak, **tight,
+    )  # fmt: skip
+
+    run = simulate(hoist, "direct")
+    assert run.peak_torque == pytest.approx(torque(peak.y[:, -1]), rel=1e-9)
+    assert run.peak_torque == pytest.approx(315.33, abs=0.005)
+    falling = simulate(hoist.replace(load_kind="active"), "direct")
+    assert falling.peak_torque > 1.2 * run.peak_torque
