@@ -205,6 +205,6 @@ def _nothing_holds(machine: Any) -> Iterator[str]:
     if falls and at_rest and not machine.position_given:
         yield (
             "start.position is not given: the start begins in mid-gap, where nothing holds this active load; "
-            'write "hanging" (and start.brake "motor" if a brake holds the motor), "mid-gap" if it is so; for a '
-            'load that stands on the ground write load.kind "reactive".'
+            'write "hanging" (and start.brake "motor" if a brake holds the motor), "mid-gap" if it is so; '
+            'for a load that stands on the ground write load.kind "reactive".'
         )
