@@ -33,6 +33,7 @@ from softstart.chain.elements import (
     Quantity,
     Shaft,
 )
+from softstart.chain.unreduced import Unreduced
 from softstart.chain.words import Words
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.drive.checks import wrong_units
@@ -378,10 +379,7 @@ class Chain(Words):
         try:
             return self.two_masses.design_drive
         except InputError as error:
-            from softstart.chain.unreduced import Unreduced
-
-            unreduced: Any = Unreduced(self, error.sentences)
-            return unreduced
+            return Unreduced(self, error.sentences)  # type: ignore[return-value]
 
     @cached_property
     def elastic_period(self) -> float:
