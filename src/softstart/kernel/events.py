@@ -28,6 +28,7 @@ EPS = 2.220446049250313e-16
 MAX_STEPS = 20_000
 CLEARLY = 1e4  # what is above so many times its rounding is not zero
 FAINT = 1e-10  # a leading coefficient below this share of what follows is taken for rounding
+LOST_IN = 1e-21  # and a value: it moves no root by more than that share of the span
 
 
 @inner
@@ -183,9 +184,44 @@ def rounding_of_torque(s: Record, k: int) -> float:
 
 
 @inner
+def differences(s: Record, k: int) -> float:
+    """The sizes of what the torque of a spring is the difference of, c z and d z'."""
+    return float(s.stiff[k] * (abs(s.theta[k]) + s.half[k]) + s.damp[k] * (abs(s.w[k]) + abs(s.w[k + 1])))
+
+
+@inner
+def size_of_torques(s: Record, i: int) -> float:
+    """The scale of rounding of the torque on the body that begins with mass i, and of what can hold it."""
+    total = s.scale[i] + s.hold[i]
+    if i > 0:
+        total += differences(s, i - 1)
+    j = i
+    while j < s.n and s.first[j] == i:
+        j += 1
+    return float(total + differences(s, j - 1) if j < s.n else total)
+
+
+@inner
 def influence(s: Record, i: int) -> float:
     """The torques on the body of mass i over its inertia."""
     return s.scale[s.first[i]] / s.body_J[s.first[i]]
+
+
+@inner
+def rounding_of_twist(s: Record, k: int, h: float) -> float:
+    """Rounding errors of the accelerations beside shaft k, as a share of its twist within the span."""
+    return 1e-14 * h * h * (influence(s, k) + influence(s, k + 1))
+
+
+@inner
+def faint_torque(s: Record, k: int, h: float, noise: float) -> float:
+    """What these errors are in the torque of the shaft, to first order: c z and d z'.
+
+    Of `first_root` of s.f, which asks for it only where f begins at zero.
+    """
+    if s.f[0] > CLEARLY * noise or h == 0.0:
+        return 0.0
+    return (s.c[k] + s.d[k] / h) * rounding_of_twist(s, k, h)
 
 
 @inner
@@ -195,7 +231,7 @@ def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]
     twist = s.twist[k]
     if swing(twist, n) < half - abs(theta):
         return NO_EVENT, end
-    faint = 1e-14 * h * h * (influence(s, k) + influence(s, k + 1))
+    faint = rounding_of_twist(s, k, h)
     if s.rigid[k] != 0.0 and s.zeros[k] == 0 and abs(theta) == half and half > 0.0:
         side = math.copysign(1.0, theta)
         rebound = -side * twist[1]
@@ -228,7 +264,7 @@ def set_damping_excess(s: Record, k: int, n: int, sign: float) -> None:
 
 
 @inner
-def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+def parting(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The instant at which flanks in contact part, or at which the damping regime changes."""
     side = s.side[k]
     event = NO_EVENT
@@ -238,7 +274,7 @@ def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     if s.law[k] == MODELICA and s.d[k] > 0.0:
         doubled = s.mode[k] == DOUBLED
         set_damping_excess(s, k, n, -side if doubled else side)
-        x = first_root(s, n, end, 0 if rejoined else s.zeros[k], noise, 0.0)
+        x = first_root(s, n, end, 0 if rejoined else s.zeros[k], noise, faint_torque(s, k, h, noise))
         if x < NONE:
             return UNSOLVED, 0.0
         if x >= 0.0:
@@ -247,37 +283,40 @@ def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
         if doubled:
             return event, end
         set_line(s.f, s.torque[k], n, 0.0, side)
+        faint = faint_torque(s, k, h, noise)
     elif s.law[k] != DEAD_ZONE and s.d[k] > 0.0:
         if swing(s.torque[k], n) < side * s.torque[k, 0]:
             return NO_EVENT, end
         set_line(s.f, s.torque[k], n, 0.0, side)
+        faint = faint_torque(s, k, h, noise)
     else:
         if swing(s.twist[k], n) < side * s.theta[k] - s.half[k]:
             return NO_EVENT, end
         set_line(s.f, s.twist[k], n, -s.half[k], side)
-        noise = ROUNDING * s.half[k]
-    x = first_root(s, n, end, zeros, noise, 0.0)
+        noise, faint = ROUNDING * s.half[k], rounding_of_twist(s, k, h)
+    x = first_root(s, n, end, zeros, noise, faint)
     if x < NONE:
         return UNSOLVED, 0.0
     return (EXIT, x) if x >= 0.0 else (event, end)
 
 
 @inner
-def returning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+def returning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """From overlapping flanks without torque: the torque comes back, or they part."""
     side = s.side[k]
     for o in range(n + 1):
         s.f[o] = -side * (s.c[k] * s.twist[k, o] + s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
     s.f[0] += s.c[k] * s.half[k]
     event = NO_EVENT
-    x = first_root(s, n, end, s.zeros[k], rounding_of_torque(s, k), 0.0)
+    noise = rounding_of_torque(s, k)
+    x = first_root(s, n, end, s.zeros[k], noise, faint_torque(s, k, h, noise))
     if x < NONE:
         return UNSOLVED, 0.0
     if x >= 0.0:
         event = REJOIN
         end = x
     set_line(s.f, s.twist[k], n, -s.half[k], side)
-    x = first_root(s, n, end, 0, ROUNDING * s.half[k], 0.0)
+    x = first_root(s, n, end, 0, ROUNDING * s.half[k], rounding_of_twist(s, k, h))
     if x < NONE:
         return UNSOLVED, 0.0
     return (BACK, x) if x >= 0.0 else (event, end)
@@ -297,15 +336,15 @@ def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
 
 
 @inner
-def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+def turning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The instant at which the torque of a shaft that may pull changes its sign."""
     pulls = s.mode[k] == CONTACT and s.law[k] == DEAD_ZONE and s.d[k] > 0.0
     if not pulls and s.mode[k] != JOINED:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.sign[k])
-    noise = s.c[k] * (abs(s.theta[k]) + s.half[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
-    noise += s.scale[s.first[k]]  # a twist near 0 has the rounding of those before it
-    x = first_root(s, n, end, s.zeros[k], ROUNDING * noise, 0.0)
+    # a twist near 0 has the rounding of those before it
+    noise = ROUNDING * (differences(s, k) + s.scale[s.first[k]])
+    x = first_root(s, n, end, s.zeros[k], noise, faint_torque(s, k, h, noise))
     if x < NONE:
         return UNSOLVED, 0.0
     return (TURNED, x) if x >= 0.0 else (NO_EVENT, end)
@@ -317,11 +356,11 @@ def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
 @inner
 def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """Breakaway or stop of the body that begins with mass i, or that its torque lets the brake go."""
-    noise = ROUNDING * (s.scale[i] + s.hold[i])
     event = NO_EVENT
     if s.braked != 0.0 and s.first[s.at_motor] == i:
         if s.release_at < math.inf:  # released by time
             return event, end
+        noise = ROUNDING * (s.scale[i] + s.hold[i])
         if s.held[i, 0] >= -noise:  # a torque that just holds the load is proved
             return LET_GO, 0.0
         set_line(s.f, s.held[i], n, 0.0, -1.0)
@@ -334,11 +373,15 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if s.stuck[i] != 0:
         if s.gears[i] == 0 and swing(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
             return event, end
+        noise = ROUNDING * size_of_torques(s, i)
         for which in range(2):
             set_line(s.f, s.held[i], n, s.hold[i], -1.0 + 2.0 * which)
             if s.gears[i] != 0:
                 for o in range(n + 1):
                     s.f[o] += grip(s, i, 1.0 - 2.0 * which, o)
+            # an excess that `first_root` would pass over in the speed of the body, once let go, is none
+            if s.f[0] < 0.0 and s.f[0] >= -FAINT * swing(s.f, n):
+                s.f[0] = 0.0
             x = first_root(s, n, end, 0, noise, noise)
             if x < NONE:
                 return UNSOLVED, 0.0
@@ -349,10 +392,14 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     j = i
     while s.rubs[j] == 0.0:
         j += 1
-    if swing(s.speed[i], n) < s.direction[j] * s.w[i]:
+    reach = swing(s.speed[i], n)
+    if reach < s.direction[j] * s.w[i]:
         return event, end
     set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
-    faint = 1e-14 * h * (s.scale[i] + s.hold[i]) / s.body_J[i]
+    faint = 0.0
+    if abs(s.f[0]) <= LOST_IN * reach:  # of a body let go within rounding: what follows decides
+        s.f[0] = 0.0
+        faint = 1e-14 * h * size_of_torques(s, i) / s.body_J[i]
     x = first_root(s, n, end, 0, 0.0, faint)
     if x < NONE:
         return UNSOLVED, 0.0
@@ -393,13 +440,13 @@ def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int
     if mode == OPEN:
         event, end = flanks(s, k, h, n, end)
     elif mode in (CONTACT, DOUBLED):
-        event, end = parting(s, k, n, end)
+        event, end = parting(s, k, h, n, end)
     elif mode == BEYOND:
-        event, end = returning(s, k, n, end)
+        event, end = returning(s, k, h, n, end)
     elif mode == PRESSED:
         event, end = releasing(s, k, n, end)
     if s.eta[k] != 1.0 and event != UNSOLVED:
-        turned, end = turning(s, k, n, end)
+        turned, end = turning(s, k, h, n, end)
         if turned != NO_EVENT:
             event = turned
     return event, end
@@ -419,7 +466,8 @@ def next_event(s: Record, h: float, n: int) -> int:
     for i in range(s.n):
         if s.first[i] == i and (s.rubbing[i] != 0 or s.braked != 0.0):
             event, x = friction(s, i, h, n, s.share)
-            if event != NO_EVENT:
+            # the friction of a gear goes with the sign of its torque: at one instant that turns first
+            if event != NO_EVENT and (event == UNSOLVED or first != TURNED or x < s.share):
                 first, s.where, s.share = event, i, x
             if event == UNSOLVED:
                 return first

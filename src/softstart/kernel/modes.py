@@ -183,7 +183,10 @@ def settle(s: Record, k: int, rest: float) -> None:
 
 @inner
 def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
-    """A flank is reached; `press` is the relative acceleration towards it."""
+    """A flank is reached; `press` is the relative acceleration towards it.
+
+    Where v and `press` are 0 it is reached by what follows in the series, and that is a contact.
+    """
     v = side * (s.w[k] - s.w[k + 1])
     s.theta[k] = side * s.half[k]
     s.side[k] = side

@@ -7,7 +7,7 @@ import math
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import next_event, peak_within, value
+from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, value
 from softstart.kernel.jit import apart, compiled_as, inner, named
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
@@ -171,12 +171,21 @@ def move(s: Record, n: int, x: float, time: float) -> None:
 
 @apart(types.float64(WORK_TYPE, types.int64, types.int64, *[types.float64] * 3))
 def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> float:
-    """The relative acceleration of the masses beside shaft k towards the flank `side`, rad/s^2."""
+    """The relative acceleration of the masses beside shaft k towards the flank `side`, rad/s^2.
+
+    Where it is lost in rounding the flank is reached because of what follows it in the series: it is 0 then.
+    """
     twist = s.twist[k]
+    noise = rounding_of_twist(s, k, h)
+    if x == 0.0:
+        rest = 0.0
+        for o in range(3, n + 1):
+            rest += abs(twist[o])
+        noise = max(noise, FAINT * rest)
     total = 0.0
     for o in range(n, 1, -1):
         total = total * x + o * (o - 1.0) * twist[o]
-    return side * total / (h * h)
+    return side * total / (h * h) if abs(total) > 2.0 * noise else 0.0
 
 
 @inner
