@@ -7,7 +7,7 @@ import math
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, value
+from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, swing, value
 from softstart.kernel.jit import apart, compiled_as, inner, named
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
@@ -178,10 +178,7 @@ def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> floa
     twist = s.twist[k]
     noise = rounding_of_twist(s, k, h)
     if x == 0.0:
-        rest = 0.0
-        for o in range(3, n + 1):
-            rest += abs(twist[o])
-        noise = max(noise, FAINT * rest)
+        noise = max(noise, FAINT * (swing(twist, n) - abs(twist[1]) - abs(twist[2])))
     total = 0.0
     for o in range(n, 1, -1):
         total = total * x + o * (o - 1.0) * twist[o]
