@@ -46,6 +46,7 @@ BUDGET, SHAFTS_BUDGET = 20.0, 60.0  # s for optima that take a search, on one sh
 def provenance(drive: Any, command: str) -> dict[str, Any]:
     """Date (UTC), versions, file of the drive and command of a report made now.
 
+    >>> from softstart import Drive
     >>> made = provenance(Drive.load("crane-4amtkf"), "softstart report")
     >>> made["command"], "numpy" in made["libraries"]
     ('softstart report', True)
