@@ -184,24 +184,6 @@ def rounding_of_torque(s: Record, k: int) -> float:
 
 
 @inner
-def differences(s: Record, k: int) -> float:
-    """The sizes of what the torque of a spring is the difference of, c z and d z'."""
-    return float(s.stiff[k] * (abs(s.theta[k]) + s.half[k]) + s.damp[k] * (abs(s.w[k]) + abs(s.w[k + 1])))
-
-
-@inner
-def size_of_torques(s: Record, i: int) -> float:
-    """The scale of rounding of the torque on the body that begins with mass i, and of what can hold it."""
-    total = s.scale[i] + s.hold[i]
-    if i > 0:
-        total += differences(s, i - 1)
-    j = i
-    while j < s.n and s.first[j] == i:
-        j += 1
-    return float(total + differences(s, j - 1) if j < s.n else total)
-
-
-@inner
 def influence(s: Record, i: int) -> float:
     """The torques on the body of mass i over its inertia."""
     return s.scale[s.first[i]] / s.body_J[s.first[i]]
@@ -342,8 +324,8 @@ def turning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
     if not pulls and s.mode[k] != JOINED:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.sign[k])
-    # a twist near 0 has the rounding of those before it
-    noise = ROUNDING * (differences(s, k) + s.scale[s.first[k]])
+    noise = s.c[k] * (abs(s.theta[k]) + s.half[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
+    noise = ROUNDING * (noise + s.scale[s.first[k]])  # a twist near 0 has the rounding of those before it
     x = first_root(s, n, end, s.zeros[k], noise, faint_torque(s, k, h, noise))
     if x < NONE:
         return UNSOLVED, 0.0
@@ -356,11 +338,11 @@ def turning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
 @inner
 def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """Breakaway or stop of the body that begins with mass i, or that its torque lets the brake go."""
+    noise = ROUNDING * (s.scale[i] + s.hold[i])
     event = NO_EVENT
     if s.braked != 0.0 and s.first[s.at_motor] == i:
         if s.release_at < math.inf:  # released by time
             return event, end
-        noise = ROUNDING * (s.scale[i] + s.hold[i])
         if s.held[i, 0] >= -noise:  # a torque that just holds the load is proved
             return LET_GO, 0.0
         set_line(s.f, s.held[i], n, 0.0, -1.0)
@@ -373,7 +355,6 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if s.stuck[i] != 0:
         if s.gears[i] == 0 and swing(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
             return event, end
-        noise = ROUNDING * size_of_torques(s, i)
         for which in range(2):
             set_line(s.f, s.held[i], n, s.hold[i], -1.0 + 2.0 * which)
             if s.gears[i] != 0:
@@ -396,10 +377,9 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if reach < s.direction[j] * s.w[i]:
         return event, end
     set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
-    faint = 0.0
     if abs(s.f[0]) <= LOST_IN * reach:  # of a body let go within rounding: what follows decides
         s.f[0] = 0.0
-        faint = 1e-14 * h * size_of_torques(s, i) / s.body_J[i]
+    faint = 1e-14 * h * (s.scale[i] + s.hold[i]) / s.body_J[i]
     x = first_root(s, n, end, 0, 0.0, faint)
     if x < NONE:
         return UNSOLVED, 0.0

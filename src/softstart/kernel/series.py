@@ -306,12 +306,15 @@ def join(s: Record, o: int, share: float) -> None:
 
 @inner
 def note_scale(s: Record) -> None:
-    """The sum of the absolute torques on each body, which is the scale of its rounding."""
+    """The sum of the absolute torques on each body, which is the scale of its rounding.
+
+    That of a spring is the difference of c theta and c gap/2.
+    """
     i = 0
     while i < s.n:
         scale = 0.0
         if i > 0:
-            scale += s.after[i - 1] * abs(s.torque[i - 1, 0])
+            scale += s.after[i - 1] * (abs(s.torque[i - 1, 0]) + s.stiff[i - 1] * s.half[i - 1])
         j = i
         while True:
             scale += abs(s.push[j]) + abs(s.ground[j] * s.w[j])
@@ -323,7 +326,7 @@ def note_scale(s: Record) -> None:
             if j == s.n or s.first[j] != i:
                 break
         if j < s.n:
-            scale += s.before[j - 1] * abs(s.torque[j - 1, 0])
+            scale += s.before[j - 1] * (abs(s.torque[j - 1, 0]) + s.stiff[j - 1] * s.half[j - 1])
         s.scale[i] = scale
         i = j
 
