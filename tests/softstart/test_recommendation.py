@@ -117,8 +117,8 @@ def test_without_limits_no_other_strategy_beats_those_that_are_named():
         for row in best:
             assert f"{row.name}, " in found.recommendation.text
     first, second = best[0].run, best[1].run
-    per_ms = 1e-3 * (first.k_dyn - second.k_dyn) / (second.settled_time - first.settled_time)
-    assert f"{per_ms:.2g} per ms" in found.recommendation.text
+    change, longer = second.k_dyn - first.k_dyn, 1e3 * (second.settled_time - first.settled_time)
+    assert f"({change:+.3f} K_dyn for {longer:+.3g} ms)" in found.recommendation.text
 
 
 def test_with_limits_the_simplest_that_keeps_them_in_the_worst_case():

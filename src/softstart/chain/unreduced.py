@@ -10,7 +10,7 @@ from softstart.errors import InputError
 
 
 class Unreduced:
-    """In the place of the two masses of a chain that has none: what controllers may know nevertheless.
+    """What controllers may know of a chain that cannot be reduced to two masses.
 
     That is what its motor, its target, its load torque and its first elastic period are; for anything else it
     says why there are no two masses. So a strategy starts such a chain if nothing of it has to be derived

@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Put something in the place of standard streams that are closed; else another file gets their number.
+    """Open standard streams that are closed as null devices; else another file would get their number.
 
     Input ends at once, output fails as on a full disk, and messages are lost: the exit code remains.
     """

@@ -1,7 +1,7 @@
 """Which strategy is recommended, and why: one rule for `compare`, the page and the report.
 
 With limits (`drive.limits`): the simplest strategy that keeps them in the worst case asked for. Without: the
-strategies that no other one beats in K_dyn and time at once, with the cost of each step from one to the next.
+strategies that are Pareto-optimal in K_dyn and settled time, with the cost of each step from one to the next.
 What is flagged, and what needs a sensor that drives do not have, is not recommended.
 """
 
@@ -368,17 +368,16 @@ def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> R
     if not best:
         return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
     first = best[0]
-    parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f} in {first.run.settled_time:.4g} s"]
+    parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f}, settled in {first.run.settled_time:.4g} s"]
     for before, row in pairwise(best):
-        less, longer = before.run.k_dyn - row.run.k_dyn, row.run.settled_time - before.run.settled_time
+        change, longer = row.run.k_dyn - before.run.k_dyn, row.run.settled_time - before.run.settled_time
         parts.append(
-            f"{row.name}, {row.run.k_dyn:.3f} in {row.run.settled_time:.4g} s ({less:.3f} less for "
-            f"{1e3 * longer:.3g} ms, {1e-3 * less / longer:.2g} per ms)"
+            f"{row.name}, {row.run.k_dyn:.3f}, settled in {row.run.settled_time:.4g} s "
+            f"({change:+.3f} K_dyn for {1e3 * longer:+.3g} ms)"
         )
-    these = "these" if len(best) > 1 else "this one"
     text = (
-        f"No other strategy beats {these} in K_dyn and time at once: {'; '.join(parts)}. Which one is enough "
-        f"depends on what the machine withstands: give {drive.LIMITS_GIVEN}."
+        f"Pareto-optimal in K_dyn and settled time: {'; '.join(parts)}. "
+        f"For a recommendation, give {drive.LIMITS_GIVEN}."
     )
     return Recommendation(text, None, best, limits)
 

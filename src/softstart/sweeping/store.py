@@ -141,7 +141,7 @@ class Store:
             self._list.stay(False)
 
     def _check_place(self, name: Path) -> None:
-        """Raise InputError where a folder that is not empty stands in the place of a file of the sweep."""
+        """Raise InputError if a file of the sweep is a folder that is not empty."""
         assert self.path is not None
         assert self._target is not None
         place = self.path / name
