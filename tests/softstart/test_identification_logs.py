@@ -138,6 +138,21 @@ LAYOUTS = {  # what stands above the numbers, a row, decimal mark, columns
     "date and time": ("time;torque [Nm];angle [rad]", "2024-05-01 {clock};{torque};{angle}", ",", {}),
     "counts": ("time [ms];torque [Nm];angle [counts]", "{ms};{torque};{counts}", ",",
         {"angle": "1/1000000*angle[turn]"}),
+    "spaces, in columns of one width": ("  time [ms]    torque [N*m]     angle [rad]",
+        "{ms:>11} {torque:>15} {angle:>15}", ".", {}),
+    "spaces, decimal commas": ("time[ms] torque (N m) angle[deg]", "{ms}   {torque} {deg}  ", ",", {}),
+    "spaces, units below": ("PLC trace of 1 May\n  time  torque   angle\n    ms     N*m     rad",
+        "   {ms}   {torque}   {angle}", ".", {}),
+    "spaces, units in brackets below": ("time  torque  angle\n[ms] [N m] [deg]",
+        "{ms} {torque} {deg}", ".", {}),
+    "spaces in names": ("Time (ms)   Motor torque [Nm]   Rotor position [deg]", "{ms} {torque} {deg}", ".",
+        {"time": "Time", "torque": "Motor torque", "angle": "Rotor position"}),
+    "spaces behind a mark of MATLAB": ("% saved by hand\n%  time [ms]  torque [N*m]  angle [rad]",
+        "   {ms}e+00   {torque}e+00   {angle}e+00", ".", {}),
+    "spaces, date and time": ("time  torque [Nm]  angle [rad]",
+        "2024-05-01 {clock}  {torque}  {angle}", ".", {}),
+    "spaces and tabs": ("time [ms]\ttorque [Nm]\tangle [rad]", " {ms} \t{torque}  {angle}", ".", {}),
+    "spaces behind commas": ("time [ms], torque [Nm],  angle [rad]", " {ms},  {torque}, {angle}", ".", {}),
     "no unit of time": ("time;torque [Nm];angle [rad]", "{ms};{torque};{angle}", ",", {}),
 }  # fmt: skip
 
@@ -227,6 +242,25 @@ def test_the_unit_of_each_signal_does_not_matter(kind: str, data: st.DataObject,
     assert read.torque == pytest.approx(TORQUE, rel=1e-12)
     assert read.values == pytest.approx(SIGNALS[kind], rel=1e-12, abs=1e-12)
     assert read.notes == ()
+
+
+def test_columns_between_spaces_that_nothing_names_or_measures_are_questions(tmp_path: Path) -> None:
+    """As `save -ascii` writes them, without a heading; the sentence's own heading mends it."""
+    path = tmp_path / "a.txt"
+    rows = "\n".join("".join(f"  {v: .7e}" for v in row) for row in zip(TIME, TORQUE, SPEED, strict=True))
+    path.write_text(rows)
+    with pytest.raises(
+        InputError, match=r"no line above the numbers names the columns.*, as (.*)\.$"
+    ) as refused:
+        Log.load(path)
+    form = str(refused.value).rpartition(", as ")[2].rstrip(".")
+    path.write_text(f"{form}\n{rows}")
+    read = Log.load(path)
+    assert read.time == pytest.approx(1e-3 * TIME, rel=1e-6)  # the heading says ms
+    assert read.values == pytest.approx(SPEED * math.pi / 30.0, rel=1e-6)
+    path.write_text(f"time torque speed\n{rows}")
+    with pytest.raises(InputError, match=r'"speed", the speed, has no unit'):
+        Log.load(path)
 
 
 @pytest.mark.parametrize("kind", ["angle", "speed"])

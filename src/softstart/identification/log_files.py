@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +13,17 @@ from scipy.integrate import cumulative_trapezoid
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.input.columns import SHARES, Table, Wanted, are_units, read_numbers, rows_of, split_heading
+from softstart.input.columns import (
+    CLOCK,
+    SHARES,
+    Table,
+    Wanted,
+    are_units,
+    cells_of,
+    read_numbers,
+    rows_of,
+    split_heading,
+)  # fmt: skip
 from softstart.input.files import read_text
 from softstart.quantities import RefusedError, nearest, parse, show
 
@@ -31,10 +40,6 @@ SEARCHED: Final = 400  # lines in which the numbers must begin
 LONGEST_PERIOD: Final = 0.1  # s between samples; a larger number without a unit is one in ms or us
 ALIKE, MATCHED = 0.01, 0.01  # error of an angle that is the integral of a speed; of the ratio of their units
 NUMBER: Final = r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?"
-CLOCK: Final = re.compile(
-    r"(?:[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4},?[ T])?\s*"
-    r"([0-9]{1,2}):([0-9]{2}):([0-9]{2})(?:[.,:]([0-9]+))?(?:Z|[+-][0-9]{2}:?[0-9]{2})?"
-)
 CELL: Final = re.compile(rf"{NUMBER}|[+-]?(?:nan|inf)|{CLOCK.pattern}|", re.IGNORECASE)
 COUNTS: Final = re.compile(r"(counts?|cts?|incr?(ements?)?|ticks?|pulses?)", re.IGNORECASE)
 
@@ -122,21 +127,23 @@ def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, di
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
         raise RefusedError(f"there are no numbers in it; write them below a line of names, as {FORM}")
-    marks = {mark: _first_row([(i, lines[i]) for i in rows[:SEARCHED]], mark) for mark in ";\t,"}
+    marks = {mark: _first_row([(i, lines[i]) for i in rows[:SEARCHED]], mark) for mark in ";\t, "}
     mark = max(marks, key=lambda one: marks[one][2])
     first, width, count = marks[mark]
     if not count:
         raise RefusedError(
             f"no line of its first {SEARCHED} has numbers in two columns or more, divided by semicolons, "
-            f"tabs or commas; write them below a line of names, as {FORM}"
+            f"tabs, commas or spaces; write them below a line of names, as {FORM}"
         )
     last = max(i for i in rows if sum(map(bool, _cells(lines[i], mark))) > 1)  # behind it words, as EOF
     numbers = rows_of([(i + 1, lines[i]) for i in rows if first <= i <= last], mark, where)
     width = len(numbers[0][1])  # without a mark at the end of each line
-    above = [_cells(lines[i].lstrip("# "), mark) for i in range(first) if lines[i].strip()]
+    above = [_heading(lines[i].lstrip("# "), mark, width) for i in range(first) if lines[i].strip()]
     headings = list(_headings([row for row in above if len(row) >= width], width))
     if not headings:
-        raise RefusedError(f"no line above the numbers names the columns; write it there, as {FORM}")
+        raise RefusedError(
+            f"no line above the numbers names the columns; write it there, as {FORM.replace(';', mark)}"
+        )
     refusals = []
     for names, units in headings:
         sheet = Sheet(names, units, Table(numbers, width, mark))
@@ -150,7 +157,20 @@ def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, di
 
 
 def _cells(line: str, mark: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True))]
+    return [cell.strip() for cell in cells_of(line, mark)]
+
+
+def _heading(line: str, mark: str, width: int) -> list[str]:
+    """The cells of a line above so many columns; between wide gaps names may have spaces.
+
+    >>> _heading("% time  M  n", " ", 3), _heading("Motor torque [Nm]   Motor speed [rpm]", " ", 2)
+    (['time', 'M', 'n'], ['Motor torque [Nm]', 'Motor speed [rpm]'])
+    """
+    if mark != " ":
+        return _cells(line, mark)
+    bare = re.sub(r"^[%!]\s*", "", line)  # of a comment, if no unit is meant
+    ways = [re.split(r"\s{2,}|\t", bare.strip()), _cells(bare, mark), _cells(line, mark)]
+    return next((way for way in ways if len(way) == width), ways[-1])
 
 
 def _first_row(lines: Sequence[tuple[int, str]], mark: str) -> tuple[int, int, int]:

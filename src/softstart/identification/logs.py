@@ -151,7 +151,7 @@ class Log:
         Parameters
         ----------
         path : str or path
-            The file; semicolons, tabs or commas divide the columns, decimal commas are read.
+            The file; semicolons, tabs, commas or spaces divide the columns, decimal commas are read.
         columns : mapping, optional
             What the file calls time, torque, angle and speed, as `-n_act [rpm]`: a minus turns the sign, and
             a unit in brackets takes the place of that of the file. A factor before the name makes a torque of

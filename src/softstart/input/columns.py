@@ -17,8 +17,20 @@ from softstart.quantities import RefusedError, parse, read_unit, show, with_poin
 _NUMBER = re.compile(r"[+-]?[.,]?[0-9]|[+-]?(inf|nan)\b", re.IGNORECASE)
 Heading = Literal["any", "names"]
 SHARES = ("%", "‰")  # of a torque that a file does not name
+CLOCK = re.compile(
+    r"(?:[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4},?[ T])?\s*"
+    r"([0-9]{1,2}):([0-9]{2}):([0-9]{2})(?:[.,:]([0-9]+))?(?:Z|[+-][0-9]{2}:?[0-9]{2})?"
+)
+_BRACKETS = r"\[[^\]]*\]|\([^)]*\)"
+# a cell between spaces: a date with its time, what is in quotes, a name with its unit, a unit
+_SPACED = re.compile(
+    rf"{CLOCK.pattern}(?!\S)|\"[^\"]*\"|[^\s\[(\"][^\s\[(]*(?:\s*(?:{_BRACKETS}))*\S*|{_BRACKETS}|\S+"
+)
 
-__all__ = ["Columns", "Wanted", "are_units", "read_columns", "read_numbers", "rows_of", "split_heading"]
+__all__ = [
+    "CLOCK", "Columns", "Wanted", "are_units", "cells_of", "read_columns", "read_numbers", "rows_of",
+    "split_heading",
+]  # fmt: skip
 
 Row = tuple[int, list[str]]  # the number of a line, and its cells
 
@@ -42,16 +54,18 @@ def read_columns(
 ) -> Columns:
     """The columns of a text in SI; `where` is put before each sentence of an `InputError`.
 
-    Semicolons, tabs or commas divide columns; between semicolons and tabs, or in quotes, numbers may have
-    decimal commas. Blank lines and lines that begin with # are passed over. A first line without numbers
-    names the columns, with units as `torque [kN*m]`, or in the line below it; if there are no more columns
-    than wanted, other names will do, in this order. Without it there are exactly the columns wanted, in SI.
-    `headed`: it must be there and give "names". `missing`: an empty cell, or "nan", is NaN. What can be read
-    in two ways is refused.
+    Semicolons, tabs, commas or else spaces divide columns; between semicolons and tabs, or in quotes, numbers
+    may have decimal commas. Blank lines and lines that begin with # are passed over. A first line without
+    numbers names the columns, with units as `torque [kN*m]`, or in the line below it; if there are no more
+    columns than wanted, other names will do, in this order. Without it there are exactly the columns wanted,
+    in SI. `headed`: it must be there and give "names". `missing`: an empty cell, or "nan", is NaN. What can
+    be read in two ways is refused.
 
     >>> time, torque = Wanted(("time", "t"), "s"), Wanted(("torque", "u"), "N*m")
     >>> read_columns("t [ms];u [N*m]\\n0;1,5\\n9;2,5", "here", [time, torque])
     Columns(lines=[2, 3], values=[array([0.   , 0.009]), array([1.5, 2.5])])
+    >>> read_columns("t [ms] u [N*m]\\n  0  1.5\\n  9  2.5", "here", [time, torque]).values[0].tolist()
+    [0.0, 0.009]
     >>> read_columns("0,0,10,5", "here", [time, torque])
     Traceback (most recent call last):
     softstart.errors.InputError: here: line 1, "0,0,10,5", has 4 values instead of 2, time and torque; with
@@ -59,7 +73,7 @@ def read_columns(
     """
     numbered = enumerate(text.splitlines(), start=1)
     lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
-    mark = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines)), ",")
+    mark = next((mark for mark in (";", "\t", ",") if any(mark in line for _, line in lines)), " ")
     rows = rows_of(lines, mark, where)
     heading = [cell.strip() for cell in rows[0][1]] if rows else []
     first = show(mark.join(heading))
@@ -155,10 +169,21 @@ def are_units(cells: Sequence[str]) -> bool:
     return any(re.search(r"[^\W\d]|[%‰°]", one) for one in units) and all(known)
 
 
+def cells_of(line: str, mark: str) -> list[str]:
+    """The cells of a line, divided by a mark, or by any number of spaces and tabs if it is a space.
+
+    >>> cells_of(" 0.0   1.5e+00 -2", " "), cells_of("t [ms] M (N m)  n", " "), cells_of("0, 1", ",")
+    (['0.0', '1.5e+00', '-2'], ['t [ms]', 'M (N m)', 'n'], ['0', '1'])
+    """
+    if mark == " ":
+        return [part[0].strip('"') for part in _SPACED.finditer(line)]
+    return next(csv.reader([line], delimiter=mark, skipinitialspace=True))
+
+
 def rows_of(lines: Sequence[tuple[int, str]], mark: str, where: str) -> list[Row]:
     """The cells of numbered lines, divided by a mark."""
     try:
-        rows = [(n, next(csv.reader([line], delimiter=mark, skipinitialspace=True))) for n, line in lines]
+        rows = [(n, cells_of(line, mark)) for n, line in lines]
     except csv.Error as error:
         raise InputError(f"{where}: it cannot be read as columns of numbers ({error}).") from None
     if all(len(row) > 1 and not row[-1].strip() for _, row in rows):  # a mark at the end of each line
