@@ -322,8 +322,8 @@ class Reduction(OneLine):
 
         All load torques and frictions act on its load; where the motor alone could not move them, less what
         load curves that drive the chain carry at standstill; damping to the ground and the efficiencies of
-        gears, which a drive does not have, are left out. It starts where the chain does, in mid-gap if the
-        chain does not say otherwise.
+        gears are left out, but the ratio from motor to load is kept: output torques are without losses, the
+        safe side. It starts where the chain does, in mid-gap if the chain does not say otherwise.
 
         >>> from softstart import Chain
         >>> drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
@@ -342,12 +342,14 @@ class Reduction(OneLine):
         twist = float(arrays.theta0.sum()) * (1.0 if arrays.motor < arrays.load else -1.0)
         speed = float(arrays.J @ arrays.w0) / self.whole.inertia
         law = chain.freed.shafts[0].contact_law
+        ratio = 1.0 / float(arrays.speed_ratio[arrays.load])  # turns of the motor for one of the load
         return Drive(
             **chain.motor.keywords(),
             name=f"{chain.name}, reduced to two masses",
             source=f"reduced from a chain of {len(chain.masses)} masses: {chain.source}",
             assumed=chain.assumed,
             units=chain.units,
+            gear_ratio=ratio if abs(ratio - 1.0) > 1e-12 else None,
             motor_inertia=self.J1,
             load_inertia=self.J2,
             load_torque=active or friction,

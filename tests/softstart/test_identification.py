@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -397,6 +399,23 @@ def test_peak_and_travel_are_those_of_a_simulation() -> None:
     peak, travel, _ = Bench(TRUTH, 1e-3, 1.0, NAMES).loads(profile, end, np.zeros(1))
     assert peak[0] == pytest.approx(run.peak_torque, rel=1e-12)
     assert travel[0] == pytest.approx(np.max(np.abs(angles - angles[0])), rel=1e-4)
+
+
+def test_bounds_of_a_plan_at_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    """20 turns of the motor for one of the output; a permissible torque comes over without losses."""
+    bounds = {}
+    monkeypatch.setattr(Bench, "experiment", lambda *_: SimpleNamespace(peak=1.0))
+    monkeypatch.setattr(Bench, "designed", lambda self, standard, *most: bounds.update(most=most))
+    geared = TRUTH.replace(gear_ratio=20.0, gear_efficiency=0.8)
+    plan_experiments(geared, max_torque="1.6 kN*m at output", max_travel="0.5 turn at output")
+    assert bounds["most"] == pytest.approx((1600.0 / 20.0, 20.0 * math.pi), rel=1e-14)
+    plan_experiments(geared, max_torque="80 N*m", max_travel="10 turn")
+    assert bounds["most"] == pytest.approx((80.0, 20.0 * math.pi), rel=1e-14)
+    for name, value in (("max_torque", "1.6 kN*m at output"), ("max_travel", "1 turn at output")):
+        with pytest.raises(InputError, match=re.escape(f'{name} = "{value}": without gear.ratio')):
+            plan_experiments(TRUTH, **{name: value})
+    with pytest.raises(InputError, match=r"max_travel = -1\.0: give a value above 0"):
+        plan_experiments(TRUTH, max_travel="-1 rad")
 
 
 @pytest.mark.parametrize(

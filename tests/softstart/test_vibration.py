@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from tests.twin import chain_of
 
+from softstart import Drive, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration, reduce_chain
 from softstart.errors import InputError
 from softstart.vibration import elastic_frequencies, shapes
@@ -161,6 +162,50 @@ def test_motor_behind_the_load() -> None:
     one, other = reduce_chain(there).to_drive(), reduce_chain(back).to_drive()
     for name in ("J1", "J2", "c", "gap", "Mc"):
         assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-9)
+
+
+@pytest.mark.parametrize("reverse", [False, True], ids=["motor first", "motor last"])
+def test_the_gear_may_sit_anywhere_and_the_output_torque_is_the_same(reverse: bool) -> None:
+    """20:1 as one gear or two, before or behind each shaft: the same values seen from the motor."""
+
+    def built(ratios: tuple[float, float], sides: tuple[Any, Any]) -> Chain:
+        speeds = np.cumprod([1.0, *(1.0 / one for one in ratios)])
+        masses = [Mass(J / w**2) for J, w in zip([0.03, 0.02, 0.16], speeds, strict=True)]
+        masses[-1] = masses[-1].replace(torque=7.16 / speeds[-1], kind="active")
+        shafts = []
+        for k, (c, gap) in enumerate([(4000.0, 0.1), (400.0, 0.3)]):
+            w = speeds[k + (sides[k] == "after")]
+            ratio = 1.0 / ratios[k] if reverse else ratios[k]
+            side = {"before": "after", "after": "before"}[sides[k]] if reverse else sides[k]
+            shafts.append(Shaft(c / w**2, gap=gap * w, ratio=ratio, side=side))
+        if reverse:
+            masses, shafts = masses[::-1], shafts[::-1]
+        load = f"mass {1 if reverse else 3}"
+        motor = Motor(62.0, mass=f"mass {3 if reverse else 1}")
+        return Chain(masses, shafts, motor, load_mass=load, target_speed="880 rpm")
+
+    plain = reduce_chain(built((1.0, 1.0), ("before", "before"))).to_drive()
+    assert plain.gear is None
+    torque = 20.0 * simulate(plain, "direct").peak_torque
+    for ratios in ((20.0, 1.0), (1.0, 20.0), (4.0, 5.0), (40.0, 0.5)):
+        for sides in (("before", "before"), ("after", "after"), ("before", "after")):
+            drive = reduce_chain(built(ratios, sides)).to_drive()
+            assert drive.gear_ratio == pytest.approx(20.0, rel=1e-14)
+            there = Drive.from_toml(drive.to_toml())  # as `reduce --out` writes it
+            assert simulate(there, "direct").peak_torque_at_output == pytest.approx(torque, rel=1e-9)
+
+
+def test_the_output_torque_of_the_reduced_drive_is_that_in_the_shaft_of_the_output() -> None:
+    """Two masses are no approximation: the shaft behind the gear carries this torque in the chain."""
+    shaft = Shaft("150 kN*m/rad", gap="0.025 rad", ratio=20, side="after")
+    chain = Chain(
+        [Mass(0.035), Mass(70, torque=143.2, kind="active")], [shaft], Motor(62), target_speed="880 rpm"
+    )
+    own = simulate(chain, "ramp").peak_torques[0] / chain.at_motor_shaft().torque_ratio[0]
+    drive = reduce_chain(chain).to_drive()
+    assert simulate(drive, "ramp").peak_torque_at_output == pytest.approx(own, rel=1e-9)
+    assert drive.at_output["stiffness"] == pytest.approx(150e3, rel=1e-12)
+    assert drive.at_output["load_torque"] == pytest.approx(143.2, rel=1e-12)
 
 
 EQUAL = Chain([Mass(1), Mass(1), Mass(1)], [Shaft(100), Shaft(100)])  # Omega = 10 and 10 sqrt(3) rad/s

@@ -32,9 +32,15 @@ free_option = click.option("--free", metavar="NAME,...", callback=reading(option
 @click.option("--standard", is_flag=True, help="Evaluate the standard experiments only.")
 @click.option("--wanted", metavar="NAME,...", callback=reading(options.read_list),
     help="Parameters whose accuracy is optimised, for example gap. Default: all.")  # fmt: skip
-@click.option("--max-torque", metavar="TORQUE", help="Upper bound of the shaft torque.")
 @click.option(
-    "--max-travel", metavar="ANGLE", help="Upper bound of the travel of the load, referred to the motor."
+    "--max-torque",
+    metavar="TORQUE",
+    help="Upper bound of the shaft torque; with a gear also '1.6 kN*m at output'.",
+)
+@click.option(
+    "--max-travel",
+    metavar="ANGLE",
+    help="Upper bound of the travel of the load at the motor shaft, or '1 turn at output'.",
 )
 @options.of_drive(options.read_drive, needed=True)
 @answers("Write torque profiles (CSV, TOML), simulated logs, figure and report into this folder.")
@@ -103,8 +109,9 @@ def identify(
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
     help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
-@click.option("--worn-gap", "limit", metavar="GAP", callback=options.quantity("rad"),
-    help="Gap of a worn drive, for example '0.2 rad': when it is reached.")  # fmt: skip
+@click.option("--worn-gap", "limit", metavar="GAP",
+    help="Gap of a worn drive, for example '0.2 rad', with a gear also '9 arcmin at output': when it is "
+    "reached.")  # fmt: skip
 @answers("Write the gaps (CSV), the figure and report.md into this folder.")
 def wear(*, folders: tuple[str, ...], **asked: Any) -> Answer:
     """Compute the growth of the gap from several identifications, and when it is worn.

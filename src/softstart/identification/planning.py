@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import quantity_of
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import Fitter, Point, Sizes
@@ -143,9 +144,9 @@ def plan_experiments(
         The parameters that the planned torque is to tell best; all that are to be found by default.
     max_torque : float or str, optional
         Largest shaft torque that a planned experiment may have, N m; by default the permissible one of the
-        drive, or else the largest of the standard experiments.
+        drive, or else the largest of the standard experiments. "at output" it is brought over without losses.
     max_travel : float or str, optional
-        How far the load may be moved, rad at the motor shaft; no limit by default.
+        How far the load may be moved, rad at the motor shaft, or "1 turn at output"; no limit by default.
     optimise : bool
         Whether to look for a better torque.
     progress : callable, optional
@@ -186,9 +187,11 @@ def plan_experiments(
     if optimise:
         torque, travel = drive.limits.shaft_torque or max(one.peak for one in experiments), math.inf
         if max_torque is not None:
-            torque = _between("max_torque", max_torque, "N*m")
+            # a limit, as that of the drive: "at output" without losses
+            most = quantity_of(drive, "permissible_torque", max_torque, "max_torque")
+            torque = _between("max_torque", most, "N*m")
         if max_travel is not None:
-            travel = _between("max_travel", max_travel, "rad")
+            travel = _between("max_travel", quantity_of(drive, "gap", max_travel, "max_travel"), "rad")
         experiments.append(bench.designed(standard, torque, travel))
     return Plan(drive, tuple(experiments), period, error)
 

@@ -14,10 +14,11 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import quantity_of
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
 from softstart.notebook import Shown
-from softstart.quantities import number_in, show
+from softstart.quantities import show
 from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
@@ -152,7 +153,7 @@ def follow_wear(
     dates : sequence of str or date
         When their logs were taken, as "2026-05-31".
     limit : float or str, optional
-        Gap at which the drive is worn, rad or with a unit.
+        Gap at which the drive is worn, rad or with a unit; also "9 arcmin at output".
 
     Returns
     -------
@@ -207,7 +208,8 @@ def follow_wear(
         np.array([one.value for one in gaps]),
         np.array([_deviation(one) for one in gaps]),
     )
-    worn = None if limit is None else number_in("rad", limit, "limit")
+    # through the gear of the last one, as the plate may have been read since
+    worn = None if limit is None else quantity_of(each[-1].drive, "gap", limit, "limit")
     if worn is not None and not worn > 0.0:
         raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
     return Wear(each, names, days, line, worn, tuple(_notes(each, line)))

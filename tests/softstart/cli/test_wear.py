@@ -161,7 +161,24 @@ def test_what_cannot_be_followed_is_refused(new: Identification, tmp_path: Path)
             follow_wear(found, dates, limit)  # type: ignore[arg-type]
 
 
-def test_the_command_reads_folders_and_writes_a_report(new: Identification, done, as_json, place) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("efficiency", [1.0, 0.8])
+def test_a_worn_gap_at_the_output_is_that_times_the_ratio_at_the_motor(
+    new: Identification, efficiency: float
+) -> None:
+    """An angle: losses do not count. Without a gear it is refused, not taken at the motor."""
+    each = [with_value(new, "gap", gap, 0.001) for gap in (0.08, 0.09)]
+    with pytest.raises(InputError, match=r'limit = "0\.005 rad at output": without gear\.ratio'):
+        follow_wear(each, DATES, "0.005 rad at output")
+    gear = {"gear_ratio": 40.0, "gear_efficiency": efficiency}
+    geared = [replace(one, drive=one.drive.replace(**gear)) for one in each]
+    wear = follow_wear(geared, DATES, "0.005 rad at output")
+    assert wear.limit == pytest.approx(0.2, rel=1e-14)
+    assert wear.worn == follow_wear(each, DATES, "0.2 rad").worn
+
+
+def test_the_command_reads_folders_and_writes_a_report(
+    new: Identification, done, as_json, refused, place
+) -> None:  # type: ignore[no-untyped-def]
     for year, gap in (("2024", 0.08), ("2026", 0.1)):
         with_value(new, "gap", gap, 0.001).save(place / year)
     line = ["wear", "2024", "2026", "--dates", "2024-07-01,2026-07-01"]
@@ -170,3 +187,9 @@ def test_the_command_reads_folders_and_writes_a_report(new: Identification, done
     assert "It reaches 0.2 rad on 2036-0" in " ".join(out.split())
     assert {"report.md", "wear.csv", "wear.svg"} <= {path.name for path in (place / "worn").iterdir()}
     assert [one["gap"] for one in as_json(*line)["gaps"]] == [0.08, 0.1]
+    for year, gap in (("2024", 0.08), ("2026", 0.1)):
+        geared = new.drive.replace(gear_ratio=40.0)
+        with_value(replace(new, drive=geared), "gap", gap, 0.001).save(place / f"{year} geared")
+    there = as_json("wear", "2024 geared", "2026 geared", *line[3:], "--worn-gap", "0.005 rad at output")
+    assert there["limit"] == pytest.approx(0.2, rel=1e-14)
+    assert "--worn-gap" in refused(*line, "--worn-gap", "0.005 rad at output")
