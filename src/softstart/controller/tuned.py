@@ -464,26 +464,26 @@ def schedule_text(
 def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:
     """The CSV text of a schedule: comment lines that say what it is, then one row per cell.
 
-    `columns` are further figures of each cell; they are not read back.
+    `columns` are further figures of each cell, of six digits; they are not read back.
     """
     stream = io.StringIO()
     stream.write(f"{CSV_TITLE}\n# controller: {saved.controller}\n")
     stream.write(f"# gains: {json.dumps({name: gain.scale for name, gain in saved.gains.items()})}\n")
     stream.write(f"# fixed: {json.dumps(saved.fixed)}\n")
-    tables = {name: gain.values for name, gain in saved.gains.items()} | dict(columns or {})
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*AXES, *tables])
+    writer.writerow([*AXES, *saved.gains, *(columns or {})])
     for i, gap in enumerate(saved.gaps):
         for j, inertia in enumerate(saved.load_inertias):
-            writer.writerow([_cell(value) for value in (gap, inertia, *(t[i, j] for t in tables.values()))])
+            exact = gap, inertia, *(gain.values[i, j] for gain in saved.gains.values())
+            figures = (table[i, j].item() for table in (columns or {}).values())
+            writer.writerow([*map(float, exact), *map(_figure, figures)])
     return stream.getvalue()
 
 
-def _cell(value: Any) -> str:
-    plain = value.item() if hasattr(value, "item") else value
-    if isinstance(plain, float):
-        return "" if math.isnan(plain) else repr(plain)
-    return str(plain)
+def _figure(value: Any) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(float(f"{value:.6g}"))
+    return str(value)
 
 
 def _table(name: str, values: Mapping[str, Any], meanings: Mapping[str, str] | None = None) -> str:

@@ -22,7 +22,7 @@ SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
 EQUALLY_GOOD = 1e-3  # share of the metric that smoothness may cost
 WIDER = 2  # times the population of a cell: a worst case over many starts is rougher than one start
-DIGITS = (6, 9, 12)  # of the parameters of one set
+DIGITS = (6, 9, 12)  # of gains
 ROUNDED = 1e-4  # share of the metric that their rounding may cost
 KEPT_EACH = 1.0  # s, after which an unfinished search is written down again
 
@@ -78,8 +78,7 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
     places, found = (part[best] for part in last.best)
     if not trials.robust:
         places = _smooth(trials, costs, places, found)
-    settled = _settled(trials, places, restart_costs)
-    return _rounded(trials, settled) if trials.robust else settled
+    return _rounded(trials, _settled(trials, places, restart_costs))
 
 
 def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None) -> Populations:
@@ -173,20 +172,34 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
 
 
 def _rounded(trials: Trials, found: Found) -> Found:
-    """One set with few digits in all its parameters, the derived ones too: as its file has them.
+    """Gains with few digits, of one set all its parameters, the derived ones too: as their file has them.
 
-    What it reaches is what the rounded values reach: in time as before, never worse than the defaults, and no
-    more than `ROUNDED` above the exact ones; else they have more digits, or all.
+    What each job reaches is what its rounded values reach: in time as before, never worse than the defaults,
+    and no more than `ROUNDED` above the exact ones; else they have more digits, or all.
     """
-    job = np.zeros(1, dtype=np.int64)
-    exact = replace(trials.controller, **{name: float(value[0]) for name, value in found.values.items()})
-    parameters = exact.set_up(trials.drives[0])[0].parameters
-    numbers = {k: v for k, v in parameters.items() if isinstance(v, float) and math.isfinite(v)}
-    ours, before = float(found.costs[0]), float(trials.cost(job, trials.default)[0])
+    values = {name: value.copy() for name, value in found.values.items()}
+    if trials.robust:
+        exact = replace(trials.controller, **{name: float(value[0]) for name, value in values.items()})
+        parameters = exact.set_up(trials.drives[0])[0].parameters
+        numbers = {k: v for k, v in parameters.items() if isinstance(v, float) and math.isfinite(v)}
+        values = {name: np.array([value]) for name, value in numbers.items()}
+    costs, judged = found.costs.copy(), Judged(*(part.copy() for part in found.judged))
+    left = np.arange(len(costs))
+    before = trials.cost(left, trials.default)
+    allowed = np.maximum(costs, np.minimum(before, (1.0 + ROUNDED) * costs))
     for digits in DIGITS:
-        values = {name: np.array([float(f"{value:.{digits}g}")]) for name, value in numbers.items()}
-        judged = trials.judged(job, values, to_the_end=True)
-        cost = trials.cost(job, judged)
-        if cost[0] <= max(ours, min(before, (1.0 + ROUNDED) * ours)):
-            return Found(values, judged, cost, found.restart_costs)
-    return found
+        tried = {
+            name: np.array([float(f"{one:.{digits}g}") for one in value[left]])
+            for name, value in values.items()
+        }
+        reached = trials.judged(left, tried, to_the_end=True)
+        cost = trials.cost(left, reached)
+        good = cost <= allowed[left]
+        for part, new in zip(
+            (*values.values(), *judged, costs), (*tried.values(), *reached, cost), strict=True
+        ):
+            part[left[good]] = new[good]
+        left = left[~good]
+        if not left.size:
+            break
+    return Found(values, judged, costs, found.restart_costs)

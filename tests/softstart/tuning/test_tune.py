@@ -1,5 +1,6 @@
 """tune: never worse than the defaults, the known optimum, the same bits, going on where it was stopped."""
 
+import csv
 import itertools
 import math
 from dataclasses import dataclass
@@ -246,6 +247,25 @@ def test_one_set_is_written_with_few_digits_and_units_and_is_what_was_promised(t
     player = make_controller(str(path))
     assert player.nominal == drive.replace(start_position="unknown")
     assert player.parameters == found.robust.parameters
+
+
+@pytest.mark.parametrize("ending", ["toml", "csv"])
+def test_a_schedule_is_written_with_few_digits_and_is_what_was_promised(tmp_path, ending):
+    """At most nine digits; a start of each cell with the file has the K_dyn of the table to the bit."""
+    found = tune(CRANE, "ramp", [0.5], ["2 J1", "5 J1"], robust=False, **SMALL)
+    path = tmp_path / f"schedule.{ending}"
+    {"toml": found.to_toml, "csv": found.to_csv}[ending](path)
+    for name, _, values in make_controller(str(path)).gains:
+        assert [float(f"{one:.9g}") for one in values.ravel()] == values.ravel().tolist()
+        assert np.array_equal(values, found.schedule[name].to_numpy())
+    for inertia in found.question.load_inertias:
+        cell = found.schedule.sel(gap=0.5, load_inertia=inertia)
+        run = simulate(CRANE.replace(gap=0.5, load_inertia=inertia), str(path))
+        assert (run.k_dyn, run.start_time) == (float(cell.k_dyn), float(cell.start_time))
+        assert run.k_dyn <= float(cell.k_dyn_default)
+    if ending == "csv":  # figures have six
+        (row, *_), names = csv.DictReader(path.read_text().splitlines()[4:]), found.schedule
+        assert float(row["k_dyn"]) == float(f"{float(names['k_dyn'][0, 0]):.6g}")
 
 
 # bad input ------------------------------------------------------------------------------------------------
