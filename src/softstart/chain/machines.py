@@ -97,7 +97,7 @@ def quantity_of(machine: Machine, key: str, given: object, name: str) -> float:
     assert knob is not None
     p = knob.parameter
     try:
-        number = parse(at_motor(p, given, machine.gear or machine.NO_GEAR), p.unit)
+        number = parse(at_motor(p, given, machine.gear_with(**{p.name: given})), p.unit)
         if not isinstance(number, float):
             raise RefusedError(f"the {p.meaning} is one number, not a list")
         return number
@@ -142,7 +142,7 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
             wrong.append(chain.no_such(key, value))
             continue
         try:
-            read[found.name] = read_value(found.parameter, value, batch=True, gear=chain.NO_GEAR)
+            read[found.name] = read_value(found.parameter, value, batch=True, gear=chain.gear_with())
         except RefusedError as refusal:
             wording = Wording(written={found.parameter.name: key})
             wrong.append(wording.refused(found.parameter, value, refusal))

@@ -110,10 +110,6 @@ class Chain(Words):
     release_time: ClassVar[float] = 0.0
     position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
     gear: ClassVar[None] = None  # masses and shafts are given at their own shafts
-    NO_GEAR: ClassVar[str] = (
-        'the gears of a chain are in its shafts, so that it has no one output; leave out "at output", and '
-        "write the value at the motor shaft, or that of one shaft at its own side, as shaft[2].gap"
-    )
     KIND: ClassVar[str] = "chain"
     LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 
@@ -236,6 +232,13 @@ class Chain(Words):
         if place == "motor":
             return 0 if self.motor is None else names.index(self.motor.mass)
         raise InputError(f"{show(place)}: {_no_such(place, names)}")
+
+    def gear_with(self, **given: object) -> str:
+        """Why nothing is "at output", as `Drive.gear_with`."""
+        return (
+            'the gears of a chain are in its shafts, so that it has no one output; leave out "at output", '
+            "and write the value at the motor shaft, or that of one shaft at its own side, as shaft[2].gap"
+        )
 
     def speed_ratios(self, reference: str | int = "motor") -> tuple[float, ...]:
         """The speed of each mass's shaft over that of the reference: `i` of [R], table 1.

@@ -444,7 +444,7 @@ class DataSheet(ParameterSet):
 
     @property
     def _gear(self) -> Gear:
-        return Gear(self.ratio, self._eta)
+        return Gear(self.ratio, self._eta, self._load.active + self._load.friction)
 
     @property
     def _arm(self) -> float:
@@ -557,16 +557,14 @@ class DataSheet(ParameterSet):
     @cached_property
     def _motor_side(self) -> _MotorSide:
         """Inertias and torques at the motor shaft, of one of the motors."""
-        (i, eta), load, starting = self._gear, self._load, self.starting_torque
-        overhauling = load.active + load.friction < 0.0
-        # where the load drives the motor, the losses of the gears help the motor to hold it
-        through = (eta / i if overhauling else 1.0 / (i * eta)) / self.motors
+        gear, load, starting = self._gear, self._load, self.starting_torque
         if starting is None:
             starting = self.starting_ratio * (self.rated or math.nan)
         return _MotorSide(
             J1=self.motor_inertia + self.added_inertia,
-            J2=self._gear.to_motor(load.inertia / self.motors, "kg*m^2"), Ms=starting,
-            active=load.active * through, friction=load.friction * through, overhauling=overhauling,
+            J2=gear.to_motor(load.inertia / self.motors, "kg*m^2"), Ms=starting,
+            active=gear.to_motor(load.active / self.motors, "N*m"),
+            friction=gear.to_motor(load.friction / self.motors, "N*m"), overhauling=gear.load < 0.0,
         )  # fmt: skip
 
     @property
@@ -663,7 +661,7 @@ class DataSheet(ParameterSet):
         """What a value comes through from the load, and what it is at the motor."""
         gear, driven = self._gear, "driving the motor " * self._motor_side.overhauling
         shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
-        if gear == Gear(1.0):
+        if gear.ratio == gear.efficiency == 1.0:
             return f"{driven}without gears{shared}" if driven else f"no gears{shared}"
         before = f"at the motor {at_motor:.5g}, " if self._geared else ""
         efficiency = f"efficiency {gear.efficiency:.5g}{self._mark('efficiency')}"
@@ -684,9 +682,7 @@ class DataSheet(ParameterSet):
         active, friction, hoist = of.active, of.friction, self.machine == "hoist"
 
         def torque(value: float, about: str) -> _Entry:
-            # "at output" goes by the sign of the value itself, not by that of both parts together
-            origin = f"{about or 'none'}; {self._through(value)}"
-            return self._there(value, "N*m", origin, behind=(value < 0.0) == of.overhauling)
+            return self._there(value, "N*m", f"{about or 'none'}; {self._through(value)}")
 
         if not active:
             unknown = _entry("unknown", "", "every figure is the worst of both flanks and mid-gap")

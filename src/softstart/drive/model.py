@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 import numpy as np
@@ -38,6 +39,7 @@ Brake = Literal["none", "motor"]
 # where a start whose position is unknown may begin; the worst of them counts
 UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
 SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
+LOAD: Final = ("load_torque", "load_friction")  # the parts of the load torque
 
 library = Library("softstart.drive", "a drive", "drives")
 
@@ -94,7 +96,6 @@ class Drive(ParameterSet):
     WHAT: ClassVar[str] = "a drive"
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
-    NO_GEAR: ClassVar[str] = NO_GEAR
     # as a chain has it
     motor_index, load_index = 0, 1
     mass_names: ClassVar[tuple[str, ...]] = ("motor", "load")
@@ -249,7 +250,12 @@ class Drive(ParameterSet):
                 found.append(read_value(cls.PARAMETERS[name], value, batch=cls.BATCH))
             except RefusedError:
                 found.append(1.0)  # it is refused under its own name
-        return Gear(*found)
+        gear, load = Gear(*found), 0.0
+        for name in LOAD:  # at the output, as far as they can be read
+            p, value = cls.PARAMETERS[name], given.get(name, 0.0)
+            with suppress(RefusedError, ValueError):  # refused under its own name
+                load += gear.to_output(read_value(p, value, batch=cls.BATCH, gear=gear), p.unit)
+        return gear._replace(load=load)
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         derived = self._derived(values)
@@ -449,9 +455,23 @@ class Drive(ParameterSet):
         """The gear, between the motor shaft, at which everything counts, and the output; None without ratio.
 
         >>> Drive.load("crane-4amtkf").replace(gear_ratio=38.1, gear_efficiency="95 %").gear
-        Gear(ratio=38.1, efficiency=0.95)
+        Gear(ratio=38.1, efficiency=0.95, load=None)
         """
         return None if self.gear_ratio is None else Gear(self.gear_ratio, self.gear_efficiency)
+
+    def gear_of(self, p: Parameter) -> Gear:
+        """The gear as values of this parameter go through it: limits without losses, load torques as one."""
+        gear = self.gear or Gear(1.0)
+        return {"limit": gear.lossless, "value": gear._replace(load=self.Mc)}.get(p.at_output, gear)
+
+    def gear_with(self, **given: object) -> Gear | str:
+        """What "... at output" goes through in values that are to be set, or why there is nothing.
+
+        >>> hoist = Drive.load("crane-4amtkf").replace(gear_ratio=40, load_torque=-4.0)
+        >>> hoist.gear_with(load_friction="100 N*m at output").load
+        -60.0
+        """
+        return self._gear_in(self.given() | given)
 
     @property
     def at_output(self) -> dict[str, Any]:
@@ -464,11 +484,11 @@ class Drive(ParameterSet):
         >>> round(sheet.stiffness, 3), [round(sheet.at_output[name], 9) for name in ("stiffness", "gap")]
         (25.38, [35000.0, 0.002617994])
         """
-        if (gear := self.gear) is None:
+        if self.gear is None:
             return {}
         found = dict[str, Any]()
         for name, p in PARAMETERS.items():
-            value, through = getattr(self, name), gear.lossless if p.at_output == "limit" else gear
+            value, through = getattr(self, name), self.gear_of(p)
             if p.at_output == "here":
                 found[name] = value
             elif p.at_output and not isinstance(value, str) and value is not None:

@@ -32,17 +32,21 @@ class Gear(NamedTuple):
 
     A torque M at the output is M/(i eta) at the motor shaft; an inertia, a stiffness and a damping are
     divided by i^2 eta, an angle and a speed multiplied by i. A torque below 0 drives the motor: it is
-    M eta/i there.
+    M eta/i there. Of parts of one torque, as lift and friction, the sign of the whole `load` counts: power
+    flows one way.
 
     >>> gear = Gear(40.0, 0.8)
     >>> gear.to_motor(1600.0, "N*m"), gear.to_motor(0.01, "rad"), gear.to_output(25.0, "N*m/rad")
     (50.0, 0.4, 32000.0)
     >>> gear.to_motor(-1600.0, "N*m"), gear.to_output(-32.0, "N*m")
     (-32.0, -1600.0)
+    >>> [Gear(40.0, 0.8, load=-1500.0).to_motor(part, "N*m") for part in (-1600.0, 100.0)]
+    [-32.0, 2.0]
     """
 
     ratio: float
     efficiency: float = 1.0
+    load: Any = None
 
     def factor(self, unit: str) -> Any:
         """What a value of this SI unit at the output is over the same at the motor shaft; None: no such."""
@@ -60,10 +64,11 @@ class Gear(NamedTuple):
         return value / self.ratio if turns else value * self._factor(value, unit)
 
     def _factor(self, value: Any, unit: str) -> Any:
-        """The factor of a value, which of a torque goes with its sign."""
-        if POWERS[unit] != (1, 1) or not np.any(np.asarray(value) < 0.0):
+        """The factor of a value, which of a torque goes with its sign, or with that of the whole."""
+        drives = np.asarray(value if self.load is None else self.load) < 0.0
+        if POWERS[unit] != (1, 1) or not np.any(drives):
             return self.factor(unit)
-        either = np.where(np.asarray(value) < 0.0, self.ratio / self.efficiency, self.factor(unit))
+        either = np.where(drives, self.ratio / self.efficiency, self.factor(unit))
         return either if either.ndim else float(either)
 
     @property

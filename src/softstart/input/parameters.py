@@ -326,17 +326,20 @@ def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
     `gear` may be the reason why there is none. Raises `RefusedError` where that counts, and for a parameter
     that is not behind the gear.
     """
-    if isinstance(value, list | tuple) and any(isinstance(one, str) for one in value):
-        alike(value)
-        return [at_motor(p, one, gear) for one in value]
-    found = BEHIND.fullmatch(value) if isinstance(value, str) else None
-    if found is None or p.at_output == "here":
-        return value if found is None else found[1]
+    several = isinstance(value, list | tuple)
+    each: list[Any] = list(value) if isinstance(value, list | tuple) else [value]
+    found = [BEHIND.fullmatch(one) if isinstance(one, str) else None for one in each]
+    if not any(found):
+        return value
+    alike(each)
+    each = [one if match is None else match[1] for one, match in zip(each, found, strict=True)]
+    if p.at_output == "here":
+        return each if several else each[0]
     if not p.at_output:
         raise RefusedError(f'the {p.meaning} does not take "at output"; leave it out')
     if p.at_output == "side" or isinstance(gear, str):
         raise RefusedError(OWN_SIDE if p.at_output == "side" else str(gear))
-    number = parse(found[1], p.unit, infinite=p.infinite)
+    number = parse(each if several else each[0], p.unit, infinite=p.infinite)
     return (gear.lossless if p.at_output == "limit" else gear).to_motor(number, p.unit)
 
 

@@ -16,7 +16,6 @@ from markupsafe import Markup, escape
 
 from softstart.drive import doubts
 from softstart.errors import listed
-from softstart.input.gear import Gear
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, figures, limit
@@ -233,9 +232,9 @@ def functions(report: Report) -> list[tuple[str, str]]:
     return [(key, name) for key, name in FUNCTIONS.items() if key not in left_out]
 
 
-def there_of(gear: Gear | None, parameter: Parameter, numbers: list[float]) -> str:
+def there_of(drive: Any, parameter: Parameter, numbers: list[float]) -> str:
     """Values of a parameter, as they are seen, at the output of the gear; "" where they have none there."""
-    through = gear and (gear.lossless if parameter.at_output == "limit" else gear)
+    through = drive.gear and drive.gear_of(parameter)
     if through is None or through.factor(parameter.unit) is None:
         return ""
     return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)
@@ -264,7 +263,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         exact = [v for v in values if isinstance(v, float)]
         numbers = [float(units.shown(v, si)) for v in exact]
         if numbers:
-            text, there = ", ".join(map(short, numbers)), there_of(gear, parameter, numbers)
+            text, there = ", ".join(map(short, numbers)), there_of(report.drive, parameter, numbers)
             if parameter.at_output == "here":  # and the motor shaft is the other one
                 text, there = short(gear.lossless.to_motor(numbers[0], si)), text
         if path == "limits.life":

@@ -150,9 +150,8 @@ class Subject:
                 return texts, "", parameter.meaning
             own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
             alike(values)
-            through = self.machine.gear or self.machine.NO_GEAR
             given = [multiplied(value, key, own) for value in values]
-            there = [at_motor(parameter, value, through) for value in given]
+            there = [at_motor(parameter, one, self.machine.gear_with(**{found.name: one})) for one in given]
             read = np.float64(read_value(parameter, there, batch=True))
         except RefusedError as reason:
             raise InputError(Wording(written={name: key}).refused(parameter, given, reason)) from None

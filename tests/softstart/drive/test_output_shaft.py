@@ -139,6 +139,55 @@ def test_a_torque_that_drives_the_motor_loses_on_its_way_there() -> None:
     assert many.fields["load_torque"].tolist() == [-3.2, 5.0]
 
 
+@given(ratios, efficiencies, st.floats(-20.0, 20.0), st.floats(0.0, 20.0))
+def test_friction_beside_a_load_that_drives_the_motor_comes_back_as_typed(i, eta, torque, friction) -> None:
+    """Power flows one way: P = (M + F) w at the output is eta P or P/eta at the motor, not some of each.
+
+    By hand for the drive, its file, a change of one part at a time, many at once, and the report.
+    """
+    there = {"load_torque": float(f"{torque * i:.5g}"), "load_friction": float(f"{friction * i:.5g}")}
+    whole = sum(there.values())
+    factor = eta / i if whole < 0.0 else 1.0 / (i * eta)
+    plain = geared(i, eta).replace(
+        load_torque=0.0, maximum_torque=None, starting_torque=300.0, start_position="mid-gap"
+    )
+    texts = {name: f"{value!r} N*m at output" for name, value in there.items()}
+    drive = plain.replace(**texts)
+    assert drive.Mc == pytest.approx(whole * factor, rel=1e-11, abs=1e-12)
+    shown = {row[0]: row[-1] for row in data_of(SimpleNamespace(project=Project(), drive=drive))[1]}
+    for one in (drive, Drive.from_toml(drive.to_toml())):
+        for name, value in there.items():
+            assert getattr(one, name) == pytest.approx(value * factor, rel=1e-13)
+            assert one.at_output[name] == pytest.approx(value, rel=1e-13)
+            if value:
+                assert float(shown[PARAMETERS[name].meaning].split()[0]) == pytest.approx(value, rel=1e-5)
+    for name, text in texts.items():  # beside the other one, which is at the motor by now
+        # a torque below 0 there that friction outweighs may have come either way: it counts by its sign
+        if name == "load_torque" or whole < 0.0 or torque >= 0.0:
+            assert drive.replace(**{name: text}) == drive
+    many = records(plain, **{name: [text, "0"] for name, text in texts.items()})
+    assert [float(many.fields[name][0]) for name in there] == [getattr(drive, name) for name in there]
+
+
+def test_an_inclined_belt_that_drives_its_motor_is_written_as_its_sheet_says() -> None:
+    """200 N m of lift less 30 N m of friction at a drum behind 20:1: both at the output in the file."""
+    sheet = DataSheet.from_settings({
+        "load.machine": "rotor", "motor.rated_power": "3 kW", "motor.rated_speed": "1410 rpm",
+        "motor.inertia": "0.01 kg*m^2", "gear.ratio": 20, "gear.efficiency": 0.8,
+        "gear.stiffness": "35 kN*m/rad",
+        "load.inertia": "20 kg*m^2", "load.torque": "-200 N*m", "load.friction": "30 N*m",
+    })  # fmt: skip
+    text = sheet.drive_toml()
+    assert 'friction = "30 N*m at output"' in text
+    assert 'torque = "-200 N*m at output"' in text
+    for drive in (sheet.drive, Drive.from_toml(text)):
+        assert (drive.load_torque, drive.load_friction) == pytest.approx((-8.0, 1.2), rel=1e-12)
+        there = drive.at_output
+        assert (there["load_torque"], there["load_friction"]) == pytest.approx((-200.0, 30.0), rel=1e-12)
+    swept = drive.replace(load_friction=0.0).gear_with(load_friction="30 N*m at output")
+    assert swept.to_motor(30.0, "N*m") == pytest.approx(1.2, rel=1e-14)
+
+
 def test_a_drive_with_its_gear_is_the_chain_that_has_the_gear_in_its_shaft() -> None:
     """The kernel brings a chain to the motor shaft by itself; without losses both start alike."""
     i, there = 38.1, {"gap": "9 arcmin at output", "stiffness": "35 kN*m/rad at output"}
