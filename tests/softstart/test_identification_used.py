@@ -190,7 +190,7 @@ def test_gains_are_tuned_over_the_drives_that_are_left(
 
 def test_tolerances_go_with_an_identification_but_not_of_what_it_knows(found: Identification) -> None:
     drawn = found.draws(6)
-    with pytest.raises(InputError, match="stiffness was identified, with an interval of its own"):
+    with pytest.raises(InputError, match="stiffness has an interval of its own already"):
         scenarios_drawn(found.drive, drawn, scenarios_of(found.drive, {"stiffness": "10 %"}))
     torques = scenarios_of(found.drive, {"starting_torque": [60.0, 62.0]})
     mixed = scenarios_drawn(found.drive, drawn, torques)

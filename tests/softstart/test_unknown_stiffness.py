@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from softstart import DataSheet, Drive, compare, simulate
+from softstart import DataSheet, Drive, InputError, compare, simulate, tune
+from softstart.controller import make_controller
 from softstart.drive import library
 from softstart.drive.data_sheet import BAND, UnknownStiffness
+from softstart.reporting import report
 from softstart.start.comparison import SOFT_END
 from softstart.views.starts import both_ends, comparison_sheet
+from softstart.views.tuning import conclusions
 
 SOFT, STIFF = BAND
 TROLLEY = {
@@ -80,3 +84,62 @@ def test_a_known_stiffness_has_no_ends(sheet):
     assert table.soft_end is None
     assert both_ends(table) == []
     assert table.rows[0].run.k_dyn == simulate(known.drive, "direct").k_dyn
+
+
+SEARCH = {"certified": False, "workers": 1, "restarts": 1, "generations": 10, "population": 10}
+
+
+def test_gains_are_tuned_for_both_ends(sheet):
+    """Each candidate counts by its worse end: no ramp of a scan in time at both is better by 1 %."""
+    stiff, soft = sheet.possible
+
+    def started(values, **refer):
+        values = {"parameters": values, "fitted_to": stiff}
+        return [simulate(end, "ramp", **values, **refer) for end in (stiff, soft)]
+
+    tuned = tune(sheet, "ramp", ["1x"], ["1x"], free=["time"], start_time="1.3x", schedule=False, **SEARCH)
+    k_dyn = [run.k_dyn for run in started(tuned.robust.parameters, base=stiff)]
+    assert tuned.robust.ends == pytest.approx(k_dyn, rel=1e-12)
+    assert tuned.robust.worst == max(tuned.robust.ends)
+    allowed = [1.3 * simulate(end, "direct").start_time for end in (stiff, soft)]
+    best = math.inf
+    for time in [tuned.robust.gains["time"], *np.linspace(0.1, 0.4, 25)]:
+        runs = started({"time": time}, base=stiff)
+        if all(run.start_time <= most for run, most in zip(runs, allowed, strict=True)):
+            best = min(best, max(run.k_dyn for run in runs))
+    assert tuned.robust.worst < 1.01 * best
+    assert k_dyn[0] < k_dyn[1]
+    assert "the soft end decides" in " ".join(conclusions(tuned))
+
+
+def test_tolerances_count_at_either_end(sheet):
+    stiff = sheet.drive
+    asked = {"free": ["time"], "schedule": False, **SEARCH, "generations": 1}
+    tuning = tune(sheet, "ramp", ["1x"], ["1x"], tolerances={"load_torque": [1.0, 2.0]}, **asked)
+    met = [stiff.replace(**{name: level.of(getattr(stiff, name)) for name, level in one.items()})
+           for one in tuning.question.scenarios]  # fmt: skip
+    frequencies = [one.Omega / math.tau for one in met]
+    assert frequencies == pytest.approx([STIFF] * 3 + [SOFT] * 3, rel=1e-12)
+    assert [one.damping_ratio for one in met] == pytest.approx([stiff.damping_ratio] * 6, rel=1e-12)
+    assert [one.load_torque for one in met] == pytest.approx([stiff.load_torque, 1.0, 2.0] * 2, rel=1e-15)
+    with pytest.raises(InputError, match="stiffness has an interval of its own already"):
+        tune(sheet, "ramp", tolerances={"stiffness": "10 %"}, **asked)
+
+
+def test_rounded_values_keep_the_limit_at_the_soft_end():
+    """A ramp in 135 ms keeps 2.75 kN m in every case; in 120 ms, the nearest step, not at the soft end."""
+    sheet = DataSheet.from_settings(TROLLEY | {"limits.output_torque": "2.75 kN*m"})
+    stiff = sheet.drive
+
+    def broken(time):
+        ramp = make_controller("ramp", {"time": time})
+        (margin,) = compare(sheet, [ramp], fitted_to=stiff).rows[0].margins(stiff.limits)
+        (at_stiff,) = compare(stiff, [ramp]).rows[0].margins(stiff.limits)
+        return not margin.kept, not at_stiff.kept
+
+    assert [broken(time) for time in (0.135, 0.12, 0.18)] == [(False, False), (True, False), (False, False)]
+    ramp = {"parameters": {"ramp": {"time": 0.135}}, "resolution": "time=60ms", "budget": 0.0}
+    (rounded,) = report(sheet, controllers=["ramp"], **ramp).sheets
+    assert (rounded.name, rounded.moved, rounded.value("time")) == ("ramp", ("time",), pytest.approx(0.18))
+    (rounded,) = report(stiff, controllers=["ramp"], **ramp).sheets  # if it is known to be stiff
+    assert (rounded.moved, rounded.value("time")) == ((), pytest.approx(0.12))

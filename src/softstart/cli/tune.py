@@ -137,12 +137,11 @@ def tune(
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
     DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an
-    identification: the gains are then robust over its confidence region. Of a chain the torques of all shafts
+    identification: the gains are then robust over its confidence region. Those of a data sheet without any
+    stiffness are judged at both ends of what is usual. Of a chain the torques of all shafts
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
     """
-    if isinstance(drive, UnknownStiffness):
-        drive = drive.drive  # gains for the stiff end; the result lists it among what is assumed
     asked |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
     with (
         kept_state(option_value("out"), STATE, "finished parts") as state,

@@ -357,7 +357,7 @@ def report(
         for row in choice.of_sheets:
             show(0.5, f"rounding the values of {row.name}")
             controller = next(one for one, other in started if other is row)
-            sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn))
+            sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn, soft))
 
     found = limit(
         machine,

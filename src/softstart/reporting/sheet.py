@@ -227,11 +227,12 @@ def make_sheet(
     resolution: Resolution,
     row: Row | None = None,
     drawn: Records | None = None,
+    soft: Drive | None = None,
 ) -> Sheet:
     """The sheet of a strategy on a drive or chain; `exact` is its start there.
 
     With the `row` by which the strategy was chosen, the values of the sheet keep what that row keeps, on the
-    drives `drawn` too where the drive is known within intervals.
+    drives `drawn` too where the drive is known within intervals, on `soft` where its stiffness is unknown.
     """
     drive = machine.design_drive
     ready, own = controller.set_up(drive)
@@ -241,7 +242,7 @@ def make_sheet(
     sheet = Sheet(name, kind_of(controller), settings, own, exact, torque_step, computes_with(ready, own))
     two_masses = len(machine.shaft_names) == 1
     try:
-        values = _within_the_rule(machine, ready, own, sheet.varied, row, drawn)
+        values = _within_the_rule(machine, ready, own, sheet.varied, row, drawn, soft)
         moved = tuple(one.name for one in sheet.varied if values[one.name] != one.rounded)
         settings = tuple(replace(one, rounded=values.get(one.name, one.rounded)) for one in sheet.settings)
         set_to = replace(ready, **values)
@@ -287,7 +288,7 @@ def _alone(count: int) -> list[tuple[int, ...]]:
 
 def _within_the_rule(
     machine: Any, ready: Controller, own: Drive, varied: Sequence[Setting], row: Row | None,
-    drawn: Records | None,
+    drawn: Records | None, soft: Drive | None,
 ) -> dict[str, float]:  # fmt: skip
     """The values at the steps nearest to the exact ones that keep what the row keeps.
 
@@ -303,7 +304,7 @@ def _within_the_rule(
         if values in tried:
             continue
         tried.append(values)
-        broken = "" if row is None else _broken(machine, replace(ready, **values), own, row, drawn)
+        broken = "" if row is None else _broken(machine, replace(ready, **values), own, row, drawn, soft)
         if not broken:
             return values
         reason = reason or broken
@@ -313,10 +314,12 @@ def _within_the_rule(
     )
 
 
-def _broken(machine: Any, controller: Controller, own: Drive, row: Row, drawn: Records | None) -> str:
+def _broken(
+    machine: Any, controller: Controller, own: Drive, row: Row, drawn: Records | None, soft: Drive | None
+) -> str:
     """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
     cases = tuple(case for case in row.worst_case if case in CASES)
-    found = compared(machine, controller, row.direct, fitted_to=own, worst_case=cases, drawn=drawn)
+    found = compared(machine, controller, row.direct, None, own, cases, drawn, soft)
     if found.flags and not row.flags:
         return found.flags[0].text
     limits = checked_limits(machine)

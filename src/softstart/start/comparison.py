@@ -242,13 +242,13 @@ def compare(
     return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end)
 
 
-def as_far_as_known(drive: Any) -> tuple[Any, Records | None, Drive | None]:
-    """The machine itself, the drives drawn where it is known within intervals, and that of the soft end."""
+def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, Records | None, Drive | None]:
+    """The machine itself, `count` drives where it is known within intervals, and that of the soft end."""
     if isinstance(drive, DataSheet):
         drive = drive.possible
     if isinstance(drive, UnknownStiffness):
         return drive.drive, None, drive.soft
-    return (drive.drive, drive.draws(), None) if isinstance(drive, Uncertain) else (drive, None, None)
+    return (drive.drive, drive.draws(count), None) if isinstance(drive, Uncertain) else (drive, None, None)
 
 
 def make_controllers(

@@ -44,8 +44,9 @@ class RobustSet(OneLine):
 
     `parameters` are all parameters of the controller, set up for the nominal drive; `gains` those that were
     tuned, `defaults` what these were. `worst` is the metric at the quantile over all starts, `worst_default`
-    that of the defaults; `excess` by which share the start times are beyond their bounds at the same
-    quantile (0: in time). `cells` has the figures of each cell. `agreement` of `restarts` searches came
+    that of the defaults, `ends` the first at the stiff and at the soft end of an unknown stiffness; `excess`
+    by which share the start times are beyond their bounds at the same quantile (0: in time). `cells` has the
+    figures of each cell. `agreement` of `restarts` searches came
     within 1 % of the best.
     """
 
@@ -59,6 +60,7 @@ class RobustSet(OneLine):
     restarts: int
     cells: xarray.Dataset
     controller: RobustGains
+    ends: tuple[float, float] | None = None
 
     @property
     def feasible(self) -> bool:

@@ -44,6 +44,7 @@ class Question:
     restarts: int
     population: int
     generations: int
+    soft: Drive | None = None  # at the soft end of an unknown stiffness: the second half of the scenarios
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -238,7 +239,7 @@ def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario])
     own = drive.values()
     moved = {name: values for name, values in drawn.fields.items() if np.any(values != own[name])}
     if both := sorted(set(moved) & {name for one in scenarios for name in one}):
-        raise InputError(f"tolerances: {both[0]} was identified, with an interval of its own; leave it out.")
+        raise InputError(f"tolerances: {both[0]} has an interval of its own already; leave it out.")
     found: list[Scenario] = [{}]
     for k in range(len(drawn)):
         levels = {name: Level(float(values[k]) / float(own[name]), 0.0) for name, values in moved.items()}

@@ -7,15 +7,18 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from softstart.chain.machines import MachineLike, one_machine
+import numpy as np
+
+from softstart.chain.machines import MachineLike, one_machine, varied
 from softstart.controller import Controller
 from softstart.drive import Drive
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole
 from softstart.start.batch import has_margin
-from softstart.start.comparison import Uncertain
+from softstart.start.comparison import Uncertain, as_far_as_known
 from softstart.store import Records, Target
 from softstart.tuning.gains import Found, Log, Progress, best_gains
 from softstart.tuning.outcome import Tuning
@@ -45,7 +48,7 @@ SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
 
 def tune(
-    drive: MachineLike | Uncertain,
+    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
     controller: str | Controller,
     gaps: Iterable[Any] | Any | None = None,
     inertias: Iterable[Any] | Any | None = None,
@@ -78,10 +81,12 @@ def tune(
 
     Parameters
     ----------
-    drive : Drive, Chain, Identification, str or path
+    drive : Drive, Chain, Identification, DataSheet, str or path
         The nominal drive or chain, or its name or file. A chain starts itself, and the controller is set up
         for its two masses. With an identification every candidate is judged by the drive found and by 100
         drives that its logs leave possible; gaps and inertias are then those of the drive, if none are given.
+        Of a data sheet without any stiffness every candidate is judged at both ends of what is usual, and set
+        up for the stiff end.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or an object.
     gaps, inertias : iterable, optional
@@ -150,12 +155,11 @@ def tune(
     """
     if not (schedule or robust):
         raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
-    identified = drive if isinstance(drive, Uncertain) else None
-    if isinstance(drive, Uncertain):
-        drive = drive.drive
-        gaps = [drive.gap] if gaps is None else gaps
-        inertias = [drive.load_inertia] if inertias is None else inertias
-    drive = one_machine(drive)
+    known, drawn, soft = as_far_as_known(drive, DRAWN)
+    if drawn is not None:
+        gaps = [known.gap] if gaps is None else gaps
+        inertias = [known.load_inertia] if inertias is None else inertias
+    drive = one_machine(known)
     certified = isinstance(drive, Drive) if certified is None else certified
     wrong = Mistakes()
     whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}
@@ -165,8 +169,12 @@ def tune(
             check_whole(number, name, least)
     with wrong.noted():
         scenarios = scenarios_of(drive, tolerances, 0 if wrong.sentences else seed)
-        if identified is not None:
-            scenarios = scenarios_drawn(identified.drive, identified.draws(DRAWN), scenarios)
+        if drawn is not None:
+            scenarios = scenarios_drawn(known, drawn, scenarios)
+        if soft is not None:  # each of them at either end
+            there = {"stiffness": soft.stiffness, "damping": soft.damping}
+            ends = varied(known, {name: np.full(len(scenarios), one) for name, one in there.items()})
+            scenarios += scenarios_drawn(known, ends, scenarios)[1:]
     with wrong.noted():
         recipe = recipe_of(controller, parameters)
         ranges = ranges_of(recipe.make(), free)
@@ -186,7 +194,7 @@ def tune(
     wrong.settle()
     question = Question(
         drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), seed, restarts,
-        population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations,
+        population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations, soft,
     )  # fmt: skip
     log = Log(progress)
     log.tell("starts with the defaults")

@@ -50,6 +50,11 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     ready, own = replace(trials.controller, **values).set_up(trials.drives[0])
     if len(trials.question.drive.positions) > 1:  # controllers are set up for mid-gap; the drive has no such
         own = own.replace(start_position="unknown")
+    ends = None
+    if trials.question.soft is not None:  # scenarios of the stiff end, then as many of the soft one
+        each = _by_cell(trials, found.judged.metric).reshape(len(trials.question.cells), 2, -1)
+        stiff, soft = (float(_over_scenarios(each[:, k].ravel(), quantile)) for k in range(2))
+        ends = stiff, soft
     both = found.judged, trials.default
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
     return RobustSet(
@@ -63,6 +68,7 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
         restarts=trials.question.restarts,
         cells=_dataset(trials.question, _figures(trials, found.judged)),
         controller=RobustGains("robust", ready, own),
+        ends=ends,
     )
 
 

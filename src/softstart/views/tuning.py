@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.drive.data_sheet import BAND
 from softstart.errors import InputError
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
@@ -181,6 +182,12 @@ def conclusions(tuning: Tuning) -> list[str]:
             f"{one.worst_default:.3f}; {end}; {one.agreement} of {one.restarts} searches agree."
         )
         shares.append(("one set for all", one.worst, one.worst_default))
+        if one.ends is not None:
+            at_ends = " and ".join(
+                f"{worst:.3f} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
+            )
+            end = "stiff" if one.ends[0] >= one.ends[1] else "soft"
+            found.append(f"With this set {metric} is {kind} {at_ends}: the {end} end decides.")
     if tuning.question.metric == MARGIN:
         margins = []
         for what, *both in shares:
@@ -207,6 +214,12 @@ def notes(tuning: Tuning) -> list[str]:
     if len(drive.mass_names) > 2:
         load = drive.mass_names[drive.load_index]
         found.append(f"gap: all gaps together, at the motor shaft; J2: inertia of {load} at its own shaft.")
+    if q.soft is not None:
+        found.append(
+            f"No stiffness is known. Gains are set up for the stiff end of what is usual, elastic frequency "
+            f"{BAND[1]:g} Hz, and judged there and at {BAND[0]:g} Hz. Once it is known, give "
+            "shaft.elastic_frequency or a stiffness, and tune again."
+        )
     if tuning.schedule is not None:
         sure = int((tuning.schedule["agreement"] == q.restarts).sum())
         found.append(
