@@ -62,6 +62,17 @@ def test_the_limit_is_cancelled_in_mid_run_and_the_page_lives_on(page: Any, serv
     comes_to(direct.inner_text, f"{simulate(CRANE, 'direct').k_dyn:.3f}")
 
 
+def test_tables_of_an_answer_stay_within_their_column(page: Any) -> None:
+    """At 1280 pixels nothing is to be scrolled sideways; what has no room goes on below its first column."""
+    page.get_by_role("tab", name="Limit", exact=True).click()
+    page.get_by_test_id("curve-go").click()
+    answer = page.get_by_test_id("curve-answer")
+    answer.locator("table").first.wait_for()
+    assert answer.evaluate("e => e.scrollWidth - e.clientWidth <= 1")
+    titles = answer.locator("caption").all_inner_texts()
+    assert titles[:2] == ["Least K_dyn, terminal reached", "Least K_dyn, terminal reached, continued"]
+
+
 def test_panels_stay_within_their_column(page: Any) -> None:
     """Nothing is cut off sideways."""
     panel = page.locator(".instrument .panel").first

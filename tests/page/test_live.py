@@ -204,6 +204,28 @@ def test_limits_open_in_sight_and_stay_open(page):
     assert page.locator("details:has(summary:text('Limits'))").get_attribute("open") is not None
 
 
+def test_a_fold_with_values_is_open_after_a_reload(page):
+    fold = page.locator("details:has(summary:text('Limits'))")
+    assert fold.get_attribute("open") is None
+    fold.locator("summary").click()
+    limit = page.locator("#field-limits-shaft_torque")
+    limit.fill("70")
+    limit.press("Enter")
+    at_rest(page)
+    before = page.locator(".controls").evaluate("e => e.scrollTop")
+    page.reload()
+    opened(page)
+    comes_to(limit.input_value, "70")
+    assert limit.is_visible()
+    assert page.locator("details:has(summary:text('Gear'))").get_attribute("open") is None  # nothing is in it
+    assert page.locator(".controls").evaluate("e => e.scrollTop") == 0 <= before  # only a hand scrolls
+    fold.locator("summary").click()  # closed by hand it stays closed, whatever is built anew
+    page.locator("#field-units").fill("deg, rpm")
+    page.locator("#field-units").press("Enter")
+    comes_to(page.locator('[data-path="shaft.gap"] .unit').inner_text, "deg")
+    assert fold.get_attribute("open") is None
+
+
 def test_a_mistake_stands_beside_its_field_and_the_state_stays(page):
     before = k_dyn(page)
     field(page, "motor.starting_torque").fill("5")  # weaker than its load

@@ -22,6 +22,8 @@ from softstart import (
 )  # fmt: skip
 from softstart.notebook import OneLine, Shown
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
+from softstart.views.numbers import Table
+from softstart.views.sheet import Sheet, as_html
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=0.3)
 KNOTS = tuple(np.linspace(0.0, 1.0, 500).tolist())
@@ -65,3 +67,16 @@ def test_no_result_prints_its_arrays():
     assert len(found) > 25
     own = {one.__name__ for one in found if "__repr__" in vars(one)}
     assert own == {"Run", "Optimum", "LinearView"}
+
+
+def test_a_table_that_is_too_wide_goes_on_below_its_keys():
+    """Each column is there once, beside the keys, which name the row."""
+    cells = {key: [f"{key}-{i}" for i in range(3)] for key in ("gap", "J2", *"abcdefgh")}
+    sheet = Sheet("title", tables=[Table.of("Gains", cells, keys=2)])
+    text = as_html(sheet, width=200.0)
+    blocks = re.findall(r"<table><caption>(.*?)</caption><thead><tr>(.*?)</tr>", text)
+    headings = [re.findall(r">(\w+)</th>", row) for _, row in blocks]
+    assert [title for title, _ in blocks] == ["Gains"] + ["Gains, continued"] * (len(blocks) - 1)
+    assert all(row[:2] == ["gap", "J2"] for row in headings)
+    assert [one for row in headings for one in row[2:]] == list("abcdefgh")
+    assert as_html(sheet).count("<table>") == 1

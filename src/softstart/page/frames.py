@@ -148,7 +148,13 @@ class Screen:
             groups = self._grouped(known)
             if self._is_new(part, groups):
                 frame[part] = groups
+                frame["filled"] = self._filled()
         return frame
+
+    def _filled(self) -> list[str]:
+        """The groups in which something is not as it was when the drive was loaded: no fold hides that."""
+        now, before = self.session.machine.by_path(), self.session.origin.by_path()
+        return sorted({one.group for path, one in self._machine.items() if now.get(path) != before.get(path)})
 
     def _grouped(self, known: Mapping[str, Entry]) -> list[Frame]:
         groups: dict[str, list[Frame]] = {}

@@ -43,6 +43,7 @@ TUNING_SHARES = {
     "robust": (0.45, 0.8),
     "optima": (0.8, 1.0),
 }
+COLUMN = 314.0  # pixels of an answer on a screen of 1280
 INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
 
@@ -64,7 +65,7 @@ def shown(*sheets: Sheet, first: bool = False) -> str:
     from softstart.views.sheet import as_html
 
     each = (replace(one, found=[*map(plain, one.found)], notes=[*map(plain, one.notes)]) for one in sheets)
-    return "\n".join(as_html(one, len(one.figures), first=first) for one in each)
+    return "\n".join(as_html(one, len(one.figures), first=first, width=COLUMN) for one in each)
 
 
 def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> Answer:

@@ -40,13 +40,17 @@ class Column(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A titled table of text cells; rows numbered in `bold` stand out, a terminal shows the first `most`."""
+    """A titled table of text cells; rows numbered in `bold` stand out, a terminal shows the first `most`.
+
+    The first `keys` columns name a row; if it is not said, those that hold text.
+    """
 
     title: str
     columns: list[Column]
     rows: Sequence[Sequence[str]]
     bold: Sequence[int] = ()
     most: int | None = None
+    keys: int | None = None
 
     @classmethod
     def of(

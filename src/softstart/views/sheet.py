@@ -6,6 +6,7 @@ import html
 import io
 import math
 import platform
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,9 +17,10 @@ from softstart.views.drawing import drawing, save_figure
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
 from softstart.views.numbers import Column, Table
-from softstart.views.terminal import console, print_lines, print_table, sentence
+from softstart.views.terminal import blocks_of, console, print_lines, print_table, sentence
 
 FITTED_TO = "fitted-to.toml"
+LETTER, PADDING = 6.5, 8.0  # pixels of a table on the page
 
 Writer = Callable[[Path], object]
 
@@ -201,15 +203,20 @@ def _parameters(machine: Any) -> Table:
 # notebook --------------------------------------------------------------------------------------------------
 
 
-def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False) -> str:
+def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float = math.inf) -> str:
     """A sheet in a notebook or on a page: what came out, facts, tables, the first figures, notes.
 
-    `first`: figures before the tables, where the picture is what was asked for.
+    `first`: figures before the tables, where the picture is what was asked for. `width`: pixels for a table;
+    what has no room beside its first columns goes on below.
     """
     facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
     parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found) if text]
-    tables = [_html(table) for table in (*facts, *sheet.tables) if table.rows]
+    tables = [
+        _html(block)
+        for table in (*facts, *sheet.tables) if table.rows
+        for block in blocks_of(table, _pixels(table), width)
+    ]  # fmt: skip
     pictures = [
         f'<figure tabindex="0" role="img" aria-label="{html.escape(f"{sheet.title}: {stem}")}">'
         f"{_svg(draw())}</figure>"
@@ -218,6 +225,16 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False) -> str:
     parts += [*pictures, *tables] if first else [*tables, *pictures]
     parts += [f"<p>{html.escape(text)}</p>" for text in sheet.notes]
     return "\n".join(parts)
+
+
+def _pixels(table: Table) -> list[float]:
+    """What each column of a table needs at least: its longest word, as a browser breaks lines."""
+    found = []
+    for i, (heading, is_number) in enumerate(table.columns):
+        cells = " ".join([heading, *(row[i] for row in table.rows)])
+        words = re.split(r"\s" if is_number else r"\s|(?<=-)", cells)
+        found.append(PADDING + LETTER * max(map(len, words)))
+    return found
 
 
 def _html(table: Table) -> str:

@@ -41,33 +41,40 @@ def print_json(data: Any) -> None:
 def print_table(to: Console, shown: Table, *, headings: bool = True) -> None:
     """A table; bold rows stand out on a terminal. Text is wrapped, numbers are never cut.
 
-    Of a table that is too wide the first columns, as far as they hold text, are printed again before those
-    that have no room beside them.
+    Of a table that is too wide its keys are printed again before the columns that have no room beside them.
     """
     rows, count = shown.rows[: shown.most], len(shown.rows)
     cut = f" (the first {len(rows)} of {count}; --json and --out give all)" if count > len(rows) else ""
-    for index, block in enumerate(_blocks(shown._replace(rows=rows), to.width)):
+    shown = shown._replace(rows=rows)
+    needed = [one + GUTTER for one in _least(shown)]
+    for index, block in enumerate(blocks_of(shown, needed, to.width + GUTTER)):
         if index:
             to.print()
-        title = f"{shown.title}, continued" if index else shown.title + cut
-        _print_block(to, block._replace(title=title), headings)
+        _print_block(to, block if index else block._replace(title=block.title + cut), headings)
 
 
-def _blocks(table: Table, width: int) -> list[Table]:
-    """The table in blocks of columns that fit; the text columns on the left stand in each of them."""
+def blocks_of(table: Table, needed: Sequence[float], width: float) -> list[Table]:
+    """The table in blocks of columns that fit beside each other; its keys stand in each of them.
+
+    `needed` is what each column needs of the `width`. Keys are the first columns that hold text, or
+    `Table.keys`.
+    """
     columns, rows = table.columns, table.rows
-    needed = [one + GUTTER for one in _least(table)]
-    keys = next((i for i, column in enumerate(columns) if column.number), len(columns)) or 1
+    keys = table.keys or next((i for i, column in enumerate(columns) if column.number), len(columns)) or 1
     blocks, used = [list(range(keys))], sum(needed[:keys])
     for i in range(keys, len(columns)):
-        if used + needed[i] - GUTTER > width and len(blocks[-1]) > keys:
+        if used + needed[i] > width and len(blocks[-1]) > keys:
             blocks.append(list(range(keys)))
             used = sum(needed[:keys])
         blocks[-1].append(i)
         used += needed[i]
     return [
-        table._replace(columns=[columns[i] for i in block], rows=[[row[i] for i in block] for row in rows])
-        for block in blocks
+        table._replace(
+            title=f"{table.title}, continued" if number else table.title,
+            columns=[columns[i] for i in block],
+            rows=[[row[i] for i in block] for row in rows],
+        )
+        for number, block in enumerate(blocks)
     ]
 
 

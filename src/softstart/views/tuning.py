@@ -121,7 +121,7 @@ def cell_table(tuning: Tuning, table: Dataset) -> Table:
         "in\ntime": ["yes" if good else "no" for good in of["in_time"]],
         "searches\nagree": [f"{n} of {tuning.question.restarts}" for n in of["agreement"]],
     }
-    return Table.of("Gains for each cell", columns, most=SHOWN)
+    return Table.of("Gains for each cell", columns, most=SHOWN, keys=2)
 
 
 def _tables(tuning: Tuning) -> Iterator[Table]:

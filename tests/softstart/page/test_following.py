@@ -446,6 +446,10 @@ def test_a_limit_is_given_and_taken_back_by_an_empty_field(machine, path, text):
     controls.take({"what": "edit", "path": path, "text": text})
     assert screen.first()["fields"][path]["text"] == text
     assert session.machine.limits
+    again = Screen(session).first()  # as after a reload: a fold that has values is open
+    assert [one["title"] for one in again["groups"] if path in [row["path"] for row in one["rows"]]] == again[
+        "filled"
+    ]
     controls.take({"what": "edit", "path": path, "text": ""})
     assert not screen.mistakes
     assert session.machine == before

@@ -5,32 +5,34 @@ const STEPS = 600;
 
 export class Controls {
   constructor(place, own, head, say) {
-    Object.assign(this, { say, own, head, rows: new Map(), open: new Set(), groups: place.appendChild(element("div")) });
+    Object.assign(this, { say, own, head, rows: new Map(), open: new Map(), groups: place.appendChild(element("div")) });
   }
 
   // the fields of another machine, the first group in the head of the page; or of another strategy
-  build({ groups, strategy }) {
+  build({ groups, strategy, filled = [] }) {
     if (groups) {
       this.head.replaceChildren(...groups[0].rows.flatMap((row) => this.row(row)));
-      this.groups.replaceChildren(...groups.slice(1).map((group) => this.box(group)));
+      this.groups.replaceChildren(...groups.slice(1).map((group) => this.box(group, filled)));
     }
     if (strategy) {
-      this.own.replaceChildren(...strategy.map((group) => this.box(group)));
+      this.own.replaceChildren(...strategy.map((group) => this.box(group, filled)));
       this.own.hidden = !strategy.length;
     }
     for (const [path, { line }] of this.rows) if (!line.isConnected) this.rows.delete(path);
   }
 
-  box({ title, rows, folded }) {
+  // a fold that has values begins open; later it is as the hand left it
+  box({ title, rows, folded }, filled) {
     const lines = rows.flatMap((row) => this.row(row));
-    if (folded) return element("details", { open: this.open.has(title), ontoggle: ({ target }) => this.fold(title, target) }, element("summary", {}, title), element("fieldset", {}, ...lines));
+    if (filled.includes(title) && !this.open.has(title)) this.open.set(title, true);
+    if (folded) return element("details", { open: Boolean(this.open.get(title)), ontoggle: ({ target }) => this.fold(title, target) }, element("summary", {}, title), element("fieldset", {}, ...lines));
     return element("fieldset", {}, element("legend", {}, title), ...lines);
   }
 
   // what is unfolded comes into sight, and stays unfolded when its fields are built anew
   fold(title, place) {
-    if (place.open && !this.open.has(title)) place.scrollIntoView({ block: "nearest" });
-    this.open[place.open ? "add" : "delete"](title);
+    if (place.open && !this.open.get(title)) place.scrollIntoView({ block: "nearest" });
+    this.open.set(title, place.open);
   }
 
   row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {
