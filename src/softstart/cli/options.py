@@ -139,11 +139,11 @@ def _data_sheet(name: str) -> str | None:
 
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
-    found = _machine(name, settings)
+    found = read_as_known(name, settings)
     return found.drive if isinstance(found, UnknownStiffness) else found
 
 
-def _machine(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:
+def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:
     """The one drive, or the chain, asked for; a drive at both ends where a data sheet has no stiffness."""
     if is_chain(name):
         return Chain.load(name, also=read_changes(settings))
@@ -167,7 +167,7 @@ def read_machine_or_identified(
         from softstart.identification.result import Identification
 
         return Identification.load(name).with_settings(settings)
-    return _machine(name, settings)
+    return read_as_known(name, settings)
 
 
 @contextmanager

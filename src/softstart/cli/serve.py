@@ -14,11 +14,11 @@ from softstart.errors import InputError
 from softstart.page.serve import Address, check_installed, listening, run
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
+    from softstart.page.machines import Loaded
 
 
 @click.command()
-@options.machine_argument("drive", options.read_machine, options.drive_names, options.DEFAULT_DRIVE)
+@options.machine_argument("drive", options.read_as_known, options.drive_names, options.DEFAULT_DRIVE)
 @options.set_option
 @click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 selects a free one.")
 @click.option(
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     "--expose", is_flag=True, help="Accept connections from other machines; requires --host and --token."
 )
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def serve(*, drive: Machine, no_browser: bool, **given: Any) -> None:
+def serve(*, drive: Loaded, no_browser: bool, **given: Any) -> None:
     """Open the interactive page in the browser.
 
     DRIVE is a TOML file or the name of a shipped drive or chain; by default the crane drive of the
@@ -46,9 +46,9 @@ def serve(*, drive: Machine, no_browser: bool, **given: Any) -> None:
             "--host ADDRESS and --token TOKEN, or leave --expose out."
         )
     check_installed()
-    from softstart.page.machines import single
+    from softstart.page.session import Session
 
-    drive = single(drive)
+    Session(drive, [])  # refused before anything listens
     with listening(address) as listener:
         with working("getting the engine ready ..."):
             _warm_up(drive)
@@ -62,7 +62,7 @@ def serve(*, drive: Machine, no_browser: bool, **given: Any) -> None:
         run(drive, address, listener, ready)
 
 
-def _warm_up(machine: Machine) -> None:
+def _warm_up(machine: Loaded) -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
     from softstart.page import machines
     from softstart.page.session import Session

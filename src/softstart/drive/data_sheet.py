@@ -103,6 +103,11 @@ class UnknownStiffness(NamedTuple):
     drive: Drive
     soft: Drive
 
+    @property
+    def name(self) -> str:
+        """Name of the drive."""
+        return self.drive.name
+
 
 class DataSheet(ParameterSet):
     """A machine as plates, catalogues and drawings give it; `drive` is what follows for the motor shaft.

@@ -8,11 +8,14 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.chain.machines import Machine
+from softstart.chain.model import is_chain_text
+from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError
+from softstart.input.documents import parsed
+from softstart.input.parameters import Wording
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
-from softstart.page.machines import machine_from
+from softstart.page.machines import Loaded, machine_from
 from softstart.page.panel_parts import (
     POLL,
     JobView,
@@ -65,7 +68,7 @@ class DriveFiles:
             self._shipped.set_value("")
             self._take_over(shipped_drives()[name])
 
-    def _take_over(self, machine: Machine) -> None:
+    def _take_over(self, machine: Loaded) -> None:
         self._troubles.say(())
         self._session.take(machine)
         notify(f"{clipped(self._session.machine.name)} is loaded.")
@@ -77,8 +80,8 @@ class DriveFiles:
         save(self._session.machine.to_toml(), drive_file(self._session.machine))
 
 
-def machine_of(content: bytes, name: str) -> Machine:
-    """The drive or chain in the bytes of a file; InputError with a sentence for each mistake.
+def machine_of(content: bytes, name: str) -> Loaded:
+    """The drive, chain or data sheet in the bytes of a file; InputError with a sentence for each mistake.
 
     >>> machine_of(b"\\xff\\xfe", "mine.toml")
     Traceback (most recent call last):
@@ -94,6 +97,8 @@ def machine_of(content: bytes, name: str) -> Machine:
             raise InputError(
                 f"{name}: line {number} has more than {LONGEST_LINE} characters, as no drive file has."
             )
+    if not is_chain_text(text) and DataSheet.describes(parsed(text, Wording(style="toml"), "a drive")):
+        return DataSheet.from_toml(text).possible
     return machine_from(text)
 
 
@@ -164,7 +169,7 @@ class Exports:
         strategies = dict(session.controllers)
         name, self._text = self._named("report", suffix=".html"), ""
         command = command_text(session.seen, strategies, "report", f"--out={name}")
-        work = tasks.report, session.seen, list(strategies.values()), command
+        work = tasks.report, session.possible, list(strategies.values()), command
         self._view.begin("report", *work, subject=name)
 
     def _done(self, text: str) -> None:

@@ -21,9 +21,10 @@ from softstart.page.machines import STRATEGY, Axes, Entry
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Reference, Session, Strategy
 from softstart.quantities import Units
+from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
 from softstart.views.numbers import unit
-from softstart.views.starts import position_notes
+from softstart.views.starts import NO_STIFFNESS, position_notes
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
@@ -139,6 +140,7 @@ class Screen:
             "rows": [row(session, found)],
             "reference": self._reference(),
             "mapped": self.axes is not None,
+            "soft": session.soft is not None,
             # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
             "here": (gap, inertia),
             "angle": (units.of("rad"), units.size("rad")),
@@ -247,7 +249,9 @@ class Screen:
             yield from (None for _ in session.judged(label))
         yield {
             "rows": [row(session, found) for found in session.strategies],
-            "recommendation": session.recommendation().text,
+            "recommendation": " ".join(
+                [session.recommendation().text, *([NO_STIFFNESS] if session.soft else [])]
+            ),
             "doubts": doubts(machine),
             "assumed": [one for one in machine.assumed.split("; ") if one],
         }
@@ -408,13 +412,14 @@ def outcomes(found: Strategy) -> Frame:
 
 
 def row(session: Session, found: Strategy) -> Frame:
-    """One line of the table; `worn`, `settled`, `limits` and `flag` are empty until they are computed."""
+    """One line of the table; `worn`, `soft`, `settled`, `limits`, `flag` are empty until computed."""
     known = session.row(found.name)
     flags = () if known is None else known.flags
     trouble = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
     return outcomes(found) | {
         "time_lost": number(session.time_lost(found)),
         "worn": None if known is None else number(known.k_dyn_worn_gap),
+        "soft": number(known.cases[SOFT_END].k_dyn) if known and SOFT_END in known.cases else None,
         "settled": None if known is None else number(known.run.settled_time),
         "limits": "" if known is None else known.against_limits,
         "flag": ", ".join(flag.word for flag in flags),

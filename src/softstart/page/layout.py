@@ -15,11 +15,11 @@ from nicegui import ui
 from nicegui.client import Client
 from nicegui.element import Element
 
-from softstart.chain.machines import Machine
 from softstart.page import USER
 from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
+from softstart.page.machines import Loaded
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
 
@@ -54,7 +54,7 @@ def style() -> str:
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def warm(drive: Machine) -> None:
+def warm(drive: Loaded) -> None:
     """Do what the first tab would wait for, and others behind it."""
     gentlest(drive)
     for _, module, _ in PANELS:
@@ -63,14 +63,14 @@ def warm(drive: Machine) -> None:
 
 
 @cache
-def gentlest(drive: Machine) -> str:
+def gentlest(drive: Loaded) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
     session.select_gentlest()
     return session.selected
 
 
-def build(drive: Machine) -> Session:
+def build(drive: Loaded) -> Session:
     """Build the page for the client of the moment, in a session of its own; returns that session."""
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
@@ -107,7 +107,7 @@ def build(drive: Machine) -> Session:
     return session
 
 
-def page(drive: Machine) -> None:
+def page(drive: Loaded) -> None:
     """The page of one client; what stands in its way is said instead."""
     try:
         build(drive)

@@ -20,7 +20,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, make_controller
 from softstart.errors import InputError
 from softstart.page.machines import machine_from, single
-from softstart.page.session import Bench, Reference, Session
+from softstart.page.session import SOFT, Bench, Reference, Session
 
 MOST_KEPT = 64  # benches of tabs that may be reloaded
 LONGEST = 16_384  # characters of a link
@@ -65,6 +65,7 @@ def link_of(session: Session) -> str:
                        if name in installed and (given := _given(controller))},
         "selected": bench.selected,
         "drawn": sorted(bench.drawn),
+        "soft": dict(bench.soft),
         "reference": None if kept is None or kept.label not in installed else {
             "drive": kept.drive.to_toml(), "label": kept.label, "parameters": _given(kept.controller),
         },
@@ -91,6 +92,8 @@ def bench_of(link: str, now: Bench) -> Bench:
         drive = machine_from(content["drive"])
         origin = machine_from(content["origin"]) if content["origin"] else drive
         parameters = content["parameters"]
+        soft = {name: float(content["soft"][name]) for name in SOFT} if content.get("soft") else {}
+        origin.with_values(soft)  # refused here, not in the midst of a page
         same = origin == now.origin
         own = {name: one for name, one in now.controllers.items() if same or name in controller_names()}
         given = {name: dict(parameters[name]) for name in own if name in parameters}
@@ -114,6 +117,7 @@ def bench_of(link: str, now: Bench) -> Bench:
         next(one for one in (selected, now.selected, *own) if one in own),
         drawn & own.keys(),
         reference,
+        soft,
     )
 
 

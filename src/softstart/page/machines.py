@@ -15,6 +15,7 @@ from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
+from softstart.drive.data_sheet import UnknownStiffness
 from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
@@ -278,6 +279,9 @@ def without(machine: Machine, path: str) -> Machine:
 def machine_from(text: str, where: str = "") -> Machine:
     """The drive or the chain of a TOML text; a chain has tables [[mass]]."""
     return (Chain if is_chain_text(text) else Drive).from_toml(text, where=where)
+
+
+Loaded = Machine | UnknownStiffness  # what a page may be given
 
 
 def single(machine: Machine) -> Machine:

@@ -78,7 +78,7 @@ class ChecksPanel(TaskPanel):
     def question(self) -> tuple[Any, ...]:
         """All checks."""
         session = self.session
-        return "positions, limits and life", tasks.checked, session.seen, dict(session.controllers)
+        return "positions, limits and life", tasks.checked, session.possible, dict(session.controllers)
 
 
 class TuningPanel(TaskPanel):
@@ -109,7 +109,7 @@ class TuningPanel(TaskPanel):
         drive, name = self.session.seen, str(self.controller.value)
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
-        return f"tuning of {name}", tasks.tuning, drive, name, *grid, *more
+        return f"tuning of {name}", tasks.tuning, self.session.possible, name, *grid, *more
 
 
 def tunable() -> list[str]:

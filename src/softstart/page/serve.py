@@ -30,7 +30,7 @@ from softstart.errors import InputError
 from softstart.page import USER
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
+    from softstart.page.machines import Loaded
 
 DEFAULT_PORT = 8765
 SHORTEST_TOKEN = 16
@@ -168,7 +168,7 @@ def guarded(app: App, address: Address, port: int) -> Guard:
     return Guard(app, names, address.token or "", exposed=not address.is_loopback, cookie=f"softstart-{port}")
 
 
-def application(drive: Machine) -> App:
+def application(drive: Loaded) -> App:
     """The ASGI application: NiceGUI with the page at `/`. One a process, since NiceGUI is one a process."""
     # NiceGUI, when it is imported, reads and stores things in the folder it is started in; the page stores
     # nothing, and nobody can put anything for it to read where no file can be
@@ -206,7 +206,7 @@ def application(drive: Machine) -> App:
     return app
 
 
-def run(drive: Machine, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
+def run(drive: Loaded, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
     import uvicorn
 

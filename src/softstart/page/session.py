@@ -10,17 +10,19 @@ import math
 import secrets
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
+from softstart.drive import Drive
+from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import STRATEGY, changed, single, without
+from softstart.page.machines import STRATEGY, Loaded, changed, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import Units, nearest
-from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
+from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, SOFT_END, as_far_as_known, changed_case
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import simulate
 from softstart.views.numbers import units_of
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from softstart.controller.base import Controller
     from softstart.start.run import Run
 
+SOFT = ("stiffness", "damping")  # what differs at the soft end of an unknown stiffness
 MAX_STRATEGIES = 24
 MOST_STEPS = 200  # that can be undone
 PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are one step
@@ -91,6 +94,7 @@ class Bench:
     selected : label of the strategy whose figure is large and whose map is drawn.
     drawn : labels of the strategies that are drawn beside it.
     reference : what all of them are compared with, if something is.
+    soft : stiffness and damping at the soft end, of a drive that was loaded without any stiffness.
     """
 
     drive: Machine
@@ -99,6 +103,7 @@ class Bench:
     selected: str
     drawn: frozenset[str]
     reference: Reference | None = None
+    soft: Mapping[str, float] = field(default_factory=dict)
 
 
 class Session:
@@ -117,14 +122,12 @@ class Session:
     0.5
     """
 
-    def __init__(
-        self, drive: Machine | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
-    ) -> None:
-        drive = single(load_machine(drive) if isinstance(drive, str) else drive)
+    def __init__(self, drive: Loaded | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None) -> None:
+        drive, soft = _loaded(load_machine(drive) if isinstance(drive, str) else drive)
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = _main(names)
         self._first = {name: make_controller(name) for name in names}
-        self.bench = Bench(drive, drive, self._first, selected, frozenset((selected,)))
+        self.bench = Bench(drive, drive, self._first, selected, frozenset((selected,)), soft=soft)
         self._past: list[Bench] = []
         self._future: list[Bench] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
@@ -168,6 +171,38 @@ class Session:
         """The machine in these units, for what is computed and written elsewhere, as reports and tabs."""
         same = units_of(self.machine) == self.units
         return self.machine if same else changed(self.machine, {"units": self.units.text})
+
+    @property
+    def soft(self) -> Drive | None:
+        """The drive of now at the soft end of an unknown stiffness; None where the stiffness is known.
+
+        A value that has been set since is that of both ends; a stiffness that has been set is known.
+
+        >>> from softstart.drive.data_sheet import UnknownStiffness
+        >>> crane = Session().machine
+        >>> session = Session(UnknownStiffness(crane, crane.replace(stiffness=0.01 * crane.stiffness)))
+        >>> session.set("gap", 1.0)
+        >>> round(session.soft.stiffness, 5), session.soft.gap
+        (3.68465, 1.0)
+        >>> session.set("stiffness", 400.0)
+        >>> session.soft is None
+        True
+        """
+        now, origin, soft = self.machine, self.origin, self.bench.soft
+        if not (soft and isinstance(now, Drive) and isinstance(origin, Drive)):
+            return None
+        if now.stiffness != origin.stiffness:
+            return None
+        same = {name: value for name, value in soft.items() if getattr(now, name) == getattr(origin, name)}
+        return now.replace(**same)
+
+    @property
+    def possible(self) -> Machine | UnknownStiffness:
+        """`seen`, at both ends where its stiffness is unknown."""
+        seen, soft = self.seen, self.soft
+        if soft is None or not isinstance(seen, Drive):
+            return seen
+        return UnknownStiffness(seen, soft.replace(units=seen.units))
 
     @property
     def controllers(self) -> Mapping[str, Controller]:
@@ -257,13 +292,13 @@ class Session:
         controller = changed_controller(self.controllers[self.selected], {name: value})
         self._put(gesture, controllers={**self.controllers, self.selected: controller})
 
-    def take(self, drive: Machine) -> None:
+    def take(self, drive: Loaded) -> None:
         """Go over to another drive or chain, without the optima and gains that were computed for this one."""
-        drive = single(drive)
+        drive, soft = _loaded(drive)
         own = {label: one for label, one in self.controllers.items() if label in self._first} or self._first
         selected = self.selected if self.selected in own else _main(own)
         drawn = self.bench.drawn.intersection(own)
-        self._put(drive=drive, origin=drive, controllers=own, selected=selected, drawn=drawn)
+        self._put(drive=drive, origin=drive, controllers=own, selected=selected, drawn=drawn, soft=soft)
 
     def restore(self, bench: Bench) -> None:
         """Begin with a bench of before, or of somebody else; nothing can be undone then."""
@@ -389,15 +424,16 @@ class Session:
         run = self.result(label).run
         if run is None or self.row(label) is not None:
             return
-        cases = {}
-        for case in CASES:
+        cases, soft = dict[str, Case](), self.soft
+        for case in (*CASES, *([SOFT_END] if soft else [])):
             yield None
+            there = soft if case == SOFT_END else None
             try:
-                cases[case] = changed_case(self.machine, self.controllers[label], case)
+                cases[case] = changed_case(self.machine, self.controllers[label], case, soft=there)
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
                 cases[case] = Case.of(None)
-        self._rows[label] = Row(run, self.direct(), cases, label=label)
+        self._rows[label] = Row(run, self.direct(), cases, tuple(cases), label)
         _ = run.settled_time, self._rows[label].flags  # computed here, kept in the runs
 
     def recommendation(self) -> Recommendation:
@@ -454,6 +490,12 @@ class Session:
             near = nearest(label, list(self.controllers))
             hint = f"did you mean {near}?" if near else f"there are {', '.join(self.controllers)}."
             raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
+
+
+def _loaded(given: Loaded) -> tuple[Machine, dict[str, float]]:
+    """The machine of now, and what differs at the soft end of an unknown stiffness."""
+    known, _, soft = as_far_as_known(given)
+    return single(known), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
 
 
 def _main(labels: Iterable[str]) -> str:

@@ -23,7 +23,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.errors import InputError, SimulationError
 from softstart.page.downloads import file_name, text_of
-from softstart.page.machines import changed
+from softstart.page.machines import Loaded, changed
 from softstart.page.sentences import plain
 from softstart.parallel import Progress
 from softstart.quantities import show
@@ -148,7 +148,7 @@ def no_solution_as_sentence() -> Iterator[None]:
 
 
 def tuning(
-    drive: Machine,
+    drive: Loaded,
     controller: str,
     gaps: Sequence[Any] | None,
     inertias: Sequence[Any] | None,
@@ -251,7 +251,7 @@ def identified(
     return Answer(shown(identification_sheet(found)), files, drive=found.drive)
 
 
-def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress: Progress) -> Answer:
+def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> Answer:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     from softstart.optimal.optimize import optimize
     from softstart.views import optima
@@ -259,7 +259,8 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress
     from softstart.views.sheet import Sheet
 
     progress(0.0, "limits")
-    compared = compare(machine, list(controllers.values()))
+    compared = compare(possible, list(controllers.values()))
+    machine: Machine = compared.drive
     progress(0.3, "start positions")
     sheets = [_positions(machine, controllers), _margins(compared)]
     progress(0.6, "life of the shaft line")
@@ -327,7 +328,11 @@ def _margins(compared: Comparison) -> Sheet:
 
 
 def report(
-    drive: Machine, controllers: Sequence[str | Controller], command: str, *, progress: Progress
+    drive: Loaded,
+    controllers: Sequence[str | Controller],
+    command: str,
+    *,
+    progress: Progress,
 ) -> str:
     """The report for a customer, as one HTML text; SOFTSTART_BUDGET, in s, is its `budget`."""
     from softstart import reporting

@@ -294,7 +294,7 @@ def compared(
     _ = run.settled_time  # now, while what a controller prints is still caught
     cases = {case: changed_case(drive, controller, case, until, fitted_to) for case in CASES}
     if soft is not None:
-        cases[SOFT_END] = _case(soft, drive, controller, until, fitted_to)
+        cases[SOFT_END] = changed_case(drive, controller, SOFT_END, until, fitted_to, soft)
         worst_case = (*worst_case, SOFT_END)
     if drawn is None:
         return Row(run, direct, cases, worst_case)
@@ -311,16 +311,16 @@ def changed_case(
     case: str,
     until: float | None = None,
     fitted_to: Drive | None = None,
+    soft: Drive | None = None,
 ) -> Case:
-    """A controller set up for `drive` with 4 times its gap, or 0.4 of its load inertia."""
-    changed = drive.changed(gaps=WORN_GAP) if case == "gap x4" else drive.changed(load_inertia=LIGHT_INERTIA)
-    return _case(changed, drive, controller, until, fitted_to)
-
-
-def _case(
-    changed: Machine, drive: Machine, controller: Controller, until: float | None, fitted_to: Drive | None
-) -> Case:
-    """A controller set up for `drive` or `fitted_to` on a drive that is another one."""
+    """A controller set up for `drive`, with 4 times its gap, 0.4 of its load inertia, or on `soft`."""
+    changed: Machine
+    if soft is not None:
+        changed = soft
+    elif case == "gap x4":
+        changed = drive.changed(gaps=WORN_GAP)
+    else:
+        changed = drive.changed(load_inertia=LIGHT_INERTIA)
     try:
         return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:

@@ -411,6 +411,12 @@ def of_the_unknown(rows: Sequence[Row]) -> tuple[Figure, ...]:
     return INTERVALS if rows[0].intervals else at_soft_end(rows)
 
 
+NO_STIFFNESS = (
+    "No stiffness is known. Strategies are set up for the stiff end of what is usual, elastic frequency "
+    f"{BAND[1]:g} Hz; K {BAND[0]:g} Hz: so set up at the soft end, where limits must be kept as well."
+)
+
+
 def both_ends(comparison: Comparison) -> list[str]:
     """How the choice differs between both ends of an unknown stiffness; nothing where it is known."""
     if comparison.soft_end is None:
@@ -418,8 +424,7 @@ def both_ends(comparison: Comparison) -> list[str]:
     stiff, soft = comparison.at_this_end, comparison.soft_end.recommendation
     same = [row.name for row in stiff.shown] == [row.name for row in soft.shown]
     return [
-        "No stiffness is known. Strategies are set up for the stiff end of what is usual, elastic frequency "
-        f"{BAND[1]:g} Hz; K {BAND[0]:g} Hz: so set up at the soft end, where limits must be kept as well.",
+        NO_STIFFNESS,
         f"If it is {BAND[1]:g} Hz: {_chosen(stiff)}. If it is {BAND[0]:g} Hz, and set up for it: "
         f"{_chosen(soft)}. The choice {'is the same at both ends' if same else 'depends on the stiffness'}. "
         "Give shaft.elastic_frequency, from the swing of the speed in a log, or a stiffness.",

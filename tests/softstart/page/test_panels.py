@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import gc
 import itertools
+import math
 import weakref
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from softstart import Drive, InputError
+from softstart import DataSheet, Drive, InputError
 from softstart.controller import make_controller
 from softstart.page.jobs import Jobs, State
 from softstart.page.session import Session
@@ -127,6 +128,28 @@ def test_a_file_of_mistakes_is_told_in_some_sentences_and_read_at_once() -> None
         machine_of(b"a." * (LARGEST // 2 - 2) + b"b=1", "mine.toml")
     named = Drive.load("crane-4amtkf").replace(name="Crane" * 24)
     assert machine_of(named.to_toml().encode(), "mine.toml") == named
+
+
+def test_a_data_sheet_without_stiffness_is_loaded_with_both_its_ends(client, monkeypatch) -> None:
+    """From a file and from the form: what tuning, checks and report are asked for is both."""
+    from softstart.page import panels
+    from softstart.page.data_sheet_panel import DataSheetPanel
+    from softstart.page.files_panel import machine_of
+
+    text = """load = { machine = "rotor", inertia = "160 kg*m^2", friction = "80 N*m" }
+    motor = { rated_power = "3 kW", rated_speed = "1410 rpm", inertia = "0.0062 kg*m^2" }
+    gear = { ratio = 38.1, backlash = "9 arcmin" }"""
+    ends = machine_of(text.encode(), "sheet.toml")
+    assert [one.Omega / math.tau for one in ends] == pytest.approx([30.0, 3.0], rel=1e-12)
+    session = Session(controllers=["direct"])
+    with client:
+        panel = DataSheetPanel(session, "A")
+        monkeypatch.setattr(panel, "sheet", lambda: DataSheet.from_toml(text))
+        panel._use()
+        assert session.possible == ends
+        tuning, checks = panels.TuningPanel(session, "A", Queue()), panels.ChecksPanel(session, "A", Queue())
+        assert ends in tuning.question()
+        assert ends in checks.question()
 
 
 def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> None:

@@ -6,14 +6,19 @@ import json
 import zlib
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from collections import OrderedDict
+from itertools import takewhile
 
 import pytest
 
-from softstart import Drive, InputError, compare, simulate
+from softstart import DataSheet, Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
+from softstart.drive.data_sheet import UnknownStiffness
 from softstart.page import links
+from softstart.page.frames import Screen
 from softstart.page.links import bench_of, link_of
 from softstart.page.session import MAX_STRATEGIES, Session
+from softstart.start.comparison import SOFT_END
+from softstart.start.recommendation import CASES
 
 
 class Failing(PlainController):
@@ -33,6 +38,60 @@ def test_all_figures_are_those_of_compare_to_the_bit():
         list(session.judged(strategy.name))
         assert session.row(strategy.name).k_dyn_worn_gap == row.k_dyn_worn_gap
         assert session.time_lost(strategy) == row.time_lost
+
+
+TROLLEY = {
+    "load.machine": "trolley", "load.mass": "6.5 t", "load.diameter": "315 mm", "motor.rated_power": "3 kW",
+    "motor.rated_speed": "1410 rpm", "motor.inertia": "0.0062 kg*m^2", "motor.starting_ratio": 2.2,
+    "gear.ratio": 38.1, "gear.backlash": "9 arcmin", "limits.output_torque": "2.3 kN*m",
+}  # fmt: skip
+
+
+def test_a_drive_without_stiffness_is_shown_at_both_ends_as_compare_does():
+    """Each K_dyn and each verdict to the bit; also with another gap, in the tab of a link, and undone."""
+    names = ["direct", "ramp"]
+    session = Session(DataSheet.from_settings(TROLLEY).possible, controllers=names)
+
+    def agree(shown, ends):
+        table, rows = compare(ends, names), {}
+        frames = (frame for frame in Screen(shown).at_rest() if frame)
+        for frame in takewhile(lambda frame: "map" not in frame, frames):
+            rows |= {row["name"]: row for row in frame.get("rows", [])}
+            if "recommendation" in frame:
+                assert frame["recommendation"].startswith(table.recommendation.text)
+                assert "No stiffness is known" in frame["recommendation"]
+        assert {row.name: row.cases[SOFT_END].k_dyn for row in table.rows} == {
+            name: row["soft"] for name, row in rows.items()
+        }
+        assert [rows[row.name]["limits"] for row in table.rows] == [row.against_limits for row in table.rows]
+
+    stiff, soft = session.possible
+    assert (stiff, soft) == DataSheet.from_settings(TROLLEY).possible
+    agree(session, DataSheet.from_settings(TROLLEY))
+    session.set("shaft.gap", "5 arcmin at output")
+    changed = UnknownStiffness(stiff.replace(gap=session.machine.gap), soft.replace(gap=session.machine.gap))
+    agree(session, changed)
+    other = Session(controllers=names)
+    other.restore(bench_of(link_of(session), other.bench))
+    agree(other, changed)
+    session.set("shaft.damping", 0.0)
+    assert [one.damping for one in session.possible] == [0.0, 0.0]
+    session.set("shaft.stiffness", "35 kN*m/rad at output")  # it is known by now
+    assert session.soft is None
+    list(session.judged("direct"))
+    assert session.row("direct").worst_case == CASES
+    session.undo()
+    session.undo()
+    assert session.soft == session.machine.replace(stiffness=soft.stiffness, damping=soft.damping)
+    session.take(Drive.load("crane-4amtkf"))
+    assert session.possible is session.machine  # of which nothing is unknown
+
+
+def test_a_link_with_an_impossible_soft_end_is_refused():
+    content = unpacked(link_of(Session(DataSheet.from_settings(TROLLEY).possible, controllers=["direct"])))
+    for wrong in ({"stiffness": -1.0, "damping": 0.0}, {"stiffness": 1.0}, ["stiffness"], "soft", 7):
+        with pytest.raises(InputError, match="the address after #"):
+            bench_of(packed(content | {"soft": wrong}), Session().bench)
 
 
 @pytest.mark.parametrize(("time", "selected"), [("0.2 s", "ramp"), ("1 s", "direct")])

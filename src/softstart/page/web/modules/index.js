@@ -74,7 +74,7 @@ export class Instrument {
       for (const known of [state.rows, state.traces]) for (const name of known.keys()) if (!order.includes(name)) known.delete(name);
       const { shown, added, changed, selected, stamp, here, angle } = frame;
       const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
-      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference });
+      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference, soft: frame.soft });
       this.plotted = false;
       this.steps.show(frame.steps);
       this.controls.build(frame);

@@ -7,6 +7,7 @@ const COLUMNS = [
   ["name", "strategy", "", null, "Names in their alphabetical order"],
   ["k_dyn", "K", "dyn", (row) => fixed(row.k_dyn, 3), "Peak of the shaft torque over its mean while the drive accelerates"],
   ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3), "K when wear has made the gap four times as wide, and the controller is as it was"],
+  ["soft", "K 3 Hz", "", (row) => fixed(row.soft, 3), "K at an elastic frequency of 3 Hz, the soft end of a stiffness that no data sheet tells; the controller is set up for 30 Hz"],
   ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
   ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
   ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed"],
@@ -41,6 +42,7 @@ export class Table {
     this.state = state;
     this.arrange(state);
     this.compare(state.reference);
+    this.body.parentNode.classList.toggle("ends", Boolean(state.soft));
     const largest = Math.max(2, ...[...state.rows.values()].map((row) => row.k_dyn ?? 0));
     for (const name of state.order) {
       const line = this.lines.get(name);
