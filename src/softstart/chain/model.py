@@ -41,6 +41,7 @@ from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import ABSENT, object_of, read_text, refusal_of
+from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameters import Wording, read_values, sentences_of
 from softstart.quantities import RefusedError, nearest, show
 
@@ -235,10 +236,7 @@ class Chain(Words):
 
     def gear_with(self, **given: object) -> str:
         """Why nothing is "at output", as `Drive.gear_with`."""
-        return (
-            'the gears of a chain are in its shafts, so that it has no one output; leave out "at output", '
-            "and write the value at the motor shaft, or that of one shaft at its own side, as shaft[2].gap"
-        )
+        return NO_OUTPUT
 
     def speed_ratios(self, reference: str | int = "motor") -> tuple[float, ...]:
         """The speed of each mass's shaft over that of the reference: `i` of [R], table 1.

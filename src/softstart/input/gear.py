@@ -10,7 +10,7 @@ import numpy as np
 
 from softstart.quantities import RefusedError
 
-__all__ = ["BEHIND", "NO_GEAR", "OWN_SIDE", "Gear", "alike"]
+__all__ = ["BEHIND", "NO_GEAR", "NO_OUTPUT", "OWN_SIDE", "Gear", "alike"]
 
 BEHIND = re.compile(r"(.*\S)\s+at\s+(?:the\s+)?output(?:\s+shaft)?\s*", re.IGNORECASE)  # "9 arcmin at output"
 _MULTIPLE = re.compile(r".*(x|J1)\s*", re.IGNORECASE)
@@ -18,6 +18,10 @@ NO_GEAR = 'without gear.ratio nothing is "at output"; give it, or write the valu
 OWN_SIDE = (
     'a shaft of a chain has its values on the side of its gear that `side` names; leave out "at output", '
     'and write side = "before" or "after"'
+)
+NO_OUTPUT = (
+    'the gears of a chain are in its shafts, so that it has no one output; leave out "at output", and write '
+    "the value at the motor shaft, or that of one shaft at its own side, as shaft[2].gap"
 )
 # exponents of the ratio i and of the efficiency eta in what a value at the output is over that at the motor
 POWERS = {

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import Machine, listed_of, quantity_of
+from softstart.chain.machines import Machine, listed_of, quantity_of, varied
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
@@ -228,8 +228,12 @@ def scenarios_of(
     return ({}, *(dict(zip(levels, one, strict=True)) for one in combined))
 
 
-def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
+def scenarios_drawn(
+    drive: Drive, drawn: Records | Drive, scenarios: Sequence[Scenario]
+) -> tuple[Scenario, ...]:
     """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
+
+    A single one, that of the soft end of an unknown stiffness, is under each of them, as the drive itself is.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> from softstart import records
@@ -237,10 +241,14 @@ def scenarios_drawn(drive: Drive, drawn: Records, scenarios: Sequence[Scenario])
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """
     own = drive.values()
+    found: list[Scenario] = [{}]
+    if isinstance(drawn, Drive):
+        found = [*scenarios]
+        there = {name: np.full(len(scenarios), getattr(drawn, name)) for name in ("stiffness", "damping")}
+        drawn = varied(drive, there)
     moved = {name: values for name, values in drawn.fields.items() if np.any(values != own[name])}
     if both := sorted(set(moved) & {name for one in scenarios for name in one}):
         raise InputError(f"tolerances: {both[0]} has an interval of its own already; leave it out.")
-    found: list[Scenario] = [{}]
     for k in range(len(drawn)):
         levels = {name: Level(float(values[k]) / float(own[name]), 0.0) for name, values in moved.items()}
         found.append({**scenarios[k % len(scenarios)], **levels})

@@ -7,9 +7,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from softstart.chain.machines import MachineLike, one_machine, varied
+from softstart.chain.machines import MachineLike, one_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
@@ -169,12 +167,8 @@ def tune(
             check_whole(number, name, least)
     with wrong.noted():
         scenarios = scenarios_of(drive, tolerances, 0 if wrong.sentences else seed)
-        if drawn is not None:
-            scenarios = scenarios_drawn(known, drawn, scenarios)
-        if soft is not None:  # each of them at either end
-            there = {"stiffness": soft.stiffness, "damping": soft.damping}
-            ends = varied(known, {name: np.full(len(scenarios), one) for name, one in there.items()})
-            scenarios += scenarios_drawn(known, ends, scenarios)[1:]
+        if others := drawn or soft:
+            scenarios = scenarios_drawn(known, others, scenarios)
     with wrong.noted():
         recipe = recipe_of(controller, parameters)
         ranges = ranges_of(recipe.make(), free)
