@@ -44,6 +44,19 @@ def test_a_start_exactly_at_its_limits_keeps_them() -> None:
             assert simulate([limited], "direct").keeps_limits.item() == keeps, (name, factor)
 
 
+def test_a_start_that_does_not_finish_keeps_no_limit() -> None:
+    """Too weak for its load, ended too early, given up: whatever is permitted, as there is no start time."""
+    able = CRANE.replace(permissible_torque=1e9, permissible_start_time=1e9)
+    weak = make_controller("ramp", {"full_torque": np.array([0.9 * CRANE.Mc, CRANE.Ms])})
+    runs: list[Any] = [simulate([able, able], weak), simulate([able], "direct", until=0.1)]
+    runs.append(simulate([able], "direct", max_events=3))
+    assert np.concatenate([run.status.values for run in runs]).tolist() == [
+        "NOT_REACHED", "REACHED", "STOPPED_EARLY", "TOO_MANY_EVENTS"
+    ]  # fmt: skip
+    assert np.concatenate([run.keeps_limits.values for run in runs]).tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert np.concatenate([np.isnan(run.margin.values) for run in runs]).tolist() == [True, False, True, True]
+
+
 def test_comparison_rows_are_the_single_starts() -> None:
     table = compare(
         CRANE, ["direct", "reduced-two-stage"], parameters={"reduced-two-stage": {"torque": 15.5}}

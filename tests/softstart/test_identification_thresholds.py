@@ -21,6 +21,7 @@ from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
 from softstart.identification.solving import (
     _check_inertia,
+    _correlations,
     _effects,
     _other_scale,
     _slow_torque,
@@ -71,6 +72,28 @@ def test_intervals_of_a_straight_line_are_those_of_student(count: int, width: in
     deviations = size * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     assert fitter.halves(best) == pytest.approx(quantile * deviations, rel=0.02)  # sizes in steps of 10 %
     assert np.sqrt(np.diag(fitter.covariance(best))) == pytest.approx(deviations, rel=1e-3)
+
+
+def test_correlations_are_those_of_the_values() -> None:
+    """Of v(x) to first order: D (J'V^-1 J + W)^-1 D, where a position falls as its number rises."""
+    size, x = 0.7, np.array([0.9, 0.2, 0.6])
+    fitter, best = line(12, 3, size)
+    unknowns = [
+        Unknown("gap", "power", 0.9, 0.0, 9.0, 0.3, power=0.5),
+        Unknown("stiffness", "logarithm", 0.2, -9.0, 9.0),
+        Unknown("position", "position", 0.6, 0.0, 1.0, log=0),
+    ]  # fmt: skip
+    # as little as the samples tell, what is known beforehand counts
+    jacobian = best.spots[0].jacobian
+    covariance = np.linalg.inv(jacobian.T @ jacobian / size**2 + np.diag([one.weight for one in unknowns]))
+    ends = [[one.value(at + step) for one, at in zip(unknowns, x, strict=True)] for step in (-1e-6, 1e-6)]
+    slopes = np.diff(ends, axis=0)[0] / 2e-6
+    of_values = covariance * np.outer(slopes, slopes)
+    deviations = np.sqrt(np.diag(of_values))
+    expected = of_values / np.outer(deviations, deviations)
+    found = _correlations(replace(fitter, unknowns=unknowns), best._replace(x=x))
+    assert found == pytest.approx(expected, rel=1e-6)
+    assert np.sign(found[2, :2]).tolist() == (-np.sign(covariance[2, :2])).tolist()
 
 
 def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
@@ -207,6 +230,19 @@ def test_an_effect_of_four_deviations_is_named_with_its_size(deviations: float, 
         turned = replace(fitter, models=[replace(fitter.models[0], log=log.changed(sign=-1.0))])
         # of a log that was turned round the signal has the other sign
         assert f"of {-size:.3g} +-" in _effects(turned, point._replace(spots=(left,)))[0]
+
+
+@pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
+def test_a_fit_that_another_step_makes_better_by_four_is_none(gain: float, named: bool) -> None:
+    """What is left is a multiple of the first derivative: a step along it gains its whole square."""
+    log = made_up_log(TRUTH, REVERSE, log_period=16e-3, ripple=1.0, seed=4)
+    fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
+    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0)))
+    spot, derivative = point.spots[0], point.white[1][:, 0]
+    root = np.sqrt(spot.variance(point.sizes))
+    left = spot._replace(residual=math.sqrt(gain) * derivative / np.linalg.norm(derivative) * root)
+    notes = misfits(fitter, point._replace(spots=(left,), drift=np.zeros(x.size)))
+    assert any("The fit would be better" in note for note in notes) == named
 
 
 def test_the_chance_of_correlations_is_that_of_ljung_and_box() -> None:

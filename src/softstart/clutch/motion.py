@@ -167,15 +167,13 @@ def event_functions(clutch: Clutch, step: Step) -> Iterator[tuple[str, Vector]]:
         yield "synchronous", mode.slip * _less(step.wM, clutch.drive_speed)
     if half and mode.presses:
         yield "open", -mode.side * step.T
-    elif half:
-        if mode.side != 1:
-            yield "contact+", _less(step.theta, half)
-        if mode.side != -1:
-            yield "contact-", _less(-step.theta, half)
-        if mode.side:
-            inside = _less(mode.side * step.theta, half)
-            yield "free", -inside
-            yield "pressed", clutch.stiffness * inside + clutch.damping * mode.side * step.v
+    elif half and not mode.side:
+        yield "contact+", _less(step.theta, half)
+        yield "contact-", _less(-step.theta, half)
+    elif half:  # the way to the other flank leads through "free"
+        inside = _less(mode.side * step.theta, half)
+        yield "free", -inside
+        yield "pressed", clutch.stiffness * inside + clutch.damping * mode.side * step.v
     if mode.load:
         yield "load stops", -mode.load * step.wc
     elif mode.load == 0:

@@ -70,6 +70,31 @@ def test_a_stiff_shaft_slips_as_long_as_a_rigid_one(law):
     assert errors[1] < errors[0] + 1e-12
 
 
+@pytest.mark.parametrize(
+    ("Ic", "Mc", "stiffness", "speed", "gap", "rises"),
+    [(0.1, 5.0, 65.6, 48.0, 15.24, 0.8), (1.0, 10.0, 191.4, 36.0, 0.26, 0.5)],
+)
+def test_a_run_with_a_gap_lasts_until_the_peak_of_the_locked_cycle(Ic, Mc, stiffness, speed, gap, rises):
+    """Locked and without damping E = Ic v^2/2 + cp z^2/2 - Mc theta stays: at the driving flank's peak v = 0.
+
+    At lock-up the twist falls; the peak comes after it has turned at the far side and crossed the gap again.
+    """
+    run = engage(
+        Clutch(
+            clutch_inertia=0.2, load_inertia=Ic, clutch_torque=100.0, load_torque=Mc,
+            stiffness=stiffness, drive_speed=speed, engagement_time=rises, gap=gap,
+        )
+    )  # fmt: skip
+    locked = run.at(run.slip_time)
+    theta, v = float(locked["theta"][0]), speed - float(locked["wc"][0])
+    assert v < 0.0
+    inside = max(theta - 0.5 * gap, 0.0)
+    energy = 0.5 * Ic * v**2 + 0.5 * stiffness * inside**2 - Mc * theta
+    peak = Mc + math.sqrt(Mc**2 + 2.0 * stiffness * (energy + 0.5 * Mc * gap))
+    assert [event.name for event in run.events].count("locked") == 1
+    assert run.locked_peak_torque == pytest.approx(peak, rel=1e-10)
+
+
 def test_units_and_scales():
     in_si = Clutch(
         clutch_inertia=0.980665, clutch_torque=588.399, drive_speed=230.0, engagement_time=1.0,

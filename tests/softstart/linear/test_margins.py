@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI
 
 from softstart import Command, PlainController, linear_view
-from softstart.linear.loop import margins
+from softstart.linear.loop import Loop, margins
 from softstart.linear.systems import System
 
 
@@ -60,6 +60,28 @@ def test_no_crossing_of_a_narrow_resonance_or_notch_is_missed(angle):
         found = [one.frequency for one in margins(loop, 1.0).gain_crossovers]
         assert len(found) == 2
         assert found == pytest.approx(pair(r, angle, k), rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.0, 2.5])
+def test_no_crossing_of_a_notch_beside_a_resonance_is_missed(angle):
+    """L = k (z - q)(z - q*)/((z - p)(z - p*)): above 1 at the pole and far away, below it about the zero.
+
+    |z - r e^(ia)|^2 |z - r e^(-ia)|^2 is quadratic in cos w, so the four crossings are those of a quadratic.
+    """
+    k, r, apart = 1.5, 1.0 - 1e-4, 2e-4
+
+    def squared(at):
+        a, b = 1.0 + r * r, r * math.cos(at)
+        return np.array([4.0 * r * r, -4.0 * a * b, a * a - 2.0 * r * r + 2.0 * r * r * math.cos(2.0 * at)])
+
+    pole, zero = angle, angle + apart
+    expected = sorted(map(math.acos, np.roots(k**2 * squared(zero) - squared(pole))))
+    p, q = ([1.0, -2.0 * r * math.cos(at), r * r] for at in (pole, zero))
+    C = [[k * (q[1] - p[1]), k * (q[2] - p[2])]]
+    A, B = [[-p[1], -p[2]], [1.0, 0.0]], [[1.0], [0.0]]
+    loop = System(np.array(A), np.array(B), np.array(C), np.array([[k]]))
+    found = [one.frequency for one in margins(loop, 1.0).gain_crossovers]
+    assert found == pytest.approx(expected, rel=1e-7)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -143,3 +165,24 @@ def test_no_delay_below_the_margin_does_harm_where_the_loop_jumps():
     for delay in inside:
         assert np.max(np.abs(closed_poles(view.loop.broken_delayed(delay)))) < 1.0
     assert np.max(np.abs(closed_poles(view.loop.broken_delayed(margin * (1 + 1e-6))))) > 1.0 - 1e-9
+
+
+class Known(Loop):
+    """L = 0.5/(z - 1), whose crossover bears 2.6 samples more; the largest pole is of a known size."""
+
+    period, stable, rotation = 1.0, True, 0.0
+
+    def __init__(self, middle, width):
+        object.__setattr__(self, "size", lambda delay: 1.0 + (0.5 * width) ** 2 - (delay - middle) ** 2)
+
+    def broken_delayed(self, delay):
+        return System(*(np.array([[v]]) for v in (1.0, 1.0, 0.5, 0.0)))
+
+    def closed(self, delay=0.0):
+        return np.array([[-max(self.size(delay), 0.0)]]), np.ones(1), np.ones((2, 1))
+
+
+@pytest.mark.parametrize("place", np.linspace(2.0, 3.0, 23).tolist())
+def test_a_delay_that_does_harm_for_a_twentieth_of_a_sample_is_the_margin(place):
+    """Between two parabola's zeros, wherever in a sample."""
+    assert Known(place, 0.05).delay_margin == pytest.approx((place - 0.025, math.pi), rel=1e-7)
