@@ -377,7 +377,7 @@ def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> R
         )
     text = (
         f"Pareto-optimal in K_dyn and settled time: {'; '.join(parts)}. "
-        f"For a recommendation, give {drive.LIMITS_GIVEN}."
+        f"Give {drive.LIMITS_GIVEN} for a recommendation."
     )
     return Recommendation(text, None, best, limits)
 

@@ -55,7 +55,9 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     assert choice.role == "gentlest unbeaten"
     assert choice.worst(choice.ordinary) == min(choice.maps[name].worst for name in ("ramp", "s-curve"))
     assert hostile.answer.startswith(for_customer(said.text))
-    assert said.text.endswith("give [limits] in the drive file.")  # which is for the author
+    assert said.text.endswith(
+        "Give [limits] in the drive file for a recommendation."
+    )  # which is for the author
     assert "[limits]" not in hostile.answer
     page = Page(hostile.to_html()).text
     assert "no limits, so nothing says which peak is low enough" in page
