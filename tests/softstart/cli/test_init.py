@@ -143,18 +143,18 @@ def test_a_file_that_is_not_of_answers_is_left_alone(run, typed, place):
 
 @pytest.mark.slow  # a process of its own
 def test_an_interrupt_loses_nothing(place):
-    dialog = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "softstart", "init", "--ask", "--out", "mine.toml"], cwd=place, text=True,
         stdin=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    dialog.stdin.write("\n".join(ANSWERS[:6]) + "\n")
-    dialog.stdin.flush()
-    said = ""
-    while "brake, fan and coupling" not in said and dialog.poll() is None:
-        said += dialog.stderr.read(1)
-    dialog.send_signal(signal.SIGINT)
-    said += dialog.stderr.read()  # what the reader holds already too; `communicate` would lose that
-    assert dialog.wait(timeout=120) == 130
+    ) as dialog:  # fmt: skip
+        dialog.stdin.write("\n".join(ANSWERS[:6]) + "\n")
+        dialog.stdin.flush()
+        said = ""
+        while "brake, fan and coupling" not in said and dialog.poll() is None:
+            said += dialog.stderr.read(1)
+        dialog.send_signal(signal.SIGINT)
+        said += dialog.stderr.read()  # what the reader holds already too; `communicate` would lose that
+        assert dialog.wait(timeout=120) == 130
     assert "what was answered is kept in mine.sheet.toml; the same command goes on from there" in said
     assert 'inertia = "0.0119 kg*m^2"' in (place / "mine.sheet.toml").read_text()
 
