@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record, size
 from softstart.drive import Drive
 from softstart_controllers.reduced import (
     closing_speed,
@@ -45,7 +45,7 @@ class Parameters:
     stride: float
     threshold: float
     wait: float
-    patience: float
+    contact_timeout: float
 
 
 class State:
@@ -62,16 +62,16 @@ class State:
 
 PARAMETERS = record(Parameters)
 STATE = record(State, ring=RING)
-COMMAND = record(Answer, State, ring=RING)
+COMMAND = record(Reply, State, ring=RING)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The angle lost against a free motor, its second difference, and the wait after contact."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    x = named(state, STATE)
-    y = named(command, COMMAND)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    x = as_record(state, STATE)
+    y = as_record(command, COMMAND)
     keep_state(state, command)
     t, u = m.time, m.motor_torque
     sample = int(x.sample)
@@ -94,7 +94,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
             y.ring[kept % RING] = lost
             if x.raise_at == math.inf and lost - 2.0 * middle + oldest > p.threshold:
                 y.raise_at = t + p.wait
-        if y.raise_at == math.inf and t >= p.patience:
+        if y.raise_at == math.inf and t >= p.contact_timeout:
             y.raise_at = t
     waiting = t + 0.5 * p.period < y.raise_at
     y.torque = p.torque if waiting else p.full_torque
@@ -129,7 +129,7 @@ class AccelerationDelay(CompiledController):
     looks at it. Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
     at the nearest sample. Damping is left out of both, as in [G].
 
-    Contact that is not seen within `patience` (a load that shares next to nothing of the torque, an encoder
+    Contact that is not seen within `contact_timeout` (a load that takes little of the torque, an encoder
     too coarse) is waited for no longer: the torque is raised then.
 
     The torque is raised while the shaft carries the most, so that the gap stays closed (`raise_at` "peak").
@@ -178,7 +178,7 @@ class AccelerationDelay(CompiledController):
         value=lambda drive, p: detection_latency(drive, p.torque, p.drop, p.period),
         rule="0 or more",
     )
-    patience: float | None = patience_parameter("longest wait for contact")
+    contact_timeout: float | None = patience_parameter("longest wait for contact")
     period: float | None = period_parameter()
     raise_at: str | None = raise_parameter()
 

@@ -2,14 +2,15 @@
 
 *Free.* While the gap is open a Kalman filter follows phi1, w1 and 1/J1 of the free motor, some samples
 behind. Contact is seen when the encoder is behind the motion that this filter foretells for now by more than
-`certainty` standard deviations; since the filter stays behind, it has not yet seen the contact. The way lost
+`detection_threshold` standard deviations; since the filter stays behind, it has not yet seen the contact. The
+way lost
 grows with the cube of the time since contact, a c v s^3/6 with a = 1/J1: that tells the time s.
 
 *In contact.* An extended Kalman filter of (phi1, w1, z, w2, 1/J2) begins at that instant, z being the twist
 beyond the gap, and sees the samples since then, afterwards each new one. The gap is open again once z < 0 and
 the flanks part; then the free motor is followed again, from what is known of motor and load by now.
 
-`observe` does all of it in one call a sample; `watching` has its numbers for a drive.
+`observe` does all of it in one call a sample; `estimator_parameters` has its numbers for a drive.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from softstart_controllers.shaft_filter import (
     SHAFT,
     Free,
     N,
-    Shaft,
+    ShaftEstimate,
     copy,
     free_predict,
     free_update,
-    move,
+    predicted_motion,
     shaft_predict,
     shaft_update,
 )  # fmt: skip
@@ -55,7 +56,7 @@ NOTHING, CONTACT, OPENED, PUSHED = 0, 1, 2, 3  # what a sample may show
 
 
 class Parameters:
-    """What `watching` gives; a = 1/J1 and b = 1/J2, with the variance of what is thought of them.
+    """What `estimator_parameters` gives; a = 1/J1 and b = 1/J2, with the variance of what is thought of them.
 
     Mc and Mb are the load torque in forward and in backward motion (`load_acceleration`).
     """
@@ -74,7 +75,7 @@ class Parameters:
     b_most: float
     samples: float
     rounding: float
-    certainty: float
+    detection_threshold: float
     free_noise: float
     speed_noise: float
     twist_noise: float
@@ -111,11 +112,11 @@ class State:
     held: float
     free: Free
     now: Free
-    shaft: Shaft
+    shaft: ShaftEstimate
     angles: Vector  # of the samples that `free` has not seen yet
     means: Vector
     leads: Vector
-    doubts: Vector
+    plausibility_warnings: Vector
     sent: Vector
 
 
@@ -125,14 +126,14 @@ PARAMETERS, STATE = record(Parameters), record(State, **PARTS)
 
 
 @compiled
-def lead(before: float, after: float, demand: float, mean: float) -> float:
+def torque_lead(before: float, after: float, demand: float, mean: float) -> float:
     """How much earlier than its mean the torque of a sample acts: (int int u)/h^2 - mean/2, in N m.
 
     `before` and `after` are the torques measured at its ends, `demand` the constant demand in it, which the
     torque follows exponentially. With x = ln(b/a), b = demand - before, a = demand - after it is
     int int u = h^2 (demand/2 - b/x + (b - a)/x^2). A fast torque has none: it is at its demand.
 
-    >>> lead(0.0, 0.0, 0.0, 0.0), round(lead(10.0, 9.99, 0.0, 9.995), 6), round(0.01 / 12, 6)
+    >>> torque_lead(0.0, 0.0, 0.0, 0.0), round(torque_lead(10.0, 9.99, 0.0, 9.995), 6), round(0.01 / 12, 6)
     (0.0, 0.000833, 0.000833)
     """
     b = demand - before
@@ -160,7 +161,7 @@ def mean_of_ramp(before: float, after: float, reach: float) -> float:
 
 @compiled
 def lead_of_ramp(before: float, after: float, reach: float) -> float:
-    """How much earlier than its mean that torque acts, as `lead`, in N m.
+    """How much earlier than its mean that torque acts, as `torque_lead`, in N m.
 
     >>> round(lead_of_ramp(40.0, 20.0, 20.0) * 12.0, 9), round(lead_of_ramp(10.0, 0.0, 20.0) * 12.0, 9)
     (20.0, 10.0)
@@ -218,13 +219,15 @@ def state_after_contact(
     torque u.
     """
     rolling = pull * s if drift != 0.0 else 0.0
-    way, w1, z, load = move(speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, Mb)
+    way, w1, z, load = predicted_motion(
+        speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, Mb
+    )
     return angle - s * (speed - 0.5 * a * u * s) + way, w1, z, load, b
 
 
 @compiled
 def begin_shaft(
-    x: Shaft, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
+    x: ShaftEstimate, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
     drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, Mb: float,
     pull: float,
 ) -> None:  # fmt: skip
@@ -273,18 +276,18 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float
     h = p.period
     kept = int(m.kept)
     if kept == int(p.samples):
-        free_predict(m.free, m.means[0], m.leads[0], h, p.free_noise + m.doubts[0])
+        free_predict(m.free, m.means[0], m.leads[0], h, p.free_noise + m.plausibility_warnings[0])
         free_update(m.free, m.angles[0], p.rounding)
         kept -= 1
         for i in range(kept):
             m.angles[i] = m.angles[i + 1]
             m.means[i] = m.means[i + 1]
             m.leads[i] = m.leads[i + 1]
-            m.doubts[i] = m.doubts[i + 1]
+            m.plausibility_warnings[i] = m.plausibility_warnings[i + 1]
     m.angles[kept] = angle
     m.means[kept] = mean
     m.leads[kept] = early
-    m.doubts[kept] = doubt
+    m.plausibility_warnings[kept] = doubt
     m.kept = kept + 1.0
     free_after(p, m, kept + 1)
 
@@ -294,7 +297,7 @@ def free_after(p: Parameters, m: State, samples: int) -> None:
     """The free motor so many samples after the filter."""
     copy(m.free, m.now)
     for i in range(samples):
-        noise = p.free_noise + m.doubts[i]
+        noise = p.free_noise + m.plausibility_warnings[i]
         free_predict(m.now, m.means[i], m.leads[i], p.period, noise)
 
 
@@ -303,7 +306,7 @@ def margin(p: Parameters, m: State) -> float:
     """Angle in rad by which the encoder must differ from the free motor to mean a contact."""
     by_inertia = m.now.p02 * m.now.p02 / m.now.p22 if m.now.p22 > 0.0 else 0.0
     rest = max(m.now.p00 - by_inertia, 0.0) + p.rounding
-    return p.certainty * math.sqrt(rest) + J1_CERTAINTY * math.sqrt(by_inertia)
+    return p.detection_threshold * math.sqrt(rest) + J1_CERTAINTY * math.sqrt(by_inertia)
 
 
 @inner
@@ -326,7 +329,9 @@ def drift_since(p: Parameters, m: State, t: float) -> float:
 
 
 @inner
-def follow(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
+def update_shaft_filter(
+    p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float
+) -> None:
     """The filter of the shaft goes on a sample."""
     h, a = p.period, m.free.inverse
     speed = a * h * p.speed_noise
@@ -382,7 +387,7 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     first = kept - again
     shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
     for i in range(first, kept):
-        follow(p, m, m.angles[i], m.means[i], m.leads[i], m.doubts[i])
+        update_shaft_filter(p, m, m.angles[i], m.means[i], m.leads[i], m.plausibility_warnings[i])
 
 
 @inner
@@ -402,7 +407,7 @@ def opened(m: State, t: float) -> None:
 
 
 @inner
-def begin(p: Parameters, m: State, angle: float, speed: float) -> None:
+def begin_estimate(p: Parameters, m: State, angle: float, speed: float) -> None:
     """The first sample; a load that hangs in the wound-up shaft is in contact from then on."""
     m.begun = 1.0
     m.free.angle, m.free.speed, m.free.inverse = angle, speed, p.a
@@ -424,7 +429,7 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
     as a motor that is ahead of the free one. While `held` the brake holds the motor of a hanging load.
     """
     if m.begun == 0.0:
-        begin(p, m, angle, speed)
+        begin_estimate(p, m, angle, speed)
         return NOTHING if m.closed == 0.0 else CONTACT
     if m.held != 0.0:
         if t >= p.released and u >= p.proving:  # some time in this sample the brake let the motor go
@@ -442,7 +447,7 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
         before = older + (before - older) * (math.exp(-p.rest / p.lag) if p.lag > 0.0 else 0.0)
         m.mean = share * mean_torque(m.realised, before, older)
     m.mean += (1.0 - share) * mean_torque(before, u, newest)
-    early = lead(before, u, newest, m.mean)
+    early = torque_lead(before, u, newest, m.mean)
     doubt = 0.0
     if p.rate > 0.0:  # slewed, lagged or both: one sample does not tell, and the truth may lie outside
         line = mean_of_ramp(m.realised, u, p.rate * p.period)
@@ -450,7 +455,7 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
         if p.slew > 0.0:
             m.mean, early = line, lead_of_ramp(m.realised, u, p.rate * p.period)
     if m.closed != 0.0:
-        follow(p, m, angle, m.mean, early, doubt)
+        update_shaft_filter(p, m, angle, m.mean, early, doubt)
         if m.shaft.z < 0.0 and m.shaft.w1 < m.shaft.w2:
             opened(m, t)
             m.closed = 0.0
@@ -476,7 +481,7 @@ def send(p: Parameters, m: State, demand: float, u: float) -> None:
 
 
 @compiled
-def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float]:
+def predicted_state(p: Parameters, m: State, u: float) -> tuple[float, float, float, float]:
     """w1, z, w2 and motor torque when a demand made now begins to act; until then those sent before do."""
     w1, z, w2 = m.shaft.w1, m.shaft.z, m.shaft.w2
     length = p.rest
@@ -492,13 +497,13 @@ def ahead(p: Parameters, m: State, u: float) -> tuple[float, float, float, float
                 left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
                 mean = demand + (u - demand) * (1.0 - left) * p.lag / length
                 u = demand + (u - demand) * left
-            _, w1, z, w2 = move(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.Mb)
+            _, w1, z, w2 = predicted_motion(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.Mb)
         length = p.period
     return w1, z, w2, u
 
 
 def certainty_parameter() -> Any:
-    """`certainty` as a field of a controller."""
+    """`detection_threshold` as a field of a controller."""
     return parameter(
         "1",
         "standard deviations of the motor's angle that mean contact",
@@ -521,23 +526,23 @@ def uncertainty_parameter() -> Any:
     )
 
 
-def watching(
+def estimator_parameters(
     drive: Drive, p: Any, speed: float, inertia_ratio: float | None = None, deviation: float = RATIO_DEVIATION
 ) -> dict[str, float]:
     """The numbers of `Parameters`, for flanks that meet at `speed` in rad/s.
 
-    p has the parameters `period`, `certainty` and `uncertainty`. J2/J1 is thought to be `inertia_ratio`, or
+    p has the parameters `period`, `detection_threshold` and `uncertainty`. J2/J1 is `inertia_ratio`, or
     that of the drive, with this standard deviation as a share. A drive whose load hangs in the wound-up shaft
     is in contact from the first sample on, unless the inertia ratio is given.
     """
     wound, proving, released = hanging(drive) if inertia_ratio is None else (0.0, 0.0, 0.0)
-    period, certainty = p.period, p.certainty
+    period, detection_threshold = p.period, p.detection_threshold
     a, rate = 1.0 / drive.J1, drive.torque_rate
     queued = min(math.floor(drive.computing_delay / period + 1e-9), QUEUE - 2)
     rest = min(max(drive.computing_delay - queued * period, 0.0), period)
     ratio, noise = 1.0 / (inertia_ratio or drive.J2 / drive.J1), drive.torque_noise
     free = a * period * math.hypot(TORQUE_DEVIATION * drive.Ms, noise)
-    delay, slewing = lateness(drive)
+    delay, slewing = torque_delay(drive)
     rounding = encoder_count(drive) ** 2 / 12.0 + (FLOOR * drive.Ms / drive.c) ** 2
     return {
         "period": period,
@@ -552,9 +557,9 @@ def watching(
         "b_variance": (deviation * ratio * a) ** 2,
         "b_least": min(LEAST_RATIO, 0.3 * ratio) * a,
         "b_most": max(MOST_RATIO, 3.0 * ratio) * a,
-        "samples": _samples(drive, speed, rounding, certainty, delay, period),
+        "samples": _samples(drive, speed, rounding, detection_threshold, delay, period),
         "rounding": rounding,
-        "certainty": certainty,
+        "detection_threshold": detection_threshold,
         "free_noise": free**2,
         "speed_noise": math.hypot(SHAFT_DEVIATION * drive.Ms, noise),
         "twist_noise": p.uncertainty,
@@ -589,29 +594,31 @@ def hanging(drive: Drive) -> tuple[float, float, float]:
     return T / drive.c, 0.0, drive.release_time
 
 
-def blind(drive: Drive, coarse: float, slow: float = math.inf) -> bool:
+def contact_undetectable(drive: Drive, coarse: float, slow: float = math.inf) -> bool:
     """Whether a contact cannot be answered in time.
 
     The encoder's count is above the share `coarse` of Ms/c, or the torque (dead time, lag, half the slewing
     time to Ms) later than `slow` sqrt(J1/c).
 
-    >>> blind(Drive.load("crane-4amtkf"), 0.04, 1.3), blind(Drive.load("crane-4amtkf"), 0.002, 1.3)
+    >>> [contact_undetectable(Drive.load("crane-4amtkf"), coarse, 1.3) for coarse in (0.04, 0.002)]
     (False, True)
     """
     late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
     return encoder_count(drive) > coarse * drive.Ms / drive.c or late * math.sqrt(drive.c / drive.J1) > slow
 
 
-def lateness(drive: Drive) -> tuple[float, bool]:
+def torque_delay(drive: Drive) -> tuple[float, bool]:
     """Mean time in s by which the torque is late, and whether the rate limit makes the most of it."""
     slew, late = drive.Ms / drive.torque_rate, drive.torque_lag + drive.computing_delay
     slewing = 0.5 * slew > late
     return (late if slewing else late + 0.5 * slew), slewing
 
 
-def _samples(drive: Drive, v: float, rounding: float, certainty: float, delay: float, period: float) -> int:
+def _samples(
+    drive: Drive, v: float, rounding: float, detection_threshold: float, delay: float, period: float
+) -> int:
     """How many samples the filter of the free motor stays behind."""
-    far = 2.0 * certainty * math.sqrt(rounding)
+    far = 2.0 * detection_threshold * math.sqrt(rounding)
     coasting = math.cbrt(6.0 * far * drive.J1 / (drive.c * v))
     pulsing = (24.0 * far * drive.J1**2 / (drive.c * drive.Ms)) ** 0.25 + delay
     return min(max(math.ceil(max(coasting, pulsing) / period) + 4, 6), RING)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record, size
 from softstart.drive import Drive
 from softstart_controllers import landing
-from softstart_controllers.contact import ahead
+from softstart_controllers.contact import predicted_state
 from softstart_controllers.landing import CLOSED, ROOM, Landing, landed, sent
 from softstart_controllers.reduced import reduced_torque_parameter
 
@@ -36,20 +36,20 @@ class State:
 
 PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
 STATE = record(State, landing=landing.STATE)
-COMMAND = record(Answer, State, landing=landing.STATE)
+COMMAND = record(Reply, State, landing=landing.STATE)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Land at the approach speed; from contact on the limit rises, less the feedback of T'."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    y = named(command, COMMAND)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    y = as_record(command, COMMAND)
     keep_state(state, command)
     near, now = p.landing, y.landing
     y.torque = landed(near, now, m)
     if now.phase == CLOSED:
-        w1, _, w2, _ = ahead(near.watch, now.watch, m.motor_torque)
+        w1, _, w2, _ = predicted_state(near.watch, now.watch, m.motor_torque)
         limit = near.low_torque + (ROOM * near.full_torque - near.low_torque) * y.progress
         y.torque = min(max(limit - p.feedback * (w1 - w2), 0.0), near.full_torque)
         if now.watch.held == 0.0:  # else the limit waits for the brake
@@ -122,7 +122,7 @@ class CurrentLimitFeedback(Landing):
         "1",
         "damping ratio added by the feedback",
         "0.7 less that of the shaft, or what the delays allow, down to 0",
-        value=lambda drive, p: damping_ratio(drive, p.period),
+        value=lambda drive, p: feedback_damping(drive, p.period),
         rule="0 or more",
         between=(0.0, 1.5),
     )
@@ -134,10 +134,10 @@ class CurrentLimitFeedback(Landing):
         return super().numbers(drive) | {"feedback": feedback, "rise": p.period / max(p.rise, p.period)}
 
 
-def damping_ratio(drive: Drive, period: float) -> float:
+def feedback_damping(drive: Drive, period: float) -> float:
     """0.7 less that of the shaft, and at most what the delays allow.
 
-    >>> round(damping_ratio(Drive.load("crane-4amtkf"), 0.001), 3)
+    >>> round(feedback_damping(Drive.load("crane-4amtkf"), 0.001), 3)
     0.7
     """
     unforeseen = drive.J1 / (drive.J1 + drive.J2)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import Answer, Vector, named, record
+from softstart.controller.compiled import Reply, Vector, as_record, record
 
 
 class Parameters:
@@ -16,14 +16,14 @@ class Parameters:
     torque: float
 
 
-PARAMETERS, COMMAND = record(Parameters), record(Answer)
+PARAMETERS, COMMAND = record(Parameters), record(Reply)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """One torque, once and for all."""
-    y = named(command, COMMAND)
-    y.torque = named(parameters, PARAMETERS).torque
+    y = as_record(command, COMMAND)
+    y.torque = as_record(parameters, PARAMETERS).torque
     y.ask_again = math.inf
 
 

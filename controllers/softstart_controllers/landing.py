@@ -7,7 +7,7 @@ The motor takes up `approach_speed` relative to the load and keeps it,
 The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the
 approach speed, no further), and after a contact as estimated (`contact`). From contact on the strategy
 itself sets the torque. Where an encoder count above a tenth of Ms/c shows the contact too late, and after
-`patience`, the torque is raised in a ramp.
+`contact_timeout`, the torque is raised in a ramp.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Parameters:
     approach: float
     horizon: float
     drift: float
-    patience: float
+    contact_timeout: float
     blind: float
 
 
@@ -67,7 +67,7 @@ def landed(p: Parameters, x: State, m: Any) -> float:
     if x.phase <= CLOSED:
         contact.observe(p.watch, watch, m.time, m.motor_torque, m.motor_angle, m.motor_speed, 1.0)
         x.phase = CLOSED if watch.closed != 0.0 else GAP_OPEN
-        if p.blind != 0.0 or m.time >= p.patience:
+        if p.blind != 0.0 or m.time >= p.contact_timeout:
             x.phase = RAISING
     if x.phase == RAISING:
         return min(watch.sent[0] + p.watch.raising, p.full_torque)
@@ -130,22 +130,22 @@ class Landing(CompiledController):
         multiples=(0.3, 3.0),
     )
     full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
-    certainty: float | None = contact.certainty_parameter()
+    detection_threshold: float | None = contact.certainty_parameter()
     uncertainty: float | None = contact.uncertainty_parameter()
-    patience: float | None = patience_parameter()
+    contact_timeout: float | None = patience_parameter()
     period: float | None = period_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """The numbers of `Parameters` as `landing`."""
         p: Any = self  # fitted: every parameter is a number
         landing = {
-            "watch": contact.watching(drive, p, p.approach_speed),
+            "watch": contact.estimator_parameters(drive, p, p.approach_speed),
             "low_torque": p.low_torque,
             "full_torque": p.full_torque,
             "approach": p.approach_speed,
             "horizon": 2.0 * (p.period + drive.torque_lag + drive.computing_delay),
             "drift": load_drift(drive),
-            "patience": p.patience,
-            "blind": contact.blind(drive, COARSE) and not contact.hanging(drive)[0],
+            "contact_timeout": p.contact_timeout,
+            "blind": contact.contact_undetectable(drive, COARSE) and not contact.hanging(drive)[0],
         }
         return {"landing": landing}

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, compiled, named, record, size
+from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, compiled, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.profile import TorqueProfile
@@ -36,7 +36,7 @@ class State:
     origin: float
 
 
-PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
 N_PARAMETERS = size(PARAMETERS)
 
 
@@ -66,10 +66,10 @@ def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The line that holds now, of the first profile or of the second."""
-    p = named(parameters[:N_PARAMETERS], PARAMETERS)
-    m = named(measured, MEASURED)
-    x = named(state, STATE)
-    y = named(command, COMMAND)
+    p = as_record(parameters[:N_PARAMETERS], PARAMETERS)
+    m = as_record(measured, MEASURED)
+    x = as_record(state, STATE)
+    y = as_record(command, COMMAND)
     t = m.time
     count_after = int(p.knots_after)
     room = int(p.room)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, inner, keep_state, named, record, size
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, inner, keep_state, record, size
 from softstart.drive import Drive
 from softstart_controllers import contact
 from softstart_controllers.contact import (
@@ -15,14 +15,14 @@ from softstart_controllers.contact import (
     NOTHING,
     OPENED,
     PUSHED,
-    blind,
-    lateness,
+    contact_undetectable,
+    estimator_parameters,
     observe,
     send,
-    watching,
+    torque_delay,
 )
 from softstart_controllers.sampled import patience_parameter, period_parameter
-from softstart_controllers.shaft_filter import move
+from softstart_controllers.shaft_filter import predicted_motion
 
 SHARE_REACTIVE, SHARE_ACTIVE = 0.8, 0.7  # of the speed that makes the stuck load's shaft carry Ms
 COARSE = 0.04  # of Ms/c: with larger counts the contact is over before it is seen
@@ -47,7 +47,7 @@ class Parameters:
     delay: float
     damping_ratio: float
     stiffening: float
-    patience: float
+    contact_timeout: float
     blind: float
 
 
@@ -68,7 +68,7 @@ class State:
 
 PARAMETERS = record(Parameters, watch=contact.PARAMETERS)
 STATE = record(State, watch=contact.STATE)
-COMMAND = record(Answer, State, watch=contact.STATE)
+COMMAND = record(Reply, State, watch=contact.STATE)
 
 
 @inner
@@ -119,7 +119,7 @@ def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
     w1, z, w2 = shaft.w1, shaft.z, shaft.w2
     steps = int(m.delay / h) + 1
     for _ in range(steps):
-        _, w1, z, w2 = move(w1, z, w2, b, u, m.delay / steps, a, c, d, Mc, Mb)
+        _, w1, z, w2 = predicted_motion(w1, z, w2, b, u, m.delay / steps, a, c, d, Mc, Mb)
     rate = w1 - w2
     ratio = b / a
     square = c * (a + b)
@@ -133,7 +133,7 @@ def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
                 m.push = 0.0
             if push > 0.0:
                 return push
-        _, x1, _, x2 = move(w1, z, w2, b, 0.0, h, a, c, d, Mc, Mb)
+        _, x1, _, x2 = predicted_motion(w1, z, w2, b, 0.0, h, a, c, d, Mc, Mb)
         return min(max((x2 - x1) / (a * h), 0.0), Ms)
     full = full_load(p, ratio)
     least = p.hold_share * full
@@ -149,9 +149,9 @@ def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Pulse, coast, hold: see `PulseCoastHold`."""
-    p = named(parameters, PARAMETERS)
-    m = named(command, COMMAND)
-    seen = named(measured, MEASURED)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(command, COMMAND)
+    seen = as_record(measured, MEASURED)
     keep_state(state, command)
     watch, shaft = m.watch, m.watch.shaft
     t, u = seen.time, seen.motor_torque
@@ -177,7 +177,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
             m.openings += 1.0
             m.held_back = -m.delay * u
             phase = PULSE if m.openings <= MOST_OPENINGS else RAISE
-    if t >= p.patience and phase != RAISE:
+    if t >= p.contact_timeout and phase != RAISE:
         phase = RAISE
         m.raised = watch.sent[0]
 
@@ -211,7 +211,7 @@ class PulseCoastHold(CompiledController):
 
     It measures the motor angle (encoder) and the motor torque, every `period`. It knows the motor, the
     stiffness and damping of the shaft and the load torque; the gap, J2 and, after the first instant, the
-    speed of the load it does not. (J2 only enters the defaults of `period` and `patience`.)
+    speed of the load it does not. (J2 only enters the defaults of `period` and `contact_timeout`.)
 
     *Pulse.* Ms until the motor is `coast_speed` faster than the load, no more than that with the impulse
     which the lag still holds back: int (demand - u) dt, as measured. Its ratio to u is the mean time D by
@@ -220,7 +220,7 @@ class PulseCoastHold(CompiledController):
     K_dyn = (v sqrt(c J1)/Ms) sqrt(x (x + 1))/(x + Mc/Ms) with x = J2/J1. That hardly depends on x, and not
     at all on the gap unless the load moves. By default it is a little below 1, from J2 = 2 J1 on.
 
-    *Coast.* No torque, until the encoder is behind the free motor by `certainty` standard deviations of the
+    *Coast.* No torque, until the encoder is behind the free motor by `detection_threshold` deviations of the
     prediction and of the rounding (and 2 of 1/J1, on which the decay of the torque turns: it so is no
     contact). The prediction comes from a filter that stays some samples behind, which has not yet seen the
     contact. The way lost grows with the cube of the time since contact, a c v s^3/6 with a = 1/J1: that tells
@@ -245,7 +245,7 @@ class PulseCoastHold(CompiledController):
     *Where it cannot work* it raises the torque to Ms in four elastic periods of the motor against a held
     load: an encoder count above 4 % of Ms/c (the contact would be over before it is seen), a torque later
     than 1.3 sqrt(J1/c) (lag, dead time and half of what the rate limit takes to Ms), a load that pushes the
-    motor, a gap open for the ninth time; and, from the torque of then on, after `patience`.
+    motor, a gap open for the ninth time; and, from the torque of then on, after `contact_timeout`.
 
     Where u >= 0 cannot hold a load back (an active one in a wide gap), K_dyn rises with the gap; so does that
     of the optimum.
@@ -297,17 +297,17 @@ class PulseCoastHold(CompiledController):
     inertia_ratio: float | None = parameter(
         "1", "J2/J1 as first guessed at contact", "3", value=3.0, rule="above 0", multiples=(0.3, 4.0)
     )
-    certainty: float | None = contact.certainty_parameter()
+    detection_threshold: float | None = contact.certainty_parameter()
     uncertainty: float | None = contact.uncertainty_parameter()
-    patience: float | None = patience_parameter()
+    contact_timeout: float | None = patience_parameter()
     period: float | None = period_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Estimator, delay of the torque, rise, and whether the contact can be seen in time at all."""
         p: Any = self  # fitted: every parameter is a number
         return {
-            "watch": watching(drive, p, p.coast_speed, p.inertia_ratio, RATIO_DEVIATION),
+            "watch": estimator_parameters(drive, p, p.coast_speed, p.inertia_ratio, RATIO_DEVIATION),
             "Ms": drive.Ms,
-            "delay": lateness(drive)[0],
-            "blind": blind(drive, COARSE, SLOW),
+            "delay": torque_delay(drive)[0],
+            "blind": contact_undetectable(drive, COARSE, SLOW),
         }

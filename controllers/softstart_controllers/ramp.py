@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, named, record, size
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, record, size
 from softstart.drive import Drive
 from softstart_controllers.sampled import full_torque_parameter, period_parameter, pulling_load
 
@@ -28,16 +28,16 @@ class State:
     sample: float
 
 
-PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """A line over time, straight or with rounded ends, sampled."""
-    p = named(parameters, PARAMETERS)
-    x = named(state, STATE)
-    y = named(command, COMMAND)
-    t = named(measured, MEASURED).time
+    p = as_record(parameters, PARAMETERS)
+    x = as_record(state, STATE)
+    y = as_record(command, COMMAND)
+    t = as_record(measured, MEASURED).time
     y.sample = x.sample + 1.0
     end = 0.5 * p.rounding  # each rounded end, as a share of the time
     if t < p.time:

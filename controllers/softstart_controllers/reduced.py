@@ -15,7 +15,7 @@ from typing import Any
 from softstart import formulas
 from softstart.controller import compiled_step, parameter
 from softstart.controller.base import Rule
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
+from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import pulling_load
 
@@ -37,16 +37,16 @@ class State:
     raise_at: float
 
 
-PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
 
 
 @compiled_step
 def step_of_gap(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced until the wait after contact has passed or the gap opens again; asked at its events."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    y = named(command, COMMAND)
-    y.raise_at = named(state, STATE).raise_at
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    y = as_record(command, COMMAND)
+    y.raise_at = as_record(state, STATE).raise_at
     if m.stage >= 2.0 and y.raise_at == 0.0:
         y.raise_at = m.time + p.wait
     waiting = m.stage < 2.0 or (m.stage < 3.0 and m.time < y.raise_at)

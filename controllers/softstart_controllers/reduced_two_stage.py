@@ -32,7 +32,7 @@ class ReducedTwoStage(CompiledController):
     does into the first. The K_dyn of the whole start is therefore that of method 1; the one of [G](18) is
     `run.k_dyn_first_contact`.
 
-    Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `patience` after
+    Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `contact_timeout` after
     contact.
 
     >>> from softstart import Drive, simulate
@@ -51,7 +51,7 @@ class ReducedTwoStage(CompiledController):
 
     torque: float | None = reduced_torque_parameter("reduced torque of stages 1 and 2")
     full_torque: float | None = full_torque_parameter("torque from stage 3 on")
-    patience: float | None = parameter(
+    contact_timeout: float | None = parameter(
         "s",
         "longest wait after contact",
         "two elastic periods; an undamped stage 2 lasts less than one",
@@ -61,8 +61,8 @@ class ReducedTwoStage(CompiledController):
     raise_at: str | None = raise_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
-        """The wait: until the torque peak, or until the gap opens, at most `patience`."""
-        wait: Any = self.patience
+        """The wait: until the torque peak, or until the gap opens, at most `contact_timeout`."""
+        wait: Any = self.contact_timeout
         if self.raise_at == "peak":
             wait = min(delay_of(drive, self.torque, "peak"), wait)
         return {"wait": wait}

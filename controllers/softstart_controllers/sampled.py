@@ -39,13 +39,13 @@ def period_parameter() -> Any:
 
 
 def patience_parameter(meaning: str = "latest instant for the feedback to act") -> Any:
-    """`patience` as a field of a controller."""
+    """`contact_timeout` as a field of a controller."""
     return parameter(
         "s",
         meaning,
         "50 elastic periods and the time a drive without gap needs to its target speed on 15 % of its "
         "accelerating torque",
-        value=lambda drive, p: patience(drive),
+        value=lambda drive, p: contact_timeout(drive),
         rule="0 or more",
     )
 
@@ -80,13 +80,13 @@ def pulling_load(drive: Drive) -> float:
     return max(drive.Mc, 0.0)
 
 
-def patience(drive: Drive) -> float:
+def contact_timeout(drive: Drive) -> float:
     """How long in s a controller waits for a contact it cannot see, before it goes on without.
 
     (J1 + J2)(target - w2(0))/(0.15 (Ms - max(0, Mc))) + 50 elastic periods: far beyond any sound start, so
     that it does not act as a timer, and yet no start waits indefinitely.
 
-    >>> round(patience(Drive.load("crane-4amtkf")), 2)
+    >>> round(contact_timeout(Drive.load("crane-4amtkf")), 2)
     5.15
     """
     push = SHARE_OF_PATIENCE * (drive.Ms - pulling_load(drive))

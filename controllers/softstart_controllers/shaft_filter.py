@@ -29,7 +29,7 @@ class Free:
     p22: float
 
 
-class Shaft:
+class ShaftEstimate:
     """The shaft in contact: phi1, w1, z (twist beyond the gap), w2, b = 1/J2; P is their covariance.
 
     F and G are matrices to work in.
@@ -45,7 +45,7 @@ class Shaft:
     G: Matrix
 
 
-FREE, SHAFT = record(Free), record(Shaft, P=(N, N), F=(N, N), G=(N, N))
+FREE, SHAFT = record(Free), record(ShaftEstimate, P=(N, N), F=(N, N), G=(N, N))
 
 
 @compiled
@@ -122,7 +122,7 @@ def shaft(z: float, rate: float, c: float, d: float) -> float:
 
 
 @compiled
-def move(
+def predicted_motion(
     w1: float, z: float, w2: float, b: float, u: float, h: float, a: float, c: float, d: float, Mc: float,
     Mb: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
@@ -130,7 +130,7 @@ def move(
 
     a = 1/J1 and b = 1/J2: w1' = a (u - T), z' = w1 - w2, w2' as in `load_acceleration`.
 
-    >>> way, w1, z, w2 = move(1.0, 0.0, 0.0, 2.0, 0.0, 0.01, 2.0, 50.0, 0.0, 0.0, 0.0)
+    >>> way, w1, z, w2 = predicted_motion(1.0, 0.0, 0.0, 2.0, 0.0, 0.01, 2.0, 50.0, 0.0, 0.0, 0.0)
     >>> round(z, 7), round(float(np.sin(0.01 * 200**0.5)) / 200**0.5, 7)
     (0.0099667, 0.0099667)
     """
@@ -159,10 +159,10 @@ def move(
 
 @compiled
 def shaft_predict(
-    x: Shaft, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
+    x: ShaftEstimate, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
     Mb: float, speed_noise: float, twist_noise: float, load_noise: float,
 ) -> None:  # fmt: skip
-    """The shaft in contact h later, by `move`; the covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
+    """The shaft in contact h later (`predicted_motion`); covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
 
     A is the Jacobian at the middle of the sample, with dT = c dz + d (dw1 - dw2):
 
@@ -171,7 +171,7 @@ def shaft_predict(
     The noises are the variances that the sample adds to w1, z and w2.
     """
     b = x.b
-    _, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, 0.5 * h, a, c, d, Mc, Mb)
+    _, w1, z, w2 = predicted_motion(x.w1, x.z, x.w2, b, u, 0.5 * h, a, c, d, Mc, Mb)
     T = shaft(z, w1 - w2, c, d)
     in_contact = 1.0 if T > 0.0 else 0.0
     moves = 0.0 if Mb != Mc and w2 == 0.0 and Mb <= T <= Mc else 1.0
@@ -214,7 +214,7 @@ def shaft_predict(
     x.P[1, 1] += speed_noise
     x.P[2, 2] += twist_noise
     x.P[3, 3] += load_noise
-    way, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, Mb)
+    way, w1, z, w2 = predicted_motion(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, Mb)
     x.phi1 += way + a * early * h * h
     x.w1 = w1
     x.z = z + a * early * h * h
@@ -222,7 +222,7 @@ def shaft_predict(
 
 
 @compiled
-def shaft_update(x: Shaft, angle: float, variance: float, least: float, most: float) -> None:
+def shaft_update(x: ShaftEstimate, angle: float, variance: float, least: float, most: float) -> None:
     """Correct by the encoder's angle; 1/J2 stays between `least` and `most`."""
     total = x.P[0, 0] + variance
     error = angle - x.phi1

@@ -7,12 +7,21 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, named, record, size
+from softstart.controller.compiled import (
+    MEASURED,
+    Reply,
+    Vector,
+    as_record,
+    compiled,
+    keep_state,
+    record,
+    size,
+)
 from softstart.drive import Drive
 from softstart_controllers import landing
-from softstart_controllers.contact import ahead
+from softstart_controllers.contact import predicted_state
 from softstart_controllers.landing import CLOSED, NEXT, RAISING, Landing, landed, sent
-from softstart_controllers.shaping import ZV, ZVD, plan, sensitivity, vector
+from softstart_controllers.shaping import ZV, ZVD, plan_levels, sensitivity, vector
 
 SHAPERS = {"zv": ZV, "zvd": ZVD}
 IMPACT = {"zv": 0.7, "zvd": 0.3}  # c dw12/Omega, of the shaft torque under the full torque
@@ -39,7 +48,7 @@ class State:
 
 PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
 STATE = record(State, landing=landing.STATE, levels=4)
-COMMAND = record(Answer, State, landing=landing.STATE, levels=4)
+COMMAND = record(Reply, State, landing=landing.STATE, levels=4)
 
 
 @compiled
@@ -50,7 +59,7 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
     """
     near, shaft = p.landing.watch, y.landing.watch.shaft
     a, b, c, d = near.a, shaft.b, near.c, near.d
-    w1, z, w2, u = ahead(near, y.landing.watch, u)
+    w1, z, w2, u = predicted_state(near, y.landing.watch, u)
     if y.landing.watch.held != 0.0:  # by the brake, under the torque that holds the load
         return p.landing.low_torque
     if near.Mb != near.Mc and w2 == 0.0 and c * z + d * w1 <= near.Mc:
@@ -64,7 +73,7 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
     W = vector(z, rate, c, sigma, omega, near.lag, level)
     D = sensitivity(rate, c * z, 1.0 / (a + b), sigma, omega, near.lag, level)
     full = share * p.landing.full_torque + load
-    n, M0, M1, M2, M3 = plan(int(p.order), W, D, max(0.0, load), full, sigma, omega, near.period)
+    n, M0, M1, M2, M3 = plan_levels(int(p.order), W, D, max(0.0, load), full, sigma, omega, near.period)
     if n == 0:
         mean = c * (z - BRAKING * rate / Omega)
         return min(max((mean - load) / share, 0.0), p.landing.full_torque)
@@ -80,9 +89,9 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Land, follow the swing, plan the steps once, play them."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    y = named(command, COMMAND)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    y = as_record(command, COMMAND)
     keep_state(state, command)
     near, now = p.landing, y.landing
     y.torque = landed(near, now, m)

@@ -37,7 +37,7 @@ closed form. Without damping and lag, a quarter of a period and an impact I = c 
 
 I = 0 gives the textbook shapers, ZV with I = M_f the pulse, coast and hold of the optimum.
 
-*Duration.* `plan` takes the shortest a, in whole samples, whose levels rise: lowest <= M_0 <= ... <= M_f.
+*Duration.* `plan_levels` is the shortest a in whole samples whose levels rise: lowest <= M_0 <= ... <= M_f.
 
 Sources: O. J. M. Smith, "Posicast control of damped oscillatory systems", Proc. IRE 45 (1957) 1249-1255;
 N. C. Singer, W. P. Seering, "Preshaping command inputs to reduce system vibration", J. Dynamic Systems,
@@ -59,10 +59,10 @@ Levels = tuple[float, float, float, float]
 
 
 @compiled
-def swing(z: float, v: float, mean: float, sigma: float, omega: float, s: float) -> tuple[float, float]:
+def oscillation(z: float, v: float, mean: float, sigma: float, omega: float, s: float) -> tuple[float, float]:
     """Twist and its rate after the time s: a damped swing about `mean` with the pole sigma + i omega.
 
-    >>> z, v = swing(0.0, 2.0, 1.0, 0.0, 2.0, math.pi / 4)
+    >>> z, v = oscillation(0.0, 2.0, 1.0, 0.0, 2.0, math.pi / 4)
     >>> round(z, 12), round(v, 12)
     (2.0, 2.0)
     """
@@ -131,10 +131,10 @@ def extremes(
     largest = smallest = T
     for k in range(order):
         q = (sigma * rate - (sigma * sigma + omega * omega) * (T - M[k])) / omega
-        T_end, rate_end = swing(T, rate, M[k], sigma, omega, a)
+        T_end, rate_end = oscillation(T, rate, M[k], sigma, omega, a)
         if rate * rate_end < 0.0:
             turn = math.atan2(abs(rate), -math.copysign(q, rate * q)) / omega
-            T, _ = swing(T, rate, M[k], sigma, omega, turn)
+            T, _ = oscillation(T, rate, M[k], sigma, omega, turn)
             largest, smallest = max(largest, T), min(smallest, T)
         T, rate = T_end, rate_end
         largest, smallest = max(largest, T), min(smallest, T)
@@ -142,14 +142,14 @@ def extremes(
 
 
 @compiled
-def plan(
+def plan_levels(
     order: int, W: complex, D: complex, lowest: float, last: float, sigma: float, omega: float, period: float
 ) -> tuple[int, float, float, float, float]:
     """Samples of each level and the levels; 0 samples where no plan has levels that rise.
 
     Nor may T leave the range from 0 to the last level meanwhile, once what the lag still owes is counted in.
 
-    >>> n, M0, M1, _, _ = plan(ZV, 0j, 0j, 0.0, 1.0, 0.0, 2.0 * math.pi, 0.01)  # a quarter: 25 samples
+    >>> n, M0, M1, _, _ = plan_levels(ZV, 0j, 0j, 0.0, 1.0, 0.0, 2.0 * math.pi, 0.01)  # a quarter: 25 samples
     >>> n, round(M0, 9), round(M1, 9)
     (25, 0.5, 0.5)
     """

@@ -7,10 +7,19 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, named, record, size
+from softstart.controller.compiled import (
+    MEASURED,
+    Reply,
+    Vector,
+    as_record,
+    compiled,
+    keep_state,
+    record,
+    size,
+)
 from softstart.drive import Drive
 from softstart_controllers import landing
-from softstart_controllers.contact import ahead
+from softstart_controllers.contact import predicted_state
 from softstart_controllers.landing import CLOSED, ROOM, Landing, landed, sent
 from softstart_controllers.regulator import feedback_gains
 
@@ -37,7 +46,7 @@ class State:
 
 PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
 STATE = record(State, landing=landing.STATE)
-COMMAND = record(Answer, State, landing=landing.STATE)
+COMMAND = record(Reply, State, landing=landing.STATE)
 
 
 @compiled
@@ -46,7 +55,7 @@ def feedback(p: Parameters, u: float, y: State) -> float:
     watch = y.landing.watch
     near, shaft = p.landing.watch, watch.shaft
     a, b, c = near.a, shaft.b, near.c
-    w1, z, w2, u = ahead(near, watch, u)
+    w1, z, w2, u = predicted_state(near, watch, u)
     share, load = a / (a + b), near.Mc * b / (a + b)  # of the motor torque, in the mean torque of the shaft
     Omega = math.sqrt(c * (a + b))
     low, full = share * p.landing.low_torque + load, share * ROOM * p.landing.full_torque + load
@@ -63,9 +72,9 @@ def feedback(p: Parameters, u: float, y: State) -> float:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Land; from contact on estimate the state and feed it back."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    y = named(command, COMMAND)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    y = as_record(command, COMMAND)
     keep_state(state, command)
     y.torque = landed(p.landing, y.landing, m)
     if y.landing.phase == CLOSED:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record, size
 from softstart.drive import Drive
 from softstart_controllers.sampled import (
     full_torque_parameter,
@@ -52,7 +52,7 @@ class Parameters:
     D1: float
     D2: float
     corner: float
-    patience: float
+    contact_timeout: float
     first: Gains
     later: Gains
 
@@ -77,16 +77,16 @@ class State:
 
 
 PARAMETERS = record(Parameters, first=GAINS, later=GAINS)
-STATE, COMMAND = record(State), record(Answer, State)
+STATE, COMMAND = record(State), record(Reply, State)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Estimate w1, T and T', tell whether the load is met, set the torque."""
-    p = named(parameters, PARAMETERS)
-    m = named(measured, MEASURED)
-    x = named(state, STATE)
-    y = named(command, COMMAND)
+    p = as_record(parameters, PARAMETERS)
+    m = as_record(measured, MEASURED)
+    x = as_record(state, STATE)
+    y = as_record(command, COMMAND)
     keep_state(state, command)
     t, u, h = m.time, m.motor_torque, p.period
     phase = x.phase
@@ -119,7 +119,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         y.w2 = max(x.w2 + h * gained, x.least)  # it has been met: it falls back no more
         y.correction = x.correction + h * p.corner * p.corner * error
         y.progress = min(1.0, x.progress + p.rise)
-    if t >= p.patience and phase != IMPATIENT:
+    if t >= p.contact_timeout and phase != IMPATIENT:
         phase = IMPATIENT
         y.low = x.demand
         y.progress = 0.0
@@ -157,7 +157,7 @@ def contact_share(drive: Drive, p: Any) -> float:
     return max(CONTACT_SHARE, feigned)
 
 
-def damping_ratio(drive: Drive, p: Any) -> float:
+def loop_damping(drive: Drive, p: Any) -> float:
     """0.28 where the torque is quick, at most a loop gain of one at 1 rad of phase lag, 0 if later still."""
     phase = drive.Omega * delay(drive, p)
     damping = min(0.28 * (LATE_SHARE + (1.0 - LATE_SHARE) * share_left(drive, p)), 0.5 / phase)
@@ -190,7 +190,7 @@ class TakeUp(CompiledController):
 
         u = clip(low + (full_torque - low) s - D1 (w1 - w2) - D2 T'/c, 0, Ms),   D = 2 zeta J1 Omega
 
-    zeta is `damping_ratio` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
+    zeta is `loop_damping` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
     ahead of the load in a gap that is still open. w2 is the estimated speed of the load: it begins at
     w1 - T'/c, accelerates by (T - Mc)/J2 and follows w1 by a loop of the bandwidth `corner`, so that a wrong
     J2 does not matter. It falls back no more. The start takes longer where D1 holds the motor back.
@@ -199,13 +199,13 @@ class TakeUp(CompiledController):
     takes to Ms, speed_gain and D1 are at most J1/tau. A derivative that comes late drives the second mode:
     D2 is full up to Omega tau = 0.5 and gone from 1 on, D1 0.6 of itself then and gone from 2.5 on, and the
     rise slower. A coarse encoder raises contact_share to 3 standard deviations of the estimated motor speed.
-    After `patience` the torque is just raised.
+    After `contact_timeout` the torque is just raised.
 
     Source: docs/take-up.md.
 
     >>> from softstart import simulate
     >>> from softstart.chain import Chain
-    >>> damped = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
+    >>> damped = {f"shaft[{k}].loop_damping": 0.02 for k in (1, 2, 3)}
     >>> chain = Chain.load("crane-4-mass", also=damped)
     >>> [round(simulate(chain, name).k_dyn, 1) for name in ("take-up", "pulse-coast-hold")]
     [1.1, 1.8]
@@ -274,7 +274,7 @@ class TakeUp(CompiledController):
         "1",
         "damping ratio added by w1 less the estimated speed of the load",
         "0.28, less for a late torque",
-        value=damping_ratio,
+        value=loop_damping,
         rule="0 or more",
         between=(0.0, 1.5),
     )
@@ -302,7 +302,7 @@ class TakeUp(CompiledController):
         rule="above 0",
         multiples=(0.1, 10.0),
     )
-    patience: float | None = patience_parameter()
+    contact_timeout: float | None = patience_parameter()
     period: float | None = period_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from softstart.clutch.model import Clutch
 from softstart.controller import controller_class, controller_names
 from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS
-from softstart.input.documents import Table
+from softstart.input.documents import DocumentTable
 from softstart.input.parameters import REQUIRED
 from softstart.plugins import STUDIES, registered
 from softstart.study import find_study
@@ -61,7 +61,7 @@ def engine_file() -> str:
     return _tables(ENGINE)
 
 
-def _tables(tables: Iterable[Table]) -> str:
+def _tables(tables: Iterable[DocumentTable]) -> str:
     lines: list[str] = []
     for table in tables:
         lines += [_heading(table.name, table.many), ""]

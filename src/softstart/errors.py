@@ -40,9 +40,9 @@ class Mistakes:
     """Collects what is wrong with an input, to raise it as one InputError.
 
     >>> mistakes = Mistakes()
-    >>> with mistakes.noted():
+    >>> with mistakes.collect():
     ...     raise InputError("gap = -1: a gap is 0 or more.")
-    >>> mistakes.settle()
+    >>> mistakes.raise_if_any()
     Traceback (most recent call last):
     softstart.errors.InputError: gap = -1: a gap is 0 or more.
     """
@@ -51,14 +51,14 @@ class Mistakes:
         self.sentences: list[str] = []
 
     @contextmanager
-    def noted(self, before: str = "") -> Iterator[None]:
+    def collect(self, before: str = "") -> Iterator[None]:
         """Keep the sentences of an InputError raised inside, each with `before` in front of it."""
         try:
             yield
         except InputError as error:
             self.sentences.extend(before + sentence for sentence in error.sentences)
 
-    def settle(self, before: str = "") -> None:
+    def raise_if_any(self, before: str = "") -> None:
         """Raise what was noted, if anything was, each with `before` in front of it."""
         if self.sentences:
             raise InputError([before + sentence for sentence in self.sentences])

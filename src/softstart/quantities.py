@@ -30,9 +30,25 @@ if TYPE_CHECKING:
     import pint
 
 __all__ = [
-    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "check_whole", "doubtful_comma",
-    "multiple", "multiplied", "nearest", "parse", "read_unit", "shortest", "show", "to_si", "values_in",
-    "whole_number", "with_points", "without_powers",
+    "OTHER_NOUNS",
+    "QUANTITIES",
+    "RefusedError",
+    "Units",
+    "Value",
+    "check_whole",
+    "doubtful_comma",
+    "multiplied",
+    "nearest",
+    "parse",
+    "read_multiple",
+    "read_unit",
+    "shortest",
+    "show",
+    "to_si",
+    "values_in",
+    "whole_number",
+    "with_points",
+    "without_powers",
 ]  # fmt: skip
 
 Value = float | NDArray[np.float64]
@@ -299,11 +315,13 @@ def number_in(unit: str, value: object, name: str) -> float:
     raise InputError(f"{name} = {show(value)}: this is a list; give a single value.")
 
 
-def multiple(value: object, name: str, endings: Iterable[str] = ("x",)) -> tuple[float, str] | None:
+def read_multiple(value: object, name: str, endings: Iterable[str] = ("x",)) -> tuple[float, str] | None:
     """The number and the ending of a text as "2x", a multiple of something; None for anything else.
 
-    >>> multiple("1.2x", "gap"), multiple("5 J1", "inertia", ("x", "J1")), multiple("2 ms", "time")
-    ((1.2, 'x'), (5.0, 'J1'), None)
+    >>> read_multiple("1.2x", "gap"), read_multiple("5 J1", "inertia", ("x", "J1"))
+    ((1.2, 'x'), (5.0, 'J1'))
+    >>> read_multiple("2 ms", "time") is None
+    True
     """
     text = value.strip() if isinstance(value, str) else ""
     for ending in endings:
@@ -321,7 +339,7 @@ def multiplied(value: Any, name: str, units: Mapping[str, float]) -> Any:
     >>> multiplied("5 J1", "inertia", {"x": 0.175, "J1": 0.035}), multiplied("2 ms", "time", {"x": 0.5})
     (0.175, '2 ms')
     """
-    found = multiple(value, name, units)
+    found = read_multiple(value, name, units)
     return value if found is None else float(f"{found[0] * units[found[1]]:.12g}")  # 5 x 0.035 is 0.175
 
 

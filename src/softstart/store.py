@@ -1,6 +1,6 @@
 """What long computations keep on disk, so that an interrupted one continues where it was.
 
-A `Target` is the file or folder that a caller named, and words the sentences about it. `Records` keeps in an
+A `Target` is the file or folder that a caller named, with the sentences about it. `PartStore` keeps in an
 SQLite file the inputs that the results follow from and each finished part, with checksums. The same call on
 it continues; a target of other inputs, or of anything else, is refused and never touched; a part that is not
 as it was written is computed again, and a DamagedWarning says so. The file is locked as long as a process
@@ -116,13 +116,13 @@ class Target(NamedTuple):
             raise self.damaged() from None
 
 
-class Records:
+class PartStore:
     """Finished parts in an SQLite file. Use it in a `with`; without a target nothing is kept on disk.
 
     The fields `keys` identify a part. A file in which nothing was kept is removed at the end, unless other
     files belong to it (`stay`).
 
-    >>> with Records(None, {"drive": "crane"}, ["cell", "restart"]) as kept:
+    >>> with PartStore(None, {"drive": "crane"}, ["cell", "restart"]) as kept:
     ...     kept.add({"cell": 3, "restart": 0, "cost": 1.1})
     ...     kept.find(3, 0), kept.find(3, 1)
     ({'cell': 3, 'restart': 0, 'cost': 1.1}, None)

@@ -147,7 +147,7 @@ def natural_vibration(chain: Chain) -> Vibration:
     J. Demmel, W. Kahan, SIAM J. Sci. Stat. Comput. 11 (1990) 873-912, doi:10.1137/0911052: frequencies.
     I. S. Dhillon, B. N. Parlett, Linear Algebra Appl. 387 (2004) 1-28, doi:10.1016/j.laa.2003.12.028: shapes.
     """
-    bodies = closed(chain.at_motor_shaft())
+    bodies = with_gaps_closed(chain.at_motor_shaft())
     return vibration_at(chain, elastic_frequencies(bodies.J, bodies.c))
 
 
@@ -160,7 +160,7 @@ def vibration_at(chain: Chain, elastic: Vector) -> Vibration:
     array([407., 431., 456.])
     """
     arrays = chain.at_motor_shaft()
-    bodies = closed(arrays)
+    bodies = with_gaps_closed(arrays)
     Omega = np.append(0.0, elastic)
     of_bodies = np.vstack([np.ones(bodies.J.size), shapes(bodies.J, bodies.c, elastic)])
     shape = of_bodies[:, bodies.body]
@@ -194,12 +194,12 @@ class Closed:
     shaft: Indices
 
 
-def closed(arrays: ChainArrays) -> Closed:
+def with_gaps_closed(arrays: ChainArrays) -> Closed:
     """Join what rigid shafts hold together. A rigid gap counts as closed, like an elastic one.
 
     >>> from softstart.chain import Chain, Mass, Shaft
     >>> chain = Chain([Mass(1), Mass(2), Mass(3)], [Shaft(gap=0.1, restitution=1), Shaft(5)])
-    >>> closed(chain.at_motor_shaft()).J
+    >>> with_gaps_closed(chain.at_motor_shaft()).J
     array([3., 3.])
     """
     body = np.append(0, np.cumsum(~arrays.rigid))
@@ -499,7 +499,7 @@ def _left_out(vibration: Vibration, whole: Vibration) -> Iterator[tuple[str, flo
         yield "the second mode", float(vibration.Omega[2])
     arrays, names = chain.at_motor_shaft(), [mass.name for mass in chain.masses]
     gaps = np.flatnonzero(arrays.gap > 0.0) + 1
-    bodies = closed(arrays)
+    bodies = with_gaps_closed(arrays)
     for first, last in pairwise([0, *gaps.tolist(), len(names)] if gaps.size else []):
         inner = (bodies.shaft >= first) & (bodies.shaft < last - 1)
         if inner.any():

@@ -17,7 +17,7 @@ from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
-from softstart.tuning.ranges import tunable
+from softstart.tuning.ranges import tunable_parameters
 from softstart.tuning.solving import tune
 from softstart_studies.crane import prefixed, published
 
@@ -28,7 +28,7 @@ def tuned_controllers() -> tuple[str, ...]:
     >>> "ramp" in tuned_controllers(), "direct" in tuned_controllers()
     (True, False)
     """
-    return tuple(name for name in ready_controller_names() if tunable(make_controller(name)))
+    return tuple(name for name in ready_controller_names() if tunable_parameters(make_controller(name)))
 
 
 def tuned(

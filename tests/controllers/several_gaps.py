@@ -59,10 +59,10 @@ def crane_cells(seed: int, count: int = 4) -> Mapping[str, list[Chain]]:
     J1 = {"mass_1_inertia": CRANE.masses[0].inertia}
     wrong = [{name: by * value for name, value in one.items()} for one in (c, J1) for by in (1.2, 0.8)]
     groups = {
-        f"gaps x{gaps:g}": [one(CRANE.changed(gaps, inertia), at) for inertia in inertias for at in flanks]
+        f"gaps x{gaps:g}": [one(CRANE.scaled(gaps, inertia), at) for inertia in inertias for at in flanks]
         for gaps in (0.5, 1.0, 2.0, 4.0)
     }
-    groups["driving flank"] = [one(CRANE.changed(1.0, inertia), (1.0, 1.0, 1.0)) for inertia in inertias]
+    groups["driving flank"] = [one(CRANE.scaled(1.0, inertia), (1.0, 1.0, 1.0)) for inertia in inertias]
     groups["stiffness or J1 20 % off"] = [
         one(CRANE.with_values(which)) for which in wrong for _ in range(count)
     ]

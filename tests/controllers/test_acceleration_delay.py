@@ -70,10 +70,10 @@ def test_rounding_alone_is_never_a_contact() -> None:
                 gap=rng.uniform(5, 60), encoder_lines=lines, start_position=rng.uniform(0, 1e-3),
                 torque_lag=rng.choice([0.0, 0.003]), load_kind="reactive",
             )  # fmt: skip
-            patient = AccelerationDelay(delay=0.0, latency=0.0, patience=100.0)
+            patient = AccelerationDelay(delay=0.0, latency=0.0, contact_timeout=100.0)
             assert seen_after(wide, patient) > 0.0
 
 
 def test_contact_not_seen_ends_with_patience() -> None:
-    blind = AccelerationDelay(drop=50.0, patience=0.2)
+    blind = AccelerationDelay(drop=50.0, contact_timeout=0.2)
     assert raised_at(simulate(CRANE, blind)) == pytest.approx(0.2, abs=0.001)

@@ -74,7 +74,7 @@ def test_softer_than_direct_on_random_drives(name: str, median: float, slower: f
 
 @pytest.mark.parametrize("name", ["current-limit-feedback", "shaped", "state-feedback", "pulse-coast-hold"])
 def test_gives_up_waiting(name: str) -> None:
-    run = simulate(CRANE, name, parameters={"certainty": 1e6, "patience": 0.3})
+    run = simulate(CRANE, name, parameters={"detection_threshold": 1e6, "contact_timeout": 0.3})
     assert float(run.at(0.29)["u"]) < 40.0
     assert float(run.at(max(0.6, run.end_time))["u"]) == pytest.approx(62.0, abs=1.0)
 
@@ -94,7 +94,7 @@ def test_asks_at_whole_sample_periods_only(name: str) -> None:
         ("s-curve", {"rounding": 1.5}),
         ("acceleration-delay", {"drop": -0.3}),
         ("acceleration-delay", {"delay": math.inf}),
-        ("pulse-coast-hold", {"certainty": math.nan}),
+        ("pulse-coast-hold", {"detection_threshold": math.nan}),
         ("take-up", {"slowing": -1.0}),
         ("state-feedback", {"torque_weight": 0.0}),
         ("shaped", {"shaper": "ei"}),

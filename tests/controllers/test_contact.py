@@ -100,7 +100,7 @@ def test_gap_position_and_encoder_phase_enter_nowhere(controller: type[CompiledC
     other = CRANE.replace(gap=2.0, start_position=-0.25, encoder_phase=0.4)
     if controller is PulseCoastHold:
         other = other.replace(load_inertia=0.05)
-    given = {"period": 0.001, "patience": 5.0}
+    given = {"period": 0.001, "contact_timeout": 5.0}
     numbers = [controller(**given).fitted(one).vector(one) for one in (CRANE, other, CRANE.replace(gap=0.0))]
     assert np.array_equal(numbers[0], numbers[1])
     assert np.array_equal(numbers[0], numbers[2])
@@ -173,7 +173,7 @@ def test_looks_ahead_by_dead_time_and_lag(dead: float, lag: float, seed: int) ->
     m.shaft.w1, m.shaft.w2, m.shaft.b = at["w1"][0], at["w2"][0], 1.0 / drive.J2
     m.shaft.z = at["T"][0] / drive.c
     m.sent[:9] = demands[8::-1]
-    w1, z, w2, u = contact.ahead(p, m, at["u"][0] if lag else demands[8])
+    w1, z, w2, u = contact.predicted_state(p, m, at["u"][0] if lag else demands[8])
     if lag:
         assert u == pytest.approx(at["u"][1], rel=1e-9)
     assert (w1, w2, drive.c * z) == pytest.approx((at["w1"][1], at["w2"][1], at["T"][1]), rel=1e-3)

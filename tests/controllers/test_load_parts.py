@@ -73,7 +73,9 @@ def test_the_estimated_speed_of_a_load_in_the_open_gap(friction: float, w2: floa
     )
     run = simulate(drive, Pieces(pieces=((0.0, 0.0),)), until=0.6)
     p = np.zeros(1, contact.PARAMETERS)[0]
-    for name, value in contact.watching(drive, make_controller("shaped").fitted(drive), 10.0).items():
+    for name, value in contact.estimator_parameters(
+        drive, make_controller("shaped").fitted(drive), 10.0
+    ).items():
         p[name] = value
     m = np.zeros(1, contact.STATE)[0]
     m["load_speed"], m["b"] = w2, 1.0 / drive.J2

@@ -19,7 +19,16 @@ from softstart import Drive, simulate
 from softstart.profile import TorqueProfile
 from softstart_controllers.profile import Profile
 from softstart_controllers.shaped import Shaped
-from softstart_controllers.shaping import ZV, ZVD, Levels, levels, plan, sensitivity, swing, vector
+from softstart_controllers.shaping import (
+    ZV,
+    ZVD,
+    Levels,
+    levels,
+    oscillation,
+    plan_levels,
+    sensitivity,
+    vector,
+)
 
 FULL = 62.0
 
@@ -135,13 +144,13 @@ def test_planned_levels_rise_and_keep_the_torque_in_its_range(
     sigma, omega, h = -ratio / math.sqrt(1.0 - ratio**2), 1.0, 0.05
     W = vector(T, rate, 1.0, sigma, omega, 0.0, 0.0)
     D = sensitivity(rate, T, 1.0 / (1.0 + sigma**2), sigma, omega, 0.0, 0.0)
-    n, *M = plan(order, W, D, 0.0, 1.0, sigma, omega, h)
+    n, *M = plan_levels(order, W, D, 0.0, 1.0, sigma, omega, h)
     assume(n > 0)
     assert all(later >= earlier - 2e-9 for earlier, later in itertools.pairwise([0.0, *M, 1.0]))
     z, v, seen = T, rate, [T]
     for level in M[:order]:
         for _ in range(20 * n):
-            z, v = swing(z, v, level, sigma, omega, h / 20)
+            z, v = oscillation(z, v, level, sigma, omega, h / 20)
             seen.append(z)
     assert (z, v) == pytest.approx((1.0, 0.0), abs=1e-9)
     assert min(seen) > -0.021

@@ -13,7 +13,14 @@ from tests.softstart.kernel.test_against_oracle import case, run_of
 
 from softstart import Drive, InputError, Run, fatigue, simulate
 from softstart.drive import SNCurve
-from softstart.start.fatigue import damage_of, damped, impacts, rainflow_cycles, turning_points, worst_damage
+from softstart.start.fatigue import (
+    damage_of,
+    damped,
+    impacts,
+    rainflow_cycles,
+    torque_turning_points,
+    worst_damage,
+)
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
 HOIST = Drive.load("hoist-15kw")
@@ -75,7 +82,7 @@ def test_turning_points_are_those_of_a_dense_trace(seed: int) -> None:
         drawn["c"] / drawn["J1"] + drawn["c"] / drawn["J2"]
     )
     run = run_of(drawn)
-    points = turning_points(run)
+    points = torque_turning_points(run)
     sampled = rainflow_cycles(dense(run, 300_000))
     located = rainflow_cycles(points[:, 1])
     scale = located[0, 0]
@@ -97,7 +104,7 @@ def test_equivalent_torque_and_starts(slope: float) -> None:
     )  # fmt: skip
     run = simulate(drive, "direct")
     (row,) = fatigue(run).rows
-    ranges, _, number = rainflow_cycles(turning_points(run)[:, 1], repeated=True).T
+    ranges, _, number = rainflow_cycles(torque_turning_points(run)[:, 1], repeated=True).T
     damage = sum(n * (r / 90.0) ** slope / 2e6 for n, r in zip(number, ranges, strict=True))
     assert row.starts == pytest.approx(1.0 / damage, rel=1e-12)
     assert row.equivalent_torque == pytest.approx(90.0 * (2e6 * damage) ** (1.0 / slope), rel=1e-12)

@@ -28,9 +28,9 @@ from softstart import (
 )
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.identification.fitting import Fitter, Sizes
+from softstart.identification.fitting import ErrorScales, Fitter
 from softstart.identification.model import FILTER, LogModel, filtered
-from softstart.identification.planning import Bench, Experiment, made_up_log, steps_of
+from softstart.identification.planning import Experiment, VirtualTest, made_up_log, steps_of
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
@@ -138,7 +138,7 @@ def test_the_truth_is_as_likely_as_the_covariance_says(experiment: str, lines: f
             drive, experiment, log_period=4e-3, ripple=1.0, position=position, phase=phase, seed=seed
         )
         fitter, x = fit_of(log, drive, position, (phase - 0.5) * log.count)
-        point = fitter.settled(x, (np.zeros(log.time.size),), Sizes(1.0, 1.0))
+        point = fitter.settled(x, (np.zeros(log.time.size),), ErrorScales(1.0, 1.0))
         point = fitter.derived(point, point)
         residual, jacobian = point.white
         covariance, pull = fitter.covariance(point), jacobian.T @ residual
@@ -380,7 +380,7 @@ def test_the_planned_torque_tells_no_less_and_keeps_its_limits() -> None:
 def test_peak_and_travel_are_those_of_the_worst_position() -> None:
     """Torques under which a contact that is only just made has a peak a thousandth of the gap wide."""
     drive = random_unknown(7).replace(load_kind="reactive", load_torque=2.0)
-    bench = Bench(drive, 1e-3, 1.0, NAMES[:5])
+    bench = VirtualTest(drive, 1e-3, 1.0, NAMES[:5])
     generator = np.random.default_rng(9)
     durations = np.full(11, 0.8 * float(drive.elastic_period))
     played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
@@ -396,7 +396,7 @@ def test_peak_and_travel_are_those_of_a_simulation() -> None:
     profile, end = steps_of(np.full(4, 0.1), np.array([30.0, -20.0, -40.0, 25.0]))
     run = played(profile, 0.0, end)
     angles = run.at(np.linspace(0.0, end, 20001))["phi2"]
-    peak, travel, _ = Bench(TRUTH, 1e-3, 1.0, NAMES).loads(profile, end, np.zeros(1))
+    peak, travel, _ = VirtualTest(TRUTH, 1e-3, 1.0, NAMES).loads(profile, end, np.zeros(1))
     assert peak[0] == pytest.approx(run.peak_torque, rel=1e-12)
     assert travel[0] == pytest.approx(np.max(np.abs(angles - angles[0])), rel=1e-4)
 
@@ -404,8 +404,8 @@ def test_peak_and_travel_are_those_of_a_simulation() -> None:
 def test_bounds_of_a_plan_at_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
     """20 turns of the motor for one of the output; a permissible torque comes over without losses."""
     bounds = {}
-    monkeypatch.setattr(Bench, "experiment", lambda *_: SimpleNamespace(peak=1.0))
-    monkeypatch.setattr(Bench, "designed", lambda self, standard, *most: bounds.update(most=most))
+    monkeypatch.setattr(VirtualTest, "experiment", lambda *_: SimpleNamespace(peak=1.0))
+    monkeypatch.setattr(VirtualTest, "designed", lambda self, standard, *most: bounds.update(most=most))
     geared = TRUTH.replace(gear_ratio=20.0, gear_efficiency=0.8)
     plan_experiments(geared, max_torque="1.6 kN*m at output", max_travel="0.5 turn at output")
     assert bounds["most"] == pytest.approx((1600.0 / 20.0, 20.0 * math.pi), rel=1e-14)

@@ -16,7 +16,7 @@ from tests.softstart.test_identification import REVERSE, TRUTH, fit_of
 from softstart import InputError, Log
 from softstart.arrays import Vector
 from softstart.identification import solving
-from softstart.identification.fitting import RIPPLE, Fitter, Point, Sizes, Spot
+from softstart.identification.fitting import RIPPLE, ErrorScales, Fitter, Point, Spot
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
 from softstart.identification.solving import (
@@ -52,7 +52,7 @@ def line(count: int, width: int, size: float) -> tuple[Fitter, Point]:
     spot = Spot(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), jacobian)
     model: Any = SimpleNamespace(log=SimpleNamespace(torque=np.array([size / RIPPLE])))
     fitter = Fitter([model], [Unknown("gap", "power", 0.0, -9.0, 9.0)] * width)
-    return fitter, Point(np.zeros(width), Sizes(0.0, size), (spot,))
+    return fitter, Point(np.zeros(width), ErrorScales(0.0, size), (spot,))
 
 
 @pytest.mark.parametrize(("count", "width"), [(12, 3), (60, 5)])
@@ -66,7 +66,9 @@ def test_intervals_of_a_straight_line_are_those_of_student(count: int, width: in
     expected = freedom * math.log1p(quantile**2 / freedom)
     assert fitter.threshold(best) == pytest.approx(expected, rel=2e-3)  # of second differences over 0.1
     # of three times that size: 1 for what is known beforehand, and ln V and squares of each degree
-    more = fitter.restricted(best.spots, Sizes(0.0, 3.0 * size)) - fitter.restricted(best.spots, best.sizes)
+    more = fitter.restricted(best.spots, ErrorScales(0.0, 3.0 * size)) - fitter.restricted(
+        best.spots, best.sizes
+    )
     assert more == pytest.approx(1.0 + (count - width) * (2.0 * math.log(3.0) - 8.0 / 9.0), rel=1e-6)
     jacobian = best.spots[0].jacobian
     deviations = size * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
@@ -98,7 +100,7 @@ def test_correlations_are_those_of_the_values() -> None:
 
 def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
     """Least squares of r + G e over the noise and of e over the ripple, with r about e = 0."""
-    response, residual, sizes = gaussian((9, 6)), gaussian((9,), 3), Sizes(1.3, 0.4)
+    response, residual, sizes = gaussian((9, 6)), gaussian((9,), 3), ErrorScales(1.3, 0.4)
     eigenvalues, vectors = np.linalg.eigh(response @ response.T)
     spot = Spot(np.zeros(6), vectors.T @ residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
     normal = response.T @ response / 1.3**2 + np.eye(6) / 0.4**2
@@ -107,7 +109,7 @@ def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
 
 
 def test_innovations_are_independent_of_unit_size_and_of_what_came_before() -> None:
-    response, sizes = gaussian((9, 6)), Sizes(1.3, 0.4)
+    response, sizes = gaussian((9, 6)), ErrorScales(1.3, 0.4)
     eigenvalues, vectors = np.linalg.eigh(response @ response.T)
     spot = Spot(np.zeros(6), np.zeros(9), vectors.T, np.maximum(eigenvalues, 0.0), response)
     each = np.array([spot._replace(residual=column).innovations(sizes) for column in vectors]).T
@@ -166,7 +168,7 @@ def test_a_torque_error_above_six_per_cent_is_no_ripple(share: float, stated: bo
     """Of 40.3 N m, at the true drive; 146 samples tell its size within 6 %."""
     log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=40.3 * share, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 2.0))
+    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 2.0))
     point = fitter.derived(point)
     assert point.sizes.ripple == pytest.approx(40.3 * share, rel=0.1)
     assert any("a torque error of" in note for note in misfits(fitter, point)) != stated
@@ -177,7 +179,7 @@ def test_samples_five_deviations_off_are_named_from_three_on(count: int, size: f
     """Of 73 samples, of which 2 + 0.5 % may be: what is left is half a deviation, but in some of them."""
     log = made_up_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0))
+    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
     point = fitter.derived(point)
     spot = point.spots[0]
     left = 0.5 * gaussian((spot.residual.size,))
@@ -199,7 +201,7 @@ def test_what_has_a_chance_below_its_limit_is_named(
 ) -> None:
     log = made_up_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0)))
+    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
     for share, named in ((0.99, True), (1.01, False)):
         monkeypatch.setattr(solving, chance, lambda *_, share=share: share * limit)
         assert any(words in note for note in misfits(fitter, point)) == named
@@ -212,7 +214,7 @@ def test_an_effect_of_four_deviations_is_named_with_its_size(deviations: float, 
     unknowns = unknowns_of(["gap", "load_inertia"], PLACED, [log], [False])
     fitter = Fitter([LogModel.of(log, PLACED)], unknowns)
     x = np.array([one.guess for one in unknowns])
-    point = fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0))
+    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
     point = fitter.derived(point, point)
     spot = point.spots[0]
     root = np.sqrt(spot.variance(point.sizes))
@@ -237,7 +239,7 @@ def test_a_fit_that_another_step_makes_better_by_four_is_none(gain: float, named
     """What is left is a multiple of the first derivative: a step along it gains its whole square."""
     log = made_up_log(TRUTH, REVERSE, log_period=16e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], Sizes(1.0, 1.0)))
+    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
     spot, derivative = point.spots[0], point.white[1][:, 0]
     root = np.sqrt(spot.variance(point.sizes))
     left = spot._replace(residual=math.sqrt(gain) * derivative / np.linalg.norm(derivative) * root)
@@ -253,7 +255,7 @@ def test_the_chance_of_correlations_is_that_of_ljung_and_box() -> None:
 
 def test_the_chance_of_a_slow_torque_is_that_of_its_waves() -> None:
     """Of 100 samples that answer to their own torque alone: twenty waves, and one of 50 explains the rest."""
-    count, sizes = 100, Sizes(0.0, 2.0)
+    count, sizes = 100, ErrorScales(0.0, 2.0)
     waves = np.cos(math.pi * np.outer(np.arange(count) + 0.5, [3.0, 50.0]) / count)
     waves /= np.linalg.norm(waves, axis=0)
     residual = 2.0 * (5.0 * waves[:, 0] + 30.0 * waves[:, 1])

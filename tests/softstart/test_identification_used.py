@@ -26,7 +26,7 @@ from softstart import (
 )
 from softstart.identification.planning import made_up_log
 from softstart.start.comparison import LEFT_POSSIBLE, intervals
-from softstart.tuning.question import scenarios_drawn, scenarios_of
+from softstart.tuning.question import scenarios_drawn, tuning_scenarios
 
 TRUTH = UNKNOWN.replace(start_position="mid-gap")
 
@@ -191,8 +191,8 @@ def test_gains_are_tuned_over_the_drives_that_are_left(
 def test_tolerances_go_with_an_identification_but_not_of_what_it_knows(found: Identification) -> None:
     drawn = found.draws(6)
     with pytest.raises(InputError, match="stiffness has an interval of its own already"):
-        scenarios_drawn(found.drive, drawn, scenarios_of(found.drive, {"stiffness": "10 %"}))
-    torques = scenarios_of(found.drive, {"starting_torque": [60.0, 62.0]})
+        scenarios_drawn(found.drive, drawn, tuning_scenarios(found.drive, {"stiffness": "10 %"}))
+    torques = tuning_scenarios(found.drive, {"starting_torque": [60.0, 62.0]})
     mixed = scenarios_drawn(found.drive, drawn, torques)
     levels = [one["starting_torque"].offset for one in mixed if "starting_torque" in one]
     assert sorted(levels) == [60.0, 60.0, 62.0, 62.0]  # every third drive has the torque of the file

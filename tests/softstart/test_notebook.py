@@ -22,7 +22,7 @@ from softstart import (
 )  # fmt: skip
 from softstart.notebook import OneLine, Shown
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
-from softstart.views.numbers import Table
+from softstart.views.numbers import TextTable
 from softstart.views.sheet import Sheet, as_html
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=0.3)
@@ -72,7 +72,7 @@ def test_no_result_prints_its_arrays():
 def test_a_table_that_is_too_wide_goes_on_below_its_keys():
     """Each column is there once, beside the keys, which name the row."""
     cells = {key: [f"{key}-{i}" for i in range(3)] for key in ("gap", "J2", *"abcdefgh")}
-    sheet = Sheet("title", tables=[Table.of("Gains", cells, keys=2)])
+    sheet = Sheet("title", tables=[TextTable.of("Gains", cells, keys=2)])
     text = as_html(sheet, width=200.0)
     blocks = re.findall(r"<table><caption>(.*?)</caption><thead><tr>(.*?)</tr>", text)
     headings = [re.findall(r">(\w+)</th>", row) for _, row in blocks]

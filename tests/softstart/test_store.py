@@ -14,14 +14,14 @@ from contextlib import closing
 import pytest
 
 from softstart.errors import DamagedWarning, InputError
-from softstart.store import Records, Target, fresh_folder
+from softstart.store import PartStore, Target, fresh_folder
 
 INPUTS = {"drive": "crane", "seed": 0, "metric": "k_dyn"}
 PARTS = [{"cell": k, "restart": 0, "cost": 0.1 * k, "place": [1.0 / k, None]} for k in (1, 2, 3)]
 
 
 def records(path, inputs=INPUTS):
-    return Records(Target("save_to", path, "tuning"), inputs, ["cell", "restart"])
+    return PartStore(Target("save_to", path, "tuning"), inputs, ["cell", "restart"])
 
 
 @pytest.fixture
@@ -153,7 +153,7 @@ def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
         assert left.is_dir()
     holder.kill()
     holder.communicate()
-    with Records(Target("save_to", path, "tuning"), {}, ["cell"]) as kept:
+    with PartStore(Target("save_to", path, "tuning"), {}, ["cell"]) as kept:
         assert kept.find(1) == {"cell": 1}
     with fresh_folder(tmp_path) as mine:
         assert {one.name for one in tmp_path.iterdir()} == {"parts.sqlite", mine.name}

@@ -9,7 +9,7 @@ from softstart import Chain, Drive, InputError
 from softstart.chain.model import LIBRARY
 from softstart.drive import library
 from softstart.input.parameters import REQUIRED
-from softstart.page.machines import changed, single
+from softstart.page.machines import startable, with_typed_changes
 
 # values that are there together or not at all: the lists of a load curve, those of an S-N curve, a gear
 TOGETHER: dict[str, list[dict[str, str]]] = {
@@ -47,7 +47,7 @@ def variants(machine: Any) -> Iterator[tuple[str, Any]]:
     for settings in TOGETHER["chain" if isinstance(machine, Chain) else "drive"]:
         if (found := _with(machine, settings)) is not None:
             yield str(settings), found
-    for path, (parameter, value) in machine.by_path().items():
+    for path, (parameter, value) in machine.parameters_by_path().items():
         words = [parameter.example.strip('"'), *parameter.choices]
         for settings in ({path: word} for word in words):
             if (found := _with(machine, settings)) is not None:
@@ -55,14 +55,14 @@ def variants(machine: Any) -> Iterator[tuple[str, Any]]:
         if value is not None and parameter.default is not REQUIRED:
             text = _without(machine, path)
             try:
-                yield f"no {path}", single(type(machine).from_toml(text))
+                yield f"no {path}", startable(type(machine).from_toml(text))
             except InputError:  # it cannot be left out alone
                 continue
 
 
 def _with(machine: Any, settings: dict[str, str]) -> Any:
     try:
-        return single(changed(machine, settings))
+        return startable(with_typed_changes(machine, settings))
     except InputError:  # contradictions: a rigid shaft with damping, a curve of one list
         return None
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, largest, shaking_of_shafts
+from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, largest_of_orders, shaking_of_shafts
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
 from softstart.input.files import object_of
@@ -205,7 +205,7 @@ class Balance(OneLine):
         inertia = engine.inertia_harmonics * w**2
         pressed = engine.gas is not None
         gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
-        force, couple = (largest(one) * w**2 for one in engine.crank_shaking)
+        force, couple = (largest_of_orders(one) * w**2 for one in engine.crank_shaking)
         couple = couple if engine.cylinders.couples_known else math.nan * couple
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
@@ -388,7 +388,7 @@ def _residual(
     swing = np.einsum("sq,qp->sp", left.real, np.cos(angle))
     swing -= np.einsum("sq,qp->sp", left.imag, np.sin(angle))
     force, couple = (
-        cleaned(crank + shaft, float(max(largest(crank).max(), largest(shaft).max())))
+        cleaned(crank + shaft, float(max(largest_of_orders(crank).max(), largest_of_orders(shaft).max())))
         for crank, shaft in zip(engine.crank_shaking, vectors, strict=True)
     )
     known = 1.0 if engine.cylinders.couples_known else math.nan
@@ -404,8 +404,8 @@ def _residual(
         first_order_moment_cosine=left[:, 2].real,
         first_order_moment_sine=-left[:, 2].imag,
         moment=np.abs(swing).max(axis=1),
-        first_order_force=largest(force)[1] * w2,
+        first_order_force=largest_of_orders(force)[1] * w2,
         force=np.abs(force_at(force, turn)).max() * w2,
-        first_order_couple=largest(couple)[1] * w2 * known,
+        first_order_couple=largest_of_orders(couple)[1] * w2 * known,
         couple=np.abs(force_at(couple, turn)).max() * w2 * known,
     )

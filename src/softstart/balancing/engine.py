@@ -36,7 +36,7 @@ from softstart.balancing.parts import (
 from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
 from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, made, read_document
+from softstart.input.documents import DocumentTable, construct, document_text, read_document
 from softstart.input.files import Library
 from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Parameter
@@ -46,7 +46,7 @@ ORDERS = 0.5 * np.arange(2 * HIGHEST + 1)  # of torques: multiples 0, 0.5, 1 .. 
 ROUNDING = 1e-13  # of the sum of the sizes
 LIBRARY = Library("softstart.balancing", "an engine", "engines")
 
-TOP = Table(
+TOP = DocumentTable(
     "",
     (
         Parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine"),
@@ -76,7 +76,7 @@ def force_at(force: Complex, phi: ArrayLike) -> Complex:
     return found
 
 
-def largest(force: Complex) -> Vector:
+def largest_of_orders(force: Complex) -> Vector:
     """Largest size of each order 0, 1 .. 24, over w^2: half the long axis of the ellipse of its vector."""
     sizes = np.abs(force)
     return np.append(sizes[:1], sizes[1 : HIGHEST + 1] + sizes[:HIGHEST:-1])
@@ -207,9 +207,9 @@ class Engine:
             first, *others = (table.name for table in PART_TABLES[key])
             if found[first] is not None:
                 values = found[first] | {k: v for name in others for k, v in (found[name] or {}).items()}
-                parts[key] = made(make, values, f"{before}[{first}] ", wrong)
+                parts[key] = construct(make, values, f"{before}[{first}] ", wrong)
         parts["shafts"] = [
-            made(BalancerShaft, row, f"{before}[shaft] {i}, ", wrong)
+            construct(BalancerShaft, row, f"{before}[shaft] {i}, ", wrong)
             for i, row in enumerate(found["shaft"], 1)
         ]
         if wrong:
@@ -222,7 +222,7 @@ class Engine:
     def to_toml(self) -> str:
         """The engine as TOML text, which `from_toml` reads back to an equal one."""
         top = {"name": self.name, "source": self.source, "assumed": self.assumed}
-        blocks: list[tuple[Table, Any]] = [(TOP, top)]
+        blocks: list[tuple[DocumentTable, Any]] = [(TOP, top)]
         for key, tables in PART_TABLES.items():
             if (part := getattr(self, key)) is not None:
                 blocks += [(table, part.values()) for table in tables]

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind, Position
-from softstart.input.documents import Table
+from softstart.input.documents import DocumentTable
 from softstart.input.files import Library
 from softstart.input.parameter_set import (
     MaybeNumber,
@@ -289,7 +289,7 @@ class Motor(ParameterSet):
         return {key: v for key, v in self.values().items() if key in Drive.PARAMETERS and v is not None}
 
 
-TOP = Table(
+TOP = DocumentTable(
     "",
     (
         Parameter("name", "", "name of the chain", '"my chain"', default="unnamed chain"),
@@ -298,7 +298,7 @@ TOP = Table(
         Drive.PARAMETERS["units"],
     ),
 )
-START = Table(
+START = DocumentTable(
     "start",
     (
         Parameter("load", "", "name of the mass that is to reach the target speed", '"drum"', default=""),
@@ -313,7 +313,7 @@ START = Table(
     ),
     required=False,
 )  # fmt: skip
-MASS = Table("mass", tuple(Mass.PARAMETERS.values()), many=True, least=2)
-SHAFT = Table("shaft", tuple(Shaft.PARAMETERS.values()), many=True, least=1)
-MOTOR = Table("motor", tuple(Motor.PARAMETERS.values()), required=False)
+MASS = DocumentTable("mass", tuple(Mass.PARAMETERS.values()), many=True, least=2)
+SHAFT = DocumentTable("shaft", tuple(Shaft.PARAMETERS.values()), many=True, least=1)
+MOTOR = DocumentTable("motor", tuple(Motor.PARAMETERS.values()), required=False)
 TABLES = (TOP, MASS, SHAFT, MOTOR, START)

@@ -93,7 +93,7 @@ def quantity_of(machine: Machine, key: str, given: object, name: str) -> float:
     >>> quantity_of(crane, "gap", "0.01 rad at output", "gaps"), quantity_of(crane, "gap", "2 rad", "gaps")
     (0.4, 2.0)
     """
-    knob = machine.knob(key)
+    knob = machine.parameter_value(key)
     assert knob is not None
     p = knob.parameter
     try:
@@ -137,7 +137,7 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     chain: Chain = chains.machine
     wrong, read = list[str](), dict[str, Any]()
     for key, value in values.items():
-        found = chain.knob(key)
+        found = chain.parameter_value(key)
         if found is None:
             wrong.append(chain.no_such(key, value))
             continue

@@ -37,9 +37,9 @@ from softstart.chain.unreduced import Unreduced
 from softstart.chain.words import Words
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.drive.checks import wrong_units
-from softstart.drive.doubts import TwoMasses
+from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, made, read_document
+from softstart.input.documents import DocumentTable, construct, document_text, read_document
 from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameters import Wording, read_values, sentences_of
@@ -190,17 +190,18 @@ class Chain(Words):
         start: dict[str, Any] = found["start"] or {}
         parts = {
             "masses": [
-                made(Mass, row, f"{before}[mass] {i}, ", wrong) for i, row in enumerate(found["mass"], 1)
+                construct(Mass, row, f"{before}[mass] {i}, ", wrong) for i, row in enumerate(found["mass"], 1)
             ],
             "shafts": [
-                made(Shaft, row, f"{before}[shaft] {i}, ", wrong) for i, row in enumerate(found["shaft"], 1)
+                construct(Shaft, row, f"{before}[shaft] {i}, ", wrong)
+                for i, row in enumerate(found["shaft"], 1)
             ],
-            "motor": found["motor"] and made(Motor, found["motor"], f"{before}[motor], ", wrong),
+            "motor": found["motor"] and construct(Motor, found["motor"], f"{before}[motor], ", wrong),
             "load_mass": start.get("load", ""),
             "target_speed": start.get("target_speed"),
             "position": start.get("position", "mid-gap"),
         }
-        chain = None if wrong else made(cls, parts | found[""], before, wrong)
+        chain = None if wrong else construct(cls, parts | found[""], before, wrong)
         if chain is None:
             raise InputError(wrong)
         return chain
@@ -208,7 +209,7 @@ class Chain(Words):
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
         start = {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
-        rows: list[tuple[Table, Any]] = [(TOP, vars(self))]
+        rows: list[tuple[DocumentTable, Any]] = [(TOP, vars(self))]
         for i, mass in enumerate(self.masses):
             rows += [(MASS, mass.values()), *((SHAFT, shaft.values()) for shaft in self.shafts[i : i + 1])]
         rows += [] if self.motor is None else [(MOTOR, self.motor.values())]
@@ -256,7 +257,7 @@ class Chain(Words):
         return tuple(mass.name for mass in self.masses)
 
     @property
-    def own_gaps(self) -> tuple[float, ...]:
+    def local_gaps(self) -> tuple[float, ...]:
         """The gap of each shaft at that shaft itself, rad, as it was given."""
         return tuple(float(shaft.gap) for shaft in self.shafts)
 
@@ -323,10 +324,10 @@ class Chain(Words):
     # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------
 
     @property
-    def lumped(self) -> TwoMasses:
+    def lever_rule_model(self) -> TwoMasses:
         """The chain as two masses: each split between motor and load by compliance (lever rule).
 
-        >>> round(Chain.load("crane-4-mass").lumped.J2, 6)
+        >>> round(Chain.load("crane-4-mass").lever_rule_model.J2, 6)
         0.175026
         """
         at, motor = self.at_motor_shaft(), self.motor
@@ -389,12 +390,12 @@ class Chain(Words):
         >>> round(Chain.load("crane-4-mass").elastic_period, 4)
         0.0548
         """
-        from softstart.vibration import closed, elastic_frequencies
+        from softstart.vibration import elastic_frequencies, with_gaps_closed
 
         arrays = self.at_motor_shaft()
         if arrays.rigid.all():
             return 0.0
-        body = closed(arrays)
+        body = with_gaps_closed(arrays)
         return 2.0 * math.pi / float(elastic_frequencies(body.J, body.c)[0])
 
     @property
@@ -470,7 +471,7 @@ class Chain(Words):
         whole = float(self.gaps.sum())
         if whole == 0.0:
             raise InputError("gap: the chain has no gap that could be widened; give its shafts some.")
-        return self.changed(gaps=gap / whole)
+        return self.scaled(gaps=gap / whole)
 
     @property
     def permissible_torques(self) -> Vector:
@@ -577,7 +578,7 @@ class Chain(Words):
         return arrays_at(self, self.motor_index)
 
 
-def _without_defaults(table: Table, values: Mapping[str, object]) -> dict[str, object]:
+def _without_defaults(table: DocumentTable, values: Mapping[str, object]) -> dict[str, object]:
     return {p.name: values[p.name] for p in table.parameters if values.get(p.name) != p.default}
 
 

@@ -212,7 +212,7 @@ def two_mass_error(
 
     Examples
     --------
-    >>> chain = Chain.load("crane-4-mass").changed(gaps=0.0)
+    >>> chain = Chain.load("crane-4-mass").scaled(gaps=0.0)
     >>> found = two_mass_error(chain, controllers=["direct", "ramp"])
     >>> [round(one.error, 3) for one in found.verified], round(found.of_torques, 3), found.enough
     ([0.029, 0.017], 0.138, False)

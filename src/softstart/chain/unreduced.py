@@ -42,7 +42,7 @@ class Unreduced:
         if name in ("name", "target_speed", "mean_torque", "elastic_period"):
             return getattr(self._chain, name)
         if name == "Mc":
-            return self._chain.lumped.Mc
+            return self._chain.lever_rule_model.Mc
         motor = {"Ms": "starting_torque"}.get(name, name)
         if motor in Motor.PARAMETERS:
             return getattr(self._chain.motor, motor)

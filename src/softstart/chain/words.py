@@ -18,7 +18,7 @@ from softstart.drive import PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
-from softstart.input.parameters import Knob, Parameter
+from softstart.input.parameters import Parameter, ParameterValue
 from softstart.quantities import show
 
 PART = re.compile(r"(mass|shaft)(?:\[(.+)\]\.|_(\d+)_)(\w+)")
@@ -76,18 +76,18 @@ class Words:
         return float(self.at_motor_shaft().gap.sum()), self.masses[self.load_index].inertia
 
     @property
-    def motor_at_load(self) -> float:
+    def motor_inertia_at_load(self) -> float:
         """The inertia of the motor's mass, brought to the shaft of the load, kg m2."""
         ratio = self.speed_ratios("motor")[self.load_index]
         return self.masses[self.motor_index].inertia / ratio**2
 
-    def moved(self, gap: float, inertia: float, origin: Any = None) -> Self:
+    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Any = None) -> Self:
         """The chain with another gap and load inertia, all gaps widened alike.
 
         A chain whose gaps are all closed has them as its `origin`.
 
         >>> from softstart.chain import Chain
-        >>> Chain.load("crane-4-mass").moved(1.0, 70.0).shafts[1].gap
+        >>> Chain.load("crane-4-mass").with_gap_and_inertia(1.0, 70.0).shafts[1].gap
         0.4
         """
         chain, (whole, load) = self, self.gap_and_inertia
@@ -99,16 +99,16 @@ class Words:
             raise InputError(
                 f"gap = {gap!r}: the chain has no gap that could be widened; give its shafts some."
             )
-        wider = chain.changed(gaps=_share(gap, whole))
+        wider = chain.scaled(gaps=_share(gap, whole))
         return wider if inertia == load else wider._with_part("mass", wider.load_index, "inertia", inertia)
 
-    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+    def scaled(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
         """The chain with so many times its gaps, and its load mass with so many times its inertia.
 
         An angle in a gap keeps its share of it, one beyond a flank its overlap.
 
         >>> from softstart.chain import Chain
-        >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
+        >>> Chain.load("crane-4-mass").scaled(gaps=4.0).shafts[1].gap
         0.8
         """
         load = self.load_index
@@ -118,11 +118,11 @@ class Words:
         ]
         return self._replaced(masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
-    def by_path(self) -> dict[str, tuple[Parameter, Any]]:
+    def parameters_by_path(self) -> dict[str, tuple[Parameter, Any]]:
         """All parameters by their paths, each with its value.
 
         >>> from softstart.chain import Chain
-        >>> Chain.load("crane-4-mass").by_path()["shaft[2].gap"][1]
+        >>> Chain.load("crane-4-mass").parameters_by_path()["shaft[2].gap"][1]
         0.2
         """
         found = {one.name: (one, getattr(self, one.name)) for one in TOP.parameters}
@@ -135,35 +135,37 @@ class Words:
         start = {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
         return found | {f"start.{one.name}": (one, start[one.name]) for one in START.parameters}
 
-    def knob(self, key: str) -> Knob | None:
+    def parameter_value(self, key: str) -> ParameterValue | None:
         """The parameter that a key names, as in a file or in Python; None where there is none.
 
         >>> from softstart.chain import Chain
         >>> crane = Chain.load("crane-4-mass")
         >>> keys = ("shaft.gap", "shaft[rotor - pinion].gap", "mass[2].inertia")
-        >>> [crane.knob(key).name for key in keys]
+        >>> [crane.parameter_value(key).name for key in keys]
         ['gap', 'shaft_1_gap', 'mass_2_inertia']
-        >>> round(crane.knob("gap").value, 9), crane.knob("start.position").value
+        >>> round(crane.parameter_value("gap").value, 9), crane.parameter_value("start.position").value
         (0.5, 'mid-gap')
         """
         name = BY_PATH.get(key, key)
         if (part := PART.fullmatch(key)) is not None:
             kind, named, number, word = part.groups()
             index = self._number(kind, named or number)
-            values = self.by_path()
+            values = self.parameters_by_path()
             path = f"{kind}[{index}].{word}"
-            return Knob(f"{kind}_{index}_{word}", *values[path]) if path in values else None
+            return ParameterValue(f"{kind}_{index}_{word}", *values[path]) if path in values else None
         if name in SHARED:
             words = {"start_position": POSITION}
-            return Knob(name, words.get(name, PARAMETERS[name]), SHARED[name][0](self))
+            return ParameterValue(name, words.get(name, PARAMETERS[name]), SHARED[name][0](self))
         if self.motor is not None and name in self.motor.PARAMETERS and name != "mass":
-            return Knob(name, self.motor.PARAMETERS[name], getattr(self.motor, name))
+            return ParameterValue(name, self.motor.PARAMETERS[name], getattr(self.motor, name))
         return None
 
-    def knobs(self) -> Iterator[str]:
+    def parameter_keys(self) -> Iterator[str]:
         """The keys of all parameters that can be varied, as in a file."""
         yield from (PARAMETERS[name].path for name in SHARED)
-        yield from (path for path in self.by_path() if path.startswith(("mass[", "shaft[", "motor.")))
+        yield from (
+            path for path in self.parameters_by_path() if path.startswith(("mass[", "shaft[", "motor."))
+        )
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
         """The chain with these values, by the words of their parameters, as in a file or in Python.
@@ -174,7 +176,7 @@ class Words:
         """
         chain, of_motor, wrong = self, {}, []
         for key, value in values.items():
-            if (found := chain.knob(key)) is None:
+            if (found := chain.parameter_value(key)) is None:
                 wrong.append(chain.no_such(key, value))
                 continue
             name = found.name
@@ -193,8 +195,12 @@ class Words:
 
     def no_such(self, key: str, value: object) -> str:
         """The sentence on a key that names no parameter."""
-        words = [named.name for path in self.knobs() if (named := self.knob(path)) is not None]
-        hint = did_you_mean(key, [*self.knobs(), *words], otherwise=f"its words are {', '.join(words)}.")
+        words = [
+            named.name for path in self.parameter_keys() if (named := self.parameter_value(path)) is not None
+        ]
+        hint = did_you_mean(
+            key, [*self.parameter_keys(), *words], otherwise=f"its words are {', '.join(words)}."
+        )
         return f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}"
 
     def _number(self, kind: str, named: str) -> int:
@@ -255,7 +261,7 @@ def _of_mass(which: str, word: str) -> Word:
 SHARED: Mapping[str, Word] = {
     "gap": (
         lambda chain: chain.gap_and_inertia[0],
-        lambda chain, gap: chain.moved(gap, chain.gap_and_inertia[1]),
+        lambda chain, gap: chain.with_gap_and_inertia(gap, chain.gap_and_inertia[1]),
     ),
     "stiffness": (_stiffness, _stiffer),
     "motor_inertia": _of_mass("motor_index", "inertia"),

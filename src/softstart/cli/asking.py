@@ -21,12 +21,12 @@ from softstart.drive.data_sheet_words import (
 )
 from softstart.errors import InputError
 from softstart.input.documents import literal, parsed
-from softstart.input.files import text_of, write_whole
+from softstart.input.files import file_text, write_whole
 from softstart.input.parameters import Parameter, Wording, read_value
 from softstart.quantities import RefusedError
 from softstart.stopping import at_stop
 
-__all__ = ["asked", "question"]
+__all__ = ["asked", "prompt_text"]
 
 # asked only where one of the others was answered
 AFTER = {
@@ -52,7 +52,7 @@ class _Answers:
         self.texts: dict[str, object] = {}
         self.seen: list[str] = []  # names of what was asked, in order
         if file.exists():
-            text = text_of(file, "the answers to softstart init")
+            text = file_text(file, "the answers to softstart init")
             if not text.startswith(HEAD):
                 raise InputError(
                     f"{file}: the answers would be written there, and there is such a file already; give "
@@ -165,7 +165,7 @@ def _answer(p: Parameter, answers: _Answers, kept: str) -> str:
     """What is typed for one parameter, asked again until it can be read; "" for nothing."""
     before, needed = str(answers.texts.get(p.path, "")), answers.needed(p)
     while True:
-        print(question(p, needed, before), end="", file=sys.stderr, flush=True)
+        print(prompt_text(p, needed, before), end="", file=sys.stderr, flush=True)
         line = sys.stdin.readline()
         if not line:
             raise InputError(
@@ -188,12 +188,12 @@ def _answer(p: Parameter, answers: _Answers, kept: str) -> str:
         return text
 
 
-def question(p: Parameter, needed: bool = False, before: str = "") -> str:
+def prompt_text(p: Parameter, needed: bool = False, before: str = "") -> str:
     """The question for one parameter, with the unit of a bare number and what Enter stands for.
 
-    >>> question(DataSheet.PARAMETERS["backlash"])
+    >>> prompt_text(DataSheet.PARAMETERS["backlash"])
     'backlash of the gears at the output in arcmin, as 15 [none]: '
-    >>> question(DataSheet.PARAMETERS["backlash"], before="9 arcmin")
+    >>> prompt_text(DataSheet.PARAMETERS["backlash"], before="9 arcmin")
     'backlash of the gears at the output in arcmin, as 15 [9 arcmin, - for none]: '
     """
     unit = USUAL.get(p.name, p.unit)

@@ -80,7 +80,9 @@ class Commands(click.Group):
         """The command of this name, imported; None if there is none."""
         if cmd_name not in COMMANDS:
             return super().get_command(ctx, cmd_name)
-        found: click.Command = getattr(import_module(f"softstart.cli.{COMMANDS[cmd_name][0]}"), cmd_name)
+        found: click.Command = getattr(
+            import_module(f"softstart.cli.{COMMANDS[cmd_name][0]}"), f"{cmd_name}_command"
+        )
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -34,9 +34,9 @@ def one_of(names: Callable[[], Iterable[str]], otherwise: str = "file", end: str
 folders = one_of(tuple, "dir")
 
 
-@click.command()
+@click.command("completion")
 @click.argument("shell", metavar="[bash|zsh|fish]", required=False)
-def completion(shell: str | None) -> None:
+def completion_command(shell: str | None) -> None:
     """Print the script for completion with the Tab key.
 
     By default it is for the shell that runs. To try it at once:

@@ -25,7 +25,7 @@ free_option = click.option("--free", metavar="NAME,...", callback=reading(option
     "default set.")  # fmt: skip
 
 
-@click.command()
+@click.command("plan")
 @free_option
 @click.option("--log-period", metavar="TIME", default="4 ms", help="Sample period of the log. Default: 4 ms.")
 @click.option("--ripple", metavar="TORQUE", help="Standard deviation of the torque error in each sample.")
@@ -44,7 +44,7 @@ free_option = click.option("--free", metavar="NAME,...", callback=reading(option
 )
 @options.of_drive(options.read_drive, needed=True)
 @answers("Write torque profiles (CSV, TOML), simulated logs, figure and report into this folder.")
-def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
+def plan_command(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
     """Plan an experiment that identifies a drive accurately.
 
     DRIVE is your estimate, as a TOML file or the name of a shipped drive (see: softstart drives). The
@@ -57,7 +57,7 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
     return made.summary, plan_sheet(made)
 
 
-@click.command()
+@click.command("identify")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @click.option(
     "--drive", metavar="GUESS", required=True, shell_complete=one_of(options.drive_names),
@@ -83,7 +83,7 @@ def plan(*, drive: Drive, standard: bool, **asked: Any) -> Answer:
     help=f"Strategies to simulate. Default: {','.join(STRATEGIES)}.",
 )  # fmt: skip
 @answers("Write the identified drive (drive.toml), residuals, figure and report.md into this folder.")
-def identify(
+def identify_command(
     *, logs: tuple[str, ...], drive: Machine, controllers: list[str], columns: dict[str, str],
     torque_is: TorqueIs, **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -105,7 +105,7 @@ def identify(
     return lambda: found.summary() | {"k_dyn": of_each}, identification_sheet(found, k_dyns)
 
 
-@click.command()
+@click.command("wear")
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @click.option("--dates", metavar="DATE,...", callback=reading(options.read_list), required=True,
     help="Dates of the logs, for example 2025-05-31,2026-05-31.")  # fmt: skip
@@ -113,7 +113,7 @@ def identify(
     help="Gap of a worn drive, for example '0.2 rad', with a gear also '9 arcmin at output': when it is "
     "reached.")  # fmt: skip
 @answers("Write the gaps (CSV), the figure and report.md into this folder.")
-def wear(*, folders: tuple[str, ...], **asked: Any) -> Answer:
+def wear_command(*, folders: tuple[str, ...], **asked: Any) -> Answer:
     """Compute the growth of the gap from several identifications, and when it is worn.
 
     Each FOLDER is what softstart identify --out has written of the same drive, in another year.

@@ -28,7 +28,7 @@ TEMPLATE = """\
 ANSWERS = Path("softstart-init.sheet.toml")  # in the current folder
 
 
-@click.command()
+@click.command("init")
 @click.argument("sheet", required=False, metavar="[SHEET]")
 @changes_option(
     DataSheet.TABLES,
@@ -38,7 +38,7 @@ ANSWERS = Path("softstart-init.sheet.toml")  # in the current folder
 @click.option("--ask", is_flag=True, help="Ask for missing values; the default on a terminal without SHEET.")
 @click.option("--template", is_flag=True, help="Print an empty data sheet to fill in.")
 @json_option
-def init(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_json: bool) -> None:
+def init_command(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_json: bool) -> None:
     """Create a drive file from data sheet values.
 
     Asks for the values of rating plate, gearbox, shaft and load, and refers them to the motor shaft; comments
@@ -66,9 +66,9 @@ def init(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_js
             write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
         values = {"data_sheet": found.values(), "drive": drive.values(), "at_output": drive.at_output}
-        print_json({**values, "doubts": found.doubts})
+        print_json({**values, "plausibility_warnings": found.plausibility_warnings})
         return
-    for one in found.doubts:
+    for one in found.plausibility_warnings:
         print(f"softstart: doubt: {one}", file=sys.stderr)
     for one in _both_ends(found):
         print(f"softstart: {one}", file=sys.stderr)

@@ -19,7 +19,7 @@ from softstart.study import Study, StudyResult, find_study
 from softstart.study import Table as Results
 from softstart.views.drawing import PICTURE_ENDINGS
 from softstart.views.markdown import file_stem, output_folder
-from softstart.views.numbers import Column, Table, printable
+from softstart.views.numbers import Column, TextTable, printable
 from softstart.views.sheet import Sheet, Writer, rows_file
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ OWN = (
 )
 
 
-@click.command()
+@click.command("drives")
 @click.argument("name", required=False, shell_complete=one_of(drive_names))
 @answers()
-def drives(*, name: str | None) -> Answer:
+def drives_command(*, name: str | None) -> Answer:
     """List the shipped drives, or print one as TOML.
 
     To begin a file of your own: softstart drives crane-4amtkf > mine.toml
@@ -43,7 +43,7 @@ def drives(*, name: str | None) -> Answer:
         shipped = {key: Drive.load(key) for key in drive_names()}
         rows = [[key, printable(f"{one.name}\n{one.source}")] for key, one in shipped.items()]
         data = [{"name": key, "title": one.name, "source": one.source} for key, one in shipped.items()]
-        table = Table.of_texts(("drive", "what it is, and its source"), rows)
+        table = TextTable.of_texts(("drive", "what it is, and its source"), rows)
         notes = ["A drive of your own begins as a copy of one of these."]
         shown = Sheet("Drives", ["Shipped drives"], tables=[table], notes=notes, commands=OWN)
         return lambda: {"drives": data}, shown
@@ -54,10 +54,10 @@ def drives(*, name: str | None) -> Answer:
     return lambda: {"name": name, "drive": Drive.load(name).values()}, library.text(name)
 
 
-@click.command()
+@click.command("controllers")
 @click.argument("name", required=False, shell_complete=one_of(controller_names))
 @answers()
-def controllers(*, name: str | None) -> Answer:
+def controllers_command(*, name: str | None) -> Answer:
     """List the controllers, or show the parameters of one.
 
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
@@ -68,10 +68,10 @@ def controllers(*, name: str | None) -> Answer:
     found: list[dict[str, Any]] = []
     with working("looking at the controllers ..."):
         for one in [check_name(name, "controller")] if name else controller_names():
-            with broken.noted(), attributed(one):
+            with broken.collect(), attributed(one):
                 found.append(_described(one, controller_class(one)))
     if name:
-        broken.settle()
+        broken.raise_if_any()
         return lambda: found[0], _one(found[0])
     return lambda: {"controllers": found}, _all(found, broken.sentences)
 
@@ -96,7 +96,7 @@ def _all(found: list[dict[str, Any]], broken: list[str]) -> Sheet:
         [printable(cell) or "-" for cell in (one["name"], one["summary"], also, one["source"])]
         for one, also in zip(found, sees, strict=True)
     ]
-    table = Table.of_texts(("controller", "what it does", "also sees", "source"), rows)
+    table = TextTable.of_texts(("controller", "what it does", "also sees", "source"), rows)
     see = "All see time, the motor's encoder and its torque. Parameters of one: softstart controllers NAME"
     return Sheet("Controllers", ["Controllers"], tables=[table], notes=[see, *broken])
 
@@ -113,16 +113,16 @@ def _one(about: dict[str, Any]) -> Sheet:
             f"  sees    {', '.join(['time', *about['sensors']])}",
             *([f"  source  {source}"] if source else []),
         ],
-        tables=[Table.of_texts(("parameter", *keys[1:]), rows)],
+        tables=[TextTable.of_texts(("parameter", *keys[1:]), rows)],
         notes=["A parameter is set by its name." if rows else "It has no parameters."],
         commands=[(command.format(name, rows[0][0]), "sets one")] if rows else (),
     )
 
 
-@click.command()
+@click.command("study")
 @click.argument("name", required=False, shell_complete=one_of(lambda: registered(STUDIES)))
 @answers("Write pictures (SVG, PNG), tables (CSV) and report.md into this folder.")
-def study(*, name: str | None) -> Answer:
+def study_command(*, name: str | None) -> Answer:
     """List the studies, or run one."""
     out = option_value("out")
     if name is None and out is not None:
@@ -141,7 +141,7 @@ def _studies() -> Answer:
     found: list[Study] = []
     broken = Mistakes()
     for name in registered(STUDIES):
-        with broken.noted():
+        with broken.collect():
             found.append(find_study(name))
     data = [
         {"name": one.name, "title": one.title, "pictures": one.pictures,
@@ -150,7 +150,7 @@ def _studies() -> Answer:
     ]  # fmt: skip
     rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
     run = "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR"
-    table = Table.of_texts(("study", "question", "pictures, each as .svg and .png"), rows)
+    table = TextTable.of_texts(("study", "question", "pictures, each as .svg and .png"), rows)
     return lambda: {"studies": data}, Sheet(
         "Studies", ["Studies"], tables=[table], notes=[run, *broken.sentences]
     )
@@ -168,13 +168,13 @@ def _study_sheet(found: Study, result: StudyResult) -> Sheet:
     return Sheet(
         title=f"{found.name}: {found.title}",
         lines=[f"{found.name}: {found.title}"],
-        tables=[*map(_shown, result.tables), Table.of_texts(("claims", ""), told)],
+        tables=[*map(_shown, result.tables), TextTable.of_texts(("claims", ""), told)],
         figures={stem: partial(result.figures.__getitem__, stem) for stem in result.figures},
         files=files,
     )
 
 
-def _shown(table: Results) -> Table:
+def _shown(table: Results) -> TextTable:
     """A table of a study, as it is shown: floats with five digits."""
 
     def text(cell: object) -> str:
@@ -184,4 +184,4 @@ def _shown(table: Results) -> Table:
         Column(name, all(isinstance(row[i], int | float | None) for row in table.rows))
         for i, name in enumerate(table.columns)
     ]
-    return Table(table.title, columns, [list(map(text, row)) for row in table.rows])
+    return TextTable(table.title, columns, [list(map(text, row)) for row in table.rows])

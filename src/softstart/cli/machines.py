@@ -36,7 +36,7 @@ def _read_law(text: str, option: str) -> dict[str, Any]:
     return {"law": "table", "law_times": times, "law_torques": torques}
 
 
-@click.command()
+@click.command("clutch")
 @click.option(
     "--law", metavar="NAME|FILE", callback=reading(_read_law), shell_complete=one_of(lambda: LAWS),
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
@@ -58,7 +58,7 @@ def _read_law(text: str, option: str) -> dict[str, Any]:
     Clutch, "paper-c", CLUTCHES, Clutch.TABLES, "clutch.engagement_time='0.5 s' or shaft.gap='1 deg'",
 )  # fmt: skip
 @answers("Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.")
-def clutch(
+def clutch_command(
     *, clutch: Clutch, law: dict[str, Any] | None, until: float | None, optimal: bool, points: int | None,
     nondecreasing: bool,
 ) -> Answer:  # fmt: skip
@@ -102,7 +102,7 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     return found or None
 
 
-@click.command()
+@click.command("balance")
 @click.option(
     "--speed", "speeds", metavar="SPEED", multiple=True, callback=reading(_read_speeds),
     help="Speed to show, for example 4500rpm. May be repeated. Default: round values over the speed range.",
@@ -111,7 +111,7 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     Engine, "vaz-11113", ENGINES, TABLES, "masses.reciprocating='0.6 kg' or operation.load=0.5",
 )  # fmt: skip
 @answers("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")
-def balance(*, engine: Engine, speeds: list[float] | None) -> Answer:
+def balance_command(*, engine: Engine, speeds: list[float] | None) -> Answer:
     """Compute forces and moments of a piston engine by order, and design a balancer.
 
     ENGINE is a TOML file or the name of a shipped engine; by default the two-cylinder engine VAZ-11113 of the

@@ -11,8 +11,8 @@ import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.options import quantity, reading
-from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
+from softstart.cli.options import quantity_callback, reading
+from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError, SimulationError
 from softstart.input.gear import BEHIND
 from softstart.optimal.problem import OBJECTIVES, TERMINALS, StartTime
@@ -41,7 +41,7 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
         found = StartTime.of(part, option)
         return found.value, found.multiple
 
-    return [StartTime(*one) for one in options.read_values(text, option, read)]
+    return [StartTime(*one) for one in options.read_value_list(text, option, read)]
 
 
 def _start_time(text: str, option: str) -> str:
@@ -104,7 +104,7 @@ def _no_solution() -> Iterator[None]:
         raise SimulationError(str(error)) from error
 
 
-@click.command()
+@click.command("optimize")
 @click.option("--start-time", metavar="TIME", callback=reading(_start_time),
     help="Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x."
 )  # fmt: skip
@@ -116,13 +116,13 @@ def _no_solution() -> Iterator[None]:
 @click.option("--minimise", metavar="|".join(OBJECTIVES), type=click.Choice(OBJECTIVES),
     help="Objective. Default: k_dyn.")  # fmt: skip
 @click.option("--max-k-dyn", "k_dyn", metavar="NUMBER",
-    callback=quantity("1", above=0.0),
+    callback=quantity_callback("1", above=0.0),
     help="Upper bound of K_dyn if another objective is minimised.")  # fmt: skip
 @click.option("--max-heat", "heat", metavar="TIME",
-    callback=quantity("s", above=0.0),
+    callback=quantity_callback("s", above=0.0),
     help="Upper bound of the I2t heat, in s of starting torque.")  # fmt: skip
 @torque_speed_option
-@click.option("--smoothness", metavar="TIME", callback=quantity("s", least=0.0),
+@click.option("--smoothness", metavar="TIME", callback=quantity_callback("s", least=0.0),
     help="Weight of torque smoothness, for example 0.001 (s). Default: 0.")  # fmt: skip
 @click.option("--confirm", is_flag=True,
     help="Also solve the CasADi problem from its own initial guess, and show both results.")  # fmt: skip
@@ -134,7 +134,7 @@ def _no_solution() -> Iterator[None]:
     help="Likewise for these load torques.")  # fmt: skip
 @options.of_drive(options.read_machine)
 @answers("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
-def optimize(
+def optimize_command(
     *, drive: Machine, gaps: Sequence[float | str] | None, inertias: Sequence[float | str] | None,
     load_torques: Sequence[float | str] | None, **given: Any,
 ) -> Answer:  # fmt: skip
@@ -169,7 +169,7 @@ def _runs_beside(best: Optimum) -> list[Run]:
     return runs
 
 
-@click.command()
+@click.command("pareto")
 @click.option("--start-times", metavar="TIME,...", callback=reading(read_start_times),
     help="Bounds of the start time: 0.25,0.3 (s), a range from:to:count such as 0.25:0.5:12, or multiples "
     "of that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.")  # fmt: skip
@@ -186,7 +186,7 @@ def _runs_beside(best: Optimum) -> list[Run]:
     "Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at "
     "once, so that an interrupted command resumes."
 )
-def pareto(
+def pareto_command(
     *, drive: Machine, start_times: list[StartTime] | None, controllers: list[str] | None, **given: Any
 ) -> Answer:  # fmt: skip
     """Compute the lowest K_dyn over the start time, and compare the controllers with it.
@@ -205,7 +205,7 @@ def pareto(
     ):
         from softstart.optimal.optimize import start_time_of_direct
 
-        made, curve = make_controllers(controllers, {}), tuple(given.get("torque_speed", ()))
+        made, curve = controllers_from_options(controllers, {}), tuple(given.get("torque_speed", ()))
         direct = cache(lambda: start_time_of_direct(drive, curve))
         times = None if start_times is None else [one.seconds(direct) for one in start_times]
         found = softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)

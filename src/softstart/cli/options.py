@@ -22,7 +22,7 @@ from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
-from softstart.input.documents import Table, parsed
+from softstart.input.documents import DocumentTable, parsed
 from softstart.input.files import ABSENT, Library, read_text, refusal_of
 from softstart.input.parameter_set import read_settings
 from softstart.input.parameters import Wording
@@ -72,7 +72,7 @@ def reading(read: Callable[[Any, str], Any]) -> Callable[..., Any]:
     return callback
 
 
-def quantity(unit: str, least: float = -np.inf, above: float = -np.inf) -> Callable[..., Any]:
+def quantity_callback(unit: str, least: float = -np.inf, above: float = -np.inf) -> Callable[..., Any]:
     """The callback of an option that is a quantity in this unit, of `least` or more, or above `above`."""
 
     def read(text: str, option: str) -> float:
@@ -114,7 +114,7 @@ def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
         f'{name} --out FILE" writes that drive.',
         file=sys.stderr,
     )
-    for doubt in found.doubts_of_motion:
+    for doubt in found.motion_warnings:
         print(f"softstart: doubt: {doubt}", file=sys.stderr)
     given = read_settings(settings, Drive.PARAMETERS)[0]
     ends = found.possible
@@ -204,14 +204,14 @@ def read_list(text: str, option: str) -> list[str]:
     return [word.strip() for word in text.split(",")]
 
 
-def read_values(
+def read_value_list(
     text: str, option: str, read: Callable[[str], tuple[float, Any]], most: int = 1000
 ) -> list[tuple[float, Any]]:
     """Values with commas between, or from:to:count, or from:to:count:log for equal ratios.
 
     `read` gives a number and of what it is a multiple; both ends of a range are of one kind.
 
-    >>> read_values("0.5 rad:2 rad:3", "--gaps", lambda text: (to_si(text, "rad"), ""))
+    >>> read_value_list("0.5 rad:2 rad:3", "--gaps", lambda text: (to_si(text, "rad"), ""))
     [(0.5, ''), (1.25, ''), (2.0, '')]
     """
     if ":" not in text:
@@ -321,7 +321,9 @@ def of_drive(read: Load, needed: bool = False) -> Decorator:
     return lambda command: argument(set_option(command))
 
 
-def of_file(kind: Any, default: str, library: Library, tables: Iterable[Table], example: str) -> Decorator:
+def of_file(
+    kind: Any, default: str, library: Library, tables: Iterable[DocumentTable], example: str
+) -> Decorator:
     """The argument for a file of another kind, with --set for the keys of its tables."""
     name = kind.__name__.lower()
     argument = machine_argument(
@@ -350,12 +352,12 @@ _allow_code_option = click.option(
 )  # fmt: skip
 
 
-def keys_of(tables: Iterable[Table]) -> list[str]:
+def keys_of(tables: Iterable[DocumentTable]) -> list[str]:
     """The keys of a file as --set names them; the first of a list of tables stands for all."""
     return [p.path.replace(".", "[1].", 1) if one.many else p.path for one in tables for p in one.parameters]
 
 
-def changes_option(tables: Iterable[Table], text: str) -> Decorator:
+def changes_option(tables: Iterable[DocumentTable], text: str) -> Decorator:
     """--set, for a file with these tables; it is read first, as the machine is loaded with its changes."""
     return click.option(
         "--set", "settings", metavar="KEY=VALUE", multiple=True, is_eager=True, expose_value=False,
@@ -369,7 +371,7 @@ set_option = changes_option(
 )
 until_option = click.option(
     "--until", metavar="TIME",
-    callback=quantity("s", above=0.0),
+    callback=quantity_callback("s", above=0.0),
     help="End of the simulation, for example 0.5 (s) or '500 ms'. Default: one elastic period after the "
     "start time (a clutch: after the lock-up).",
 )  # fmt: skip

@@ -9,15 +9,15 @@ import click
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
 from softstart.cli import options
-from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
+from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.terminal import print_json
 
 
-@click.command()
+@click.command("reduce")
 @click.option(
-    "--factor", metavar="NUMBER", callback=options.quantity("1", above=0.0),
+    "--factor", metavar="NUMBER", callback=options.quantity_callback("1", above=0.0),
     help="Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.",
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Continue where a frequency that is left out is too low.")
@@ -37,7 +37,7 @@ from softstart.views.terminal import print_json
     Chain, "crane-4-mass", LIBRARY, TABLES, "mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2",
 )  # fmt: skip
 @answers("Write scheme, figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder.")
-def reduce(
+def reduce_command(
     *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **asked: Any
 ) -> Answer:  # fmt: skip
     """Compute the natural frequencies of a chain, and reduce it to two masses.
@@ -64,7 +64,7 @@ def reduce(
         if option_value("as_json"):
             print_json({"chain": chain.name, "vibration": vibration.summary(), "refused": refused})
         else:
-            sheet.show(views.vibration_sheet(vibration))
+            sheet.print_sheet(views.vibration_sheet(vibration))
         raise
     drive = views.drive_of(found) if verify is None else found.to_drive()
     off = None
@@ -72,6 +72,6 @@ def reduce(
         with working("starting the drive and the chain ..."), attributed():
             from softstart.chain.two_masses import two_mass_error
 
-            made = None if verify is None else make_controllers(verify, params)
+            made = None if verify is None else controllers_from_options(verify, params)
             off = two_mass_error(found.chain, drive, made)
     return lambda: views.summary(found, off), views.reduction_sheet(found, off)

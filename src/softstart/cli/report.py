@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli import options
-from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
+from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 
@@ -32,7 +32,7 @@ BROWSERS = (
 PRINTING = 120.0  # s for a browser to print a report
 
 
-@click.command()
+@click.command("report")
 @click.option("--out", "to", metavar="FILE", help="HTML file to write, for example report.html.")
 @click.option("--pdf", metavar="FILE",
     help="PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.")  # fmt: skip
@@ -48,7 +48,7 @@ PRINTING = 120.0  # s for a browser to print a report
     "frequency=0.1Hz,share=1%. Torque in % of the rated torque or in N*m. Default: 0.1 %, 1 ms, 1 rpm, "
     "0.1 Hz and 0.01.")  # fmt: skip
 @click.option("--budget", metavar="TIME",
-    callback=options.quantity("s", least=0.0),
+    callback=options.quantity_callback("s", least=0.0),
     help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0 "
     "disables it.")  # fmt: skip
 @click.option("--project", metavar="FILE",
@@ -59,7 +59,7 @@ PRINTING = 120.0  # s for a browser to print a report
 )
 @options.set_option
 @answers()
-def report(
+def report_command(
     *, drive: Machine | Identification, to: str | None, pdf: str | None, controllers: list[str] | None,
     params: dict[str, str], **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -81,7 +81,7 @@ def report(
         from softstart.reporting import report as compute
 
         made = compute(
-            drive, controllers=make_controllers(controllers, params), command=options.command_line(),
+            drive, controllers=controllers_from_options(controllers, params), command=options.command_line(),
             progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **asked,
         )  # fmt: skip
         show("drawing the figures")

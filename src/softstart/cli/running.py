@@ -132,7 +132,7 @@ def answers(text: str = "") -> Decorator:
             elif isinstance(shown, str):
                 print(shown, end="")
             else:
-                sheet.show(shown)
+                sheet.print_sheet(shown)
                 if out is not None:
                     print(f"\nWritten to {out}: report.md, figures and tables.")
             for failure in failures:
@@ -159,7 +159,7 @@ def _check_report(out: str) -> None:
         )
 
 
-def make_controllers(
+def controllers_from_options(
     names: Sequence[str] | None, params: Mapping[str, str], several: bool = True
 ) -> list[Controller]:
     """The controllers of these names with the parameters of --param.

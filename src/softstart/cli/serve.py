@@ -11,13 +11,13 @@ import click
 from softstart.cli import options
 from softstart.cli.running import working
 from softstart.errors import InputError
-from softstart.page.serve import Address, check_installed, listening, run
+from softstart.page.serve import Address, check_installed, listening, run_server
 
 if TYPE_CHECKING:
     from softstart.page.machines import Loaded
 
 
-@click.command()
+@click.command("serve")
 @options.machine_argument("drive", options.read_as_known, options.drive_names, options.DEFAULT_DRIVE)
 @options.set_option
 @click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 selects a free one.")
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     "--expose", is_flag=True, help="Accept connections from other machines; requires --host and --token."
 )
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def serve(*, drive: Loaded, no_browser: bool, **given: Any) -> None:
+def serve_command(*, drive: Loaded, no_browser: bool, **given: Any) -> None:
     """Open the interactive page in the browser.
 
     DRIVE is a TOML file or the name of a shipped drive or chain; by default the crane drive of the
@@ -59,7 +59,7 @@ def serve(*, drive: Loaded, no_browser: bool, **given: Any) -> None:
                 # some browsers take the terminal until they are closed; the page must not wait for that
                 threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
-        run(drive, address, listener, ready)
+        run_server(drive, address, listener, ready)
 
 
 def _warm_up(machine: Loaded) -> None:

@@ -11,7 +11,7 @@ import click
 import softstart
 from softstart.cli import options
 from softstart.cli.options import reading
-from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
+from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.quantities import whole_number
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ params_option = options.param_option(
 )
 
 
-@click.command()
+@click.command("compare")
 @strategies_option
 @options.fitted_to_option
 @params_option
@@ -43,7 +43,7 @@ params_option = options.param_option(
 @click.option("--details", is_flag=True, help="Also show times, events, and what each column means.")
 @options.of_drive(options.read_machine_or_identified)
 @answers("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
-def compare(
+def compare_command(
     *, drive: Machine | Identification, controllers: list[str] | None, params: dict[str, str], details: bool,
     **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -55,7 +55,7 @@ def compare(
     file of tuned gains.
     """
     with working("starting the drive ..."), attributed():
-        found = softstart.compare(drive, make_controllers(controllers, params), **asked)
+        found = softstart.compare(drive, controllers_from_options(controllers, params), **asked)
     from softstart.views.starts import comparison_sheet
 
     rows = sorted(found.rows, key=lambda row: row.run.k_dyn) if controllers is None else list(found.rows)
@@ -65,7 +65,7 @@ def compare(
 
 def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     """Commands for the same machine that lead on, each with what it gives."""
-    from softstart.tuning.ranges import tunable
+    from softstart.tuning.ranges import tunable_parameters
 
     machine = [
         options.typed_machine(),
@@ -77,13 +77,13 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     if not (chosen.recommended or comparison.rows[0].intervals):
         known = len(comparison.drive.positions) == 1
         steps.append(("optimize", [], "the lowest possible K_dyn" if known else "the best fixed profile"))
-    if best is not None and best.name in options.controller_names() and tunable(best.controller):
+    if best is not None and best.name in options.controller_names() and tunable_parameters(best.controller):
         steps.append(("tune", ["--controller", best.name], "gains for other gaps and loads"))
     steps.append(("report", ["--out", "report.html"], "all results in one file"))
     return [(shlex.join(["softstart", name, *machine, *more]), gives) for name, more, gives in steps]
 
 
-@click.command()
+@click.command("simulate")
 @options.controller_option(
     "--controller", "NAME",
     "A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).", required=True,
@@ -93,7 +93,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
 @options.until_option
 @options.of_drive(options.read_machine, needed=True)
 @answers("Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.")
-def simulate(
+def simulate_command(
     *, drive: Machine, controller: str, params: dict[str, str], fitted_to: Drive | None, until: float | None
 ) -> Answer:  # fmt: skip
     """Simulate one start of a drive or a chain.
@@ -103,7 +103,7 @@ def simulate(
     docs/howto/motor-torque-over-speed.md.
     """
     with working("starting the drive ..."), attributed():
-        (made,) = make_controllers([controller], params, several=False)
+        (made,) = controllers_from_options([controller], params, several=False)
         run: Any = softstart.simulate(drive, made, until, fitted_to=fitted_to)
         _ = run.settled_time  # it may ask the controller on
     from softstart.start.recommendation import margins_of
@@ -125,12 +125,12 @@ def _numbers(text: str, option: str) -> dict[str, int]:
     return {name: whole_number(number, option, 0) for name, number in pairs.items()}
 
 
-@click.command()
+@click.command("fatigue")
 @strategies_option
 @options.fitted_to_option
 @params_option
 @click.option(
-    "--slope", metavar="M", callback=options.quantity("1"),
+    "--slope", metavar="M", callback=options.quantity_callback("1"),
     help="Slope of the S-N curve, instead of limits.fatigue.slope. Default: 6.6, pitting of case-hardened "
     "gears.",
 )  # fmt: skip
@@ -146,7 +146,7 @@ def _numbers(text: str, option: str) -> dict[str, int]:
 )  # fmt: skip
 @options.of_drive(options.read_machine)
 @answers("Write the figure (SVG, PNG), cycles and turning points (CSV) and report.md into this folder.")
-def fatigue(
+def fatigue_command(
     *, drive: Machine, controllers: list[str] | None, fitted_to: Drive | None, params: dict[str, str],
     **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -159,7 +159,7 @@ def fatigue(
     separately.
     """
     with working("starting the machine ..."), attributed():
-        made = make_controllers(controllers, params)
+        made = controllers_from_options(controllers, params)
         found = softstart.fatigue(
             [softstart.simulate(drive, one, fitted_to=fitted_to) for one in made], **asked
         )
@@ -168,14 +168,14 @@ def fatigue(
     return found.summary, fatigue_sheet(found, found.ranked if controllers is None else found.rows, fitted_to)
 
 
-@click.command()
+@click.command("linear")
 @options.controller_option(
     "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
 )
 @options.param_option("Set a parameter of the controller, for example period='0.5 ms'. May be repeated.")
 @options.of_drive(options.read_machine)
 @answers("Write the Bode and Nyquist diagrams (SVG, PNG), the response (CSV) and report.md into this folder.")
-def linear(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer:
+def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer:
     """Linearise the control loop: stability margins, modes, limit cycles.
 
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
@@ -184,7 +184,7 @@ def linear(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer
     predicted by the describing function.
     """
     with working("running and linearising the start ..."), attributed():
-        (made,) = make_controllers([controller], params, several=False)
+        (made,) = controllers_from_options([controller], params, several=False)
         view = softstart.linear_view(drive, made)
     from softstart.views.linear import linear_sheet
 

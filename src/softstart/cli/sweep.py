@@ -23,7 +23,7 @@ from softstart.views.markdown import kept_state
 if TYPE_CHECKING:
     from softstart.chain.machines import Machine
     from softstart.controller.recipe import Recipe
-    from softstart.sweeping.entry import Progress
+    from softstart.sweeping.entry import SweepProgress
     from softstart.sweeping.grid import Subject
 
 RESULTS = "sweep.zarr"
@@ -31,7 +31,7 @@ MOST_VALUES = 1_000_000  # of a range
 PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 
 
-@click.command()
+@click.command("sweep")
 @options.controller_option(
     "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp."
 )
@@ -58,7 +58,7 @@ PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
     f"Write the results chunk by chunk into DIR/{RESULTS}, with figure, table and report.md; an "
     "interrupted command resumes. Without it only a summary is printed."
 )
-def sweep(
+def sweep_command(
     *, drive: Machine, controller: str | None, grid: tuple[str, ...], params: dict[str, str],
     fitted_to: Drive | None, netcdf: Path | None, **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -74,7 +74,7 @@ def sweep(
     asked = {name: value for name, value in asked.items() if value is not None}
     begin, last = time.monotonic(), None
 
-    def progress(now: Progress) -> None:
+    def progress(now: SweepProgress) -> None:
         nonlocal last
         last = now
         show(str(now))
@@ -160,8 +160,8 @@ def _read(key: str, text: str, subject: Subject) -> tuple[str, Any]:
 
     name = subject.name_of(key)
     if text.count(":") not in (2, 3) or name == "controller" or ".py" in text:
-        knob = subject.machine.knob(key)
+        knob = subject.machine.parameter_value(key)
         counts = name == "controller" or (knob and knob.parameter.limit.startswith("a whole"))
         read = subject.coordinate(key, values_in(text, key, whole=bool(counts)))
         return name, read.values.tolist()
-    return name, [value for value, _ in options.read_values(text, key, end, MOST_VALUES)]
+    return name, [value for value, _ in options.read_value_list(text, key, end, MOST_VALUES)]

@@ -12,12 +12,12 @@ import click
 import softstart
 from softstart.cli import options
 from softstart.cli.options import reading
-from softstart.cli.running import Answer, answers, attributed, make_controllers, option_value, working
+from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.drive import PARAMETERS
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.input.gear import BEHIND
-from softstart.quantities import multiple, to_si, values_in
+from softstart.quantities import read_multiple, to_si, values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
@@ -28,28 +28,28 @@ STATE = "tuning.sqlite"
 LARGEST_GRID = 100  # values of one axis
 
 
-def read_grid(text: str, option: str, unit: str) -> list[Any]:
+def read_axis(text: str, option: str, unit: str) -> list[Any]:
     """Values with commas between, or from:to:count; quantities, or multiples as 2x or 5J1.
 
-    >>> read_grid("0.5, 2x", "--gaps", "rad"), read_grid("0.5:2:4", "--gaps", "rad")
+    >>> read_axis("0.5, 2x", "--gaps", "rad"), read_axis("0.5:2:4", "--gaps", "rad")
     ([0.5, '2.0x'], [0.5, 1.0, 1.5, 2.0])
-    >>> read_grid("2J1:5J1:3", "--inertias", "kg*m^2"), read_grid("0.01 rad at output", "--gaps", "rad")
+    >>> read_axis("2J1:5J1:3", "--inertias", "kg*m^2"), read_axis("0.01 rad at output", "--gaps", "rad")
     (['2.0J1', '3.5J1', '5.0J1'], ['0.01 rad at output'])
     """
 
     def read(part: str) -> tuple[float, str]:
         there = BEHIND.fullmatch(part)  # of the gear of the drive, which is read later
-        if (found := multiple(part, option, ("x", "J1"))) is not None:
+        if (found := read_multiple(part, option, ("x", "J1"))) is not None:
             return found
         value = float(to_si(there[1] if there else part, unit, name=option))
         return value, f" {unit} at output" if there else ""
 
-    found = options.read_values(text, option, read, LARGEST_GRID)
+    found = options.read_value_list(text, option, read, LARGEST_GRID)
     return [f"{float(f'{one:.12g}')!r}{ending}" if ending else float(f"{one:.12g}") for one, ending in found]
 
 
 def _grid(unit: str) -> Callable[..., Any]:
-    return reading(lambda text, option: read_grid(text, option, unit))
+    return reading(lambda text, option: read_axis(text, option, unit))
 
 
 def read_free(text: str, option: str = "--free") -> dict[str, tuple[str, str] | None]:
@@ -83,7 +83,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     }
 
 
-@click.command()
+@click.command("tune")
 @options.controller_option(
     "--controller", "NAME", "The controller to tune, or path/to/file.py:ClassName.", required=True
 )
@@ -107,7 +107,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     callback=reading(read_tolerances),
     help="Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover, "
     "encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.")  # fmt: skip
-@click.option("--quantile", metavar="SHARE", callback=options.quantity("1"), default="1",
+@click.option("--quantile", metavar="SHARE", callback=options.quantity_callback("1"), default="1",
     help="Quantile of the starts that is minimised. Default: 1, the worst case.")  # fmt: skip
 @click.option("--only", metavar="schedule|robust", type=click.Choice(["schedule", "robust"]),
     help="Compute the gain schedule or the robust set only.")  # fmt: skip
@@ -130,7 +130,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     "Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished "
     "parts are saved at once, so that an interrupted command resumes."
 )
-def tune(
+def tune_command(
     *, drive: Machine | Identification | UnknownStiffness, controller: str, params: dict[str, str],
     only: str | None, **asked: Any,
 ) -> Answer:  # fmt: skip
@@ -149,7 +149,7 @@ def tune(
         attributed(),
         _as_typed(),
     ):
-        make_controllers([controller], params, several=False)
+        controllers_from_options([controller], params, several=False)
         tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
     from softstart.views.tuning import any_in_time, tuning_sheet
 

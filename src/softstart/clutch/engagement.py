@@ -21,12 +21,12 @@ from softstart.arrays import Vector
 from softstart.clutch.laws import Law
 from softstart.clutch.model import Clutch
 from softstart.clutch.motion import (
-    Mode,
-    State,
+    ClutchMode,
+    ClutchState,
     Step,
     event_functions,
     first_crossing,
-    follow,
+    next_mode,
     roots,
     start_mode,
     step_from,
@@ -52,7 +52,7 @@ PATIENCE = 20.0  # times the slip time on a rigid shaft, until an engagement is 
 
 
 @dataclass(frozen=True)
-class Event:
+class EngagementEvent:
     """What happened at the instant t (s)."""
 
     t: float
@@ -140,7 +140,7 @@ class Engagement(OneLine):
     work_while_engaging: float
     energy: EnergyBalance
     phases: tuple[Phase, ...]
-    events: tuple[Event, ...]
+    events: tuple[EngagementEvent, ...]
     steps: tuple[Step, ...]
 
     @property
@@ -245,7 +245,7 @@ def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None
         if not end > 0.0:
             raise InputError(f"until = {until!r}: the end of the run is a time above 0 s.")
     law = clutch.friction
-    events: list[Event] = []
+    events: list[EngagementEvent] = []
     steps, mode, lost = _steps(clutch, law, end, events)
     return _figures(clutch, law, steps, events, mode, lost)
 
@@ -259,8 +259,8 @@ def _time_limit(clutch: Clutch, law: Law) -> float:
 
 
 def _steps(
-    clutch: Clutch, law: Law, until: float | None, events: list[Event]
-) -> tuple[list[Step], Mode, float]:
+    clutch: Clutch, law: Law, until: float | None, events: list[EngagementEvent]
+) -> tuple[list[Step], ClutchMode, float]:
     """The steps up to `until` or the end, the last mode, and the energy in J lost as damped flanks separate.
 
     The end is one period 2 pi sqrt(Ic/cp) after the first lock-up, with a gap not before the twist has
@@ -268,7 +268,7 @@ def _steps(
     time limit.
     """
     steps: list[Step] = []
-    state, mode = State(), start_mode(clutch)
+    state, mode = ClutchState(), start_mode(clutch)
     last = _time_limit(clutch, law) if until is None else until
     watched = math.inf  # until then at least, once it has locked
     lost, reversals, direction, at_once = 0.0, 0, 0.0, 0
@@ -290,10 +290,10 @@ def _steps(
                     f"The engagement was given up at {state.t:.6g} s: {MOST_AT_ONCE} changes at one instant."
                 )
             lost += mode.elastic_energy(clutch, state.theta)
-            state, mode, event = follow(clutch, name, state, mode, float(step.M.sum()))
+            state, mode, event = next_mode(clutch, name, state, mode, float(step.M.sum()))
             lost -= mode.elastic_energy(clutch, state.theta)
             if event:
-                events.append(Event(state.t, event))
+                events.append(EngagementEvent(state.t, event))
             if event == "locked" and watched == math.inf:
                 watched = state.t + 2.0 * math.pi / clutch.locked_frequency
                 reversals, direction = 0, 0.0
@@ -318,7 +318,7 @@ def _first_event(clutch: Clutch, step: Step) -> tuple[Step, str]:
 
 
 def _figures(
-    clutch: Clutch, law: Law, steps: list[Step], events: list[Event], mode: Mode, lost: float
+    clutch: Clutch, law: Law, steps: list[Step], events: list[EngagementEvent], mode: ClutchMode, lost: float
 ) -> Engagement:
     """Peaks, work and energy of the steps."""
     drive, load, damping = 0.0, 0.0, lost

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import text_of
+from softstart.input.files import file_text
 from softstart.quantities import show
 
 LawKind = Literal["linear", "quadratic-concave", "quadratic-convex", "exponential"]
@@ -146,6 +146,6 @@ def read_law(path: str | os.PathLike[str]) -> tuple[list[float], list[float]]:
     InputError for all lines that are wrong.
     """
     wanted = (Wanted(("time", "t"), "s"), Wanted(("torque", "m"), "N*m"))
-    text = text_of(path, "a table of the law", "CSV")
+    text = file_text(path, "a table of the law", "CSV")
     times, torques = read_columns(text, show(os.fspath(path)), wanted).values
     return times.tolist(), torques.tolist()

@@ -40,7 +40,7 @@ NEARLY_REAL = 1e-6  # imaginary part of a root that may be a real one
 
 
 @dataclass(frozen=True)
-class State:
+class ClutchState:
     """State at the instant t (s): twist theta (rad), speeds wM and wc (rad/s)."""
 
     t: float = 0.0
@@ -50,7 +50,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Mode:
+class ClutchMode:
     """Which equations apply.
 
     `slip`: +1 the clutch side is slower than w0, -1 faster, 0 locked. `side`: +1 or -1 the flank, 0 inside of
@@ -87,7 +87,7 @@ class Step:
 
     start: float
     end: float
-    mode: Mode
+    mode: ClutchMode
     M: Vector
     F: Vector
     T: Vector
@@ -112,18 +112,18 @@ class Step:
         series = {name: getattr(self, name) * powers for name in ("M", "F", "T", "theta", "wM", "wc")}
         return replace(self, end=self.start + share * self.length, **series)
 
-    def after(self) -> State:
+    def after(self) -> ClutchState:
         """The state at the end."""
-        return State(self.end, *(float(series.sum()) for series in (self.theta, self.wM, self.wc)))
+        return ClutchState(self.end, *(float(series.sum()) for series in (self.theta, self.wM, self.wc)))
 
 
-def start_mode(clutch: Clutch) -> Mode:
+def start_mode(clutch: Clutch) -> ClutchMode:
     """At rest in mid-gap: the clutch slips, a reactive load stands (without torque it is free)."""
     free = clutch.load_kind == "active" or clutch.load_torque == 0.0
-    return Mode(1, 0 if clutch.gap > 0.0 else 1, clutch.gap == 0.0, None if free else 0)
+    return ClutchMode(1, 0 if clutch.gap > 0.0 else 1, clutch.gap == 0.0, None if free else 0)
 
 
-def step_from(clutch: Clutch, law: Law, state: State, mode: Mode, last: float) -> Step:
+def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, last: float) -> Step:
     """The series of the mode from the state on: at most to `last` (s) and to the end of the law's piece."""
     IM, Ic, c, d = clutch.clutch_inertia, clutch.load_inertia, clutch.stiffness, clutch.damping
     piece, end = law.piece_at(state.t)
@@ -185,7 +185,9 @@ def _less(a: Vector, constant: float) -> Vector:
     return np.append(a[0] - constant, a[1:])
 
 
-def follow(clutch: Clutch, name: str, state: State, mode: Mode, M: float) -> tuple[State, Mode, str]:
+def next_mode(
+    clutch: Clutch, name: str, state: ClutchState, mode: ClutchMode, M: float
+) -> tuple[ClutchState, ClutchMode, str]:
     """State, mode and what happened (empty: nothing of interest) after the zero of an event function.
 
     `M` is the friction torque that the clutch can transmit at this instant.

@@ -9,11 +9,11 @@ from typing import Any
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
 from softstart.kernel import jit, motor, records
-from softstart.kernel.jit import OPTIONS, compiled_as, drop_stale, named
+from softstart.kernel.jit import OPTIONS, as_record, compiled_as, drop_stale
 from softstart.kernel.jit import unfused as compiled
 from softstart.kernel.jit import unfused_inner as inner
 from softstart.kernel.motor import STEP_SIGNATURE
-from softstart.kernel.records import MEASURED, Answer, record, size
+from softstart.kernel.records import MEASURED, Reply, record, size
 
 # indices of `measured`
 from softstart.kernel.motor import (  # isort: skip
@@ -43,13 +43,13 @@ __all__ = [
     "STATE",
     "TIME",
     "TORQUE",
-    "Answer",
+    "Reply",
     "Vector",
+    "as_record",
     "compiled",
     "compiled_step",
     "inner",
     "keep_state",
-    "named",
     "record",
     "size",
 ]

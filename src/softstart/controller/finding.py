@@ -146,18 +146,20 @@ def _values(
         try:
             unit = known[key].metadata.get("unit", "")
             choices = known[key].metadata.get("choices", ())
-            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value, choices)
+            values[key] = (
+                parameter_value(key, value, unit) if kind == "quantity" else _text(key, value, choices)
+            )
         except InputError as error:
             wrong.extend(error.sentences)
     return values, wrong
 
 
-def quantity(key: str, value: object, unit: str) -> Any:
+def parameter_value(key: str, value: object, unit: str) -> Any:
     """A parameter in SI; one that is a plain dataclass field has no unit, and is a bare number.
 
-    >>> quantity("rise", "20 ms", "s"), quantity("rise", "0.02", "")
+    >>> parameter_value("rise", "20 ms", "s"), parameter_value("rise", "0.02", "")
     (0.02, 0.02)
-    >>> quantity("rise", "20 ms", "")
+    >>> parameter_value("rise", "20 ms", "")
     Traceback (most recent call last):
     softstart.errors.InputError: rise = "20 ms": this parameter has no unit; give a bare number, as 0.02, or
     declare it in its class with parameter(unit, meaning).

@@ -72,7 +72,7 @@ class Tuned(Controller):
     controller: Controller
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", named(self.controller, self.label))
+        object.__setattr__(self, "name", display_name(self.controller, self.label))
 
     @property
     def sensors(self) -> Sensor:  # type: ignore[override]
@@ -186,7 +186,7 @@ def _mixed(first: float, second: float, share: float, scale: Scale) -> float:
     return (1.0 - share) * first + share * second
 
 
-def named(controller: Controller, label: str) -> str:
+def display_name(controller: Controller, label: str) -> str:
     """The name of tuned gains in tables."""
     return f"{label_of(controller)} ({label})"
 

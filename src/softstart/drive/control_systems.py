@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from softstart.drive.model import Drive
 
-__all__ = ["in_contact", "initial_state", "shaft_torque", "whole_drive"]
+__all__ = ["contact_torque", "in_contact", "initial_state", "whole_drive"]
 
 
 # The smoothing of what sticks or slews, in elastic periods, and the speed below which a load is stuck, in
@@ -44,7 +44,7 @@ _STUCK = 1e-6
 def in_contact(drive: Drive) -> control.StateSpace:
     """The drive in contact: inputs `motor_torque`, `load_torque` (N m, braking); states `z`, `w1`, `w2`.
 
-    Outputs are the states and `shaft_torque`. Holds while the flank presses (`shaft_torque > 0`; with
+    Outputs are the states and `contact_torque`. Holds while the flank presses (`contact_torque > 0`; with
     the `modelica` law also while the damping torque is below that of the spring).
 
 
@@ -70,14 +70,14 @@ def in_contact(drive: Drive) -> control.StateSpace:
     )
 
 
-def shaft_torque(theta: float, rate: float, c: float, d: float, gap: float, *, law: str) -> float:
+def contact_torque(theta: float, rate: float, c: float, d: float, gap: float, *, law: str) -> float:
     """Torque in N m that the shaft passes to the load at the twist `theta` (rad) and its rate (rad/s).
 
     On the touching side, `z = |theta| - gap/2 > 0` and `z'` its rate: `no-pull` max(0, c z + d z'),
     `dead-zone` c z + d z', `modelica` 0 if c z + d z' <= 0, else c z + min(c z, d z') (ElastoBacklash of the
     Modelica Standard Library); 0 while the gap is open.
 
-    >>> [shaft_torque(1.0, -8.0, 4.0, 1.0, 0.5, law=law) for law in ("no-pull", "dead-zone", "modelica")]
+    >>> [contact_torque(1.0, -8.0, 4.0, 1.0, 0.5, law=law) for law in ("no-pull", "dead-zone", "modelica")]
     [0.0, -5.0, 0.0]
     """
     z = abs(theta) - 0.5 * gap
@@ -120,7 +120,7 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
         return (torque - direction * friction) / inertia
 
     def torque(x: Vector, p: dict[str, float]) -> float:
-        return shaft_torque(x[0] - x[2], x[1] - x[3], p["c"], p["d"], p["gap"], law=law)
+        return contact_torque(x[0] - x[2], x[1] - x[3], p["c"], p["d"], p["gap"], law=law)
 
     def update(t: float, x: Vector, inputs: Vector, params: dict[str, float]) -> Vector:
         T = torque(x, params)

@@ -20,11 +20,11 @@ from softstart.drive.data_sheet_words import (
     Machine,
     converted,
 )  # fmt: skip
-from softstart.drive.doubts import doubts, doubts_of_motion
 from softstart.drive.model import Drive
+from softstart.drive.plausibility import motion_warnings, plausibility_warnings
 from softstart.errors import InputError
 from softstart.input.documents import document_text, literal, parsed
-from softstart.input.files import text_of
+from softstart.input.files import file_text
 from softstart.input.gear import Gear
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
 from softstart.input.parameters import Mistake, Parameter, Wording, bare, without_unit
@@ -243,7 +243,7 @@ class DataSheet(ParameterSet):
     @classmethod
     def load(cls, path: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
         """The TOML file at this path; `also` holds changes by path, as {"load.mass": "5000 kg"}."""
-        return cls.from_toml(text_of(path, cls.WHAT), where=os.fspath(path), also=also)
+        return cls.from_toml(file_text(path, cls.WHAT), where=os.fspath(path), also=also)
 
     @classmethod
     def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
@@ -598,17 +598,17 @@ class DataSheet(ParameterSet):
         return f"load {speed}, accelerated by {self.acceleration:.4g} {unit} on average"
 
     @property
-    def doubts_of_motion(self) -> list[str]:
+    def motion_warnings(self) -> list[str]:
         """What can hardly be of the motion of the load, which a drive does not know."""
         if self.machine == "rotor":
             return []
         a, balanced = self.acceleration, self.counterweight > 0.0
-        return list(doubts_of_motion(self.machine, self.speed, a, self._sine, balanced))
+        return list(motion_warnings(self.machine, self.speed, a, self._sine, balanced))
 
     @property
-    def doubts(self) -> list[str]:
+    def plausibility_warnings(self) -> list[str]:
         """What is possible and hardly ever true, of the drive and of the motion of its load."""
-        return [*doubts(self.drive), *self.doubts_of_motion]
+        return [*plausibility_warnings(self.drive), *self.motion_warnings]
 
     @cached_property
     def _follows(self) -> dict[str, _Entry]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
-from softstart.drive.doubts import TwoMasses
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
+from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
@@ -27,7 +27,7 @@ from softstart.input.parameter_set import (
     parameter,
     read_settings,
 )  # fmt: skip
-from softstart.input.parameters import Knob, Parameter, Wording, read_value
+from softstart.input.parameters import Parameter, ParameterValue, Wording, read_value
 from softstart.quantities import RefusedError, show
 
 __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
@@ -511,10 +511,10 @@ class Drive(ParameterSet):
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
 
-    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+    def scaled(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
         """The drive with so many times its gap, its start where it was in the gap, and its load inertia.
 
-        >>> Drive.load("crane-4amtkf").changed(gaps=4.0).gap
+        >>> Drive.load("crane-4amtkf").scaled(gaps=4.0).gap
         2.0
         """
         one = self if gaps == 1.0 else self.with_gap(gaps * self.gap)
@@ -532,28 +532,28 @@ class Drive(ParameterSet):
         return self.gap, self.load_inertia
 
     @property
-    def motor_at_load(self) -> float:
+    def motor_inertia_at_load(self) -> float:
         """Inertia of the motor at the shaft of the load, kg m2: the load is at the motor shaft here."""
         return self.motor_inertia
 
-    def moved(self, gap: float, inertia: float, origin: Any = None) -> Self:
+    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Any = None) -> Self:
         """The drive with another gap, as `with_gap`, and another load inertia; `origin` is for chains."""
         return self.with_gap(gap, load_inertia=inertia)
 
-    def by_path(self) -> dict[str, tuple[Parameter, Any]]:
+    def parameters_by_path(self) -> dict[str, tuple[Parameter, Any]]:
         """All parameters by their paths, each with its value."""
         return {one.path: (one, getattr(self, name)) for name, one in self.PARAMETERS.items()}
 
-    def knob(self, key: str) -> Knob | None:
+    def parameter_value(self, key: str) -> ParameterValue | None:
         """The parameter that a key names, as in a file or in Python; None where there is none.
 
-        >>> Drive.load("crane-4amtkf").knob("load.inertia").name
+        >>> Drive.load("crane-4amtkf").parameter_value("load.inertia").name
         'load_inertia'
         """
         name = BY_PATH.get(key, key)
-        return Knob(name, PARAMETERS[name], getattr(self, name)) if name in PARAMETERS else None
+        return ParameterValue(name, PARAMETERS[name], getattr(self, name)) if name in PARAMETERS else None
 
-    def knobs(self) -> Iterator[str]:
+    def parameter_keys(self) -> Iterator[str]:
         """The keys of all parameters that can be varied, as in a file."""
         return iter(BY_PATH)
 
@@ -579,7 +579,7 @@ class Drive(ParameterSet):
         return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
 
     @property
-    def lumped(self) -> TwoMasses:
+    def lever_rule_model(self) -> TwoMasses:
         """The drive as two masses at the motor shaft, as its doubts see it."""
         travels = (0.5 * self.gap - one.theta0 for one in self.positions.values())
         return TwoMasses(
@@ -600,7 +600,7 @@ class Drive(ParameterSet):
         return np.array([self.gap])
 
     @property
-    def own_gaps(self) -> tuple[float, ...]:
+    def local_gaps(self) -> tuple[float, ...]:
         """The gap of each shaft at that shaft itself, rad, as it was given."""
         return (float(self.gap),)
 

@@ -33,7 +33,7 @@ from scipy.stats import t as student
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError, SimulationError
 from softstart.identification.model import LogModel
-from softstart.identification.unknowns import Unknown, values_of
+from softstart.identification.unknowns import Unknown, model_parameters
 from softstart.start.comparison import INTERVAL
 
 HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
@@ -56,7 +56,7 @@ SAME: Final = 0.3  # standard errors between two explanations that are one
 HOPELESS: Final = 100.0  # above the least L: no place there is as likely
 
 
-class Sizes(NamedTuple):
+class ErrorScales(NamedTuple):
     """How large the errors are: of the measurement in units of its rounding, of the torque in N m."""
 
     noise: float
@@ -73,19 +73,19 @@ class Spot(NamedTuple):
     response: Matrix  # G, not turned
     jacobian: Matrix = np.zeros((0, 0))
 
-    def variance(self, sizes: Sizes) -> Vector:
+    def variance(self, sizes: ErrorScales) -> Vector:
         """The diagonal of V."""
         found: Vector = sizes.noise**2 + sizes.ripple**2 * self.eigenvalues
         return found
 
-    def innovations(self, sizes: Sizes) -> Vector:
+    def innovations(self, sizes: ErrorScales) -> Vector:
         """What is left in each sample that the samples before it did not tell, of unit size."""
         # V = upper' upper, without the product that rounding would break, and with a positive diagonal
         upper = np.linalg.qr(np.sqrt(self.variance(sizes))[:, None] * self.rotation, mode="r")
         upper *= np.sign(np.diag(upper))[:, None]
         return np.asarray(solve_triangular(upper, self.rotation.T @ self.residual, trans=1))
 
-    def likely_error(self, residual: Vector, sizes: Sizes) -> Vector:
+    def likely_error(self, residual: Vector, sizes: ErrorScales) -> Vector:
         """The most likely torque error for a turned residual: the best linear unbiased prediction."""
         pulled = self.rotation.T @ (residual / self.variance(sizes))
         return np.asarray(-(sizes.ripple**2) * (self.response.T @ pulled))
@@ -95,7 +95,7 @@ class Point(NamedTuple):
     """An x, the sizes of the errors that are most likely there, and each log about it."""
 
     x: Vector
-    sizes: Sizes
+    sizes: ErrorScales
     spots: tuple[Spot, ...]
     drift: Vector = np.zeros(0)  # d ln|V|/dx, halved
     value: float = math.nan  # of the restricted likelihood, see `Fitter.valued`
@@ -148,7 +148,9 @@ class Fitter:
     def residuals(self, points: Sequence[Vector], log: int, error: Vector | None = None) -> Matrix:
         """Model minus log in the samples that count, in units of their rounding, a row for each x."""
         model = self.models[log]
-        signals = model.signals([values_of(self.unknowns, x, log) for x in points], error)[:, model.rows]
+        signals = model.signals([model_parameters(self.unknowns, x, log) for x in points], error)[
+            :, model.rows
+        ]
         offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
         return np.asarray((signals + offsets[:, None] - model.values) / model.root)
 
@@ -175,7 +177,7 @@ class Fitter:
     def response(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """G: how the samples that count answer to a torque error, in units of their rounding."""
         model = self.models[log]
-        responses = model.responses(values_of(self.unknowns, x, log), error)
+        responses = model.responses(model_parameters(self.unknowns, x, log), error)
         return np.asarray(responses[model.rows] / model.root[:, None])
 
     def spot(self, x: Vector, log: int, error: Vector) -> Spot:
@@ -189,7 +191,7 @@ class Fitter:
         """Model minus log in each sample of each log, in its unit."""
         found = []
         for log, (model, error) in enumerate(zip(self.models, point.errors, strict=True)):
-            values = values_of(self.unknowns, point.x, log)
+            values = model_parameters(self.unknowns, point.x, log)
             one = model.signals([values], error)[0] - model.responses(values, error) @ error
             one += sum(point.x[i] for i in self._offset(log)) - model.log.values
             found.append(one[np.isfinite(one)])
@@ -247,9 +249,9 @@ class Fitter:
     def refined(self, x: Vector, held: int | None = None) -> Point:
         """The most likely x near this one. `held`: the number that stays."""
         errors = [np.zeros(one.blocks) for one in self.models]
-        return self.descended(self.settled(x, errors, Sizes(1.0, RIPPLE * self.largest_torque)), held)
+        return self.descended(self.settled(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque)), held)
 
-    def settled(self, x: Vector, errors: Sequence[Vector], sizes: Sizes) -> Point:
+    def settled(self, x: Vector, errors: Sequence[Vector], sizes: ErrorScales) -> Point:
         """The covariance at x about the torque errors that are most likely there, sought from `errors`."""
         spots = []
         for log, error in enumerate(errors):
@@ -332,7 +334,9 @@ class Fitter:
 
     # ---- how large the errors are ------------------------------------------------------------------------
 
-    def restricted(self, spots: Sequence[Spot], sizes: Sizes, about: Sequence[Spot] | None = None) -> float:
+    def restricted(
+        self, spots: Sequence[Spot], sizes: ErrorScales, about: Sequence[Spot] | None = None
+    ) -> float:
         """L + ln|J' V^-1 J|; J and V of the last term are those of `about`.
 
         Without `about` x need not be the most likely one: it follows along J.
@@ -351,12 +355,14 @@ class Fitter:
         along = (vectors.T @ pull)[kept]
         return value + float(np.log(values[kept]).sum() - np.sum(along**2 / values[kept]))
 
-    def sized(self, spots: Sequence[Spot], before: Sizes, about: Sequence[Spot] | None = None) -> Sizes:
+    def sized(
+        self, spots: Sequence[Spot], before: ErrorScales, about: Sequence[Spot] | None = None
+    ) -> ErrorScales:
         """Noise and ripple where `restricted` is least, from where they stood; at least the rounding."""
 
-        def sizes_at(logs: Vector) -> Sizes:
+        def sizes_at(logs: Vector) -> ErrorScales:
             excess, ripple = np.exp(np.clip(logs, -60.0, 60.0)).tolist()
-            return Sizes(math.hypot(1.0, excess), ripple)
+            return ErrorScales(math.hypot(1.0, excess), ripple)
 
         begin = np.log([math.sqrt(max(before.noise**2 - 1.0, 0.01)), before.ripple])
         simplex = begin + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
@@ -476,7 +482,7 @@ class Fitter:
         return best, others
 
 
-def _ripples(best: Point, logs: Sequence[float]) -> list[Sizes]:
+def _ripples(best: Point, logs: Sequence[float]) -> list[ErrorScales]:
     """The sizes of the best point with the ripple so many e-folds larger."""
     return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(one)) for one in logs]
 

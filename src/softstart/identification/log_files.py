@@ -16,13 +16,13 @@ from softstart.errors import InputError
 from softstart.input.columns import (
     CLOCK,
     SHARES,
-    Table,
+    CellTable,
     Wanted,
     are_units,
     cells_of,
     read_numbers,
-    rows_of,
     split_heading,
+    split_rows,
 )  # fmt: skip
 from softstart.input.files import read_text
 from softstart.quantities import RefusedError, nearest, parse, show
@@ -44,7 +44,7 @@ CELL: Final = re.compile(rf"{NUMBER}|[+-]?(?:nan|inf)|{CLOCK.pattern}|", re.IGNO
 COUNTS: Final = re.compile(r"(counts?|cts?|incr?(ements?)?|ticks?|pulses?)", re.IGNORECASE)
 
 
-class Asked(NamedTuple):
+class WantedColumn(NamedTuple):
     """A column as people write it: its name, a factor, and a unit."""
 
     name: str
@@ -52,12 +52,12 @@ class Asked(NamedTuple):
     unit: str
 
 
-class Sheet(NamedTuple):
+class LogTable(NamedTuple):
     """The columns of a file: name and unit of each, and the lines of numbers."""
 
     names: list[str]
     units: list[str]
-    table: Table
+    table: CellTable
 
     def titled(self, i: int) -> str:
         """A column as a sentence calls it."""
@@ -86,7 +86,7 @@ def read_log(where: str, columns: Mapping[str, str]) -> tuple[dict[str, Vector],
         time = _seconds(sheet, places["time"], asked.get("time"), place, notes)
         found = {"time": time}
         for key in [key for key in places if key != "time"]:
-            _, factor, unit = asked.get(key, Asked("", 1.0, ""))
+            _, factor, unit = asked.get(key, WantedColumn("", 1.0, ""))
             raw = _numbers(sheet, places[key], key, place)
             size = _size(sheet, places, key, unit, found["time"], raw, notes)
             found[key] = factor * size * raw
@@ -95,7 +95,7 @@ def read_log(where: str, columns: Mapping[str, str]) -> tuple[dict[str, Vector],
     return found, notes
 
 
-def asked_columns(columns: Mapping[str, str]) -> dict[str, Asked]:
+def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
     """Name, factor and unit of the columns as people write them.
 
     >>> asked_columns({"speed": "-n_act [rpm]", "angle": "1/4096 * pos[turn]"})["angle"]
@@ -114,14 +114,14 @@ def asked_columns(columns: Mapping[str, str]) -> dict[str, Asked]:
         factor = float(f"{minus}{above or 1}") / (float(below or 1) or math.nan)
         if not (math.isfinite(factor) and factor):
             raise InputError(f"columns: {key} = {show(text)}: its factor is 0 or none.")
-        found[key] = Asked(name, factor, unit)
+        found[key] = WantedColumn(name, factor, unit)
     return found
 
 
 # ---- where the numbers are, and what they are called ---------------------------------------------------
 
 
-def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, dict[str, int]]:
+def _sheet(text: str, asked: Mapping[str, WantedColumn], where: str) -> tuple[LogTable, dict[str, int]]:
     """The columns of a text, and in which of them each signal stands."""
     lines = text.splitlines()
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
@@ -136,7 +136,7 @@ def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, di
             f"tabs, commas or spaces; write them below a line of names, as {FORM}"
         )
     last = max(i for i in rows if sum(map(bool, _cells(lines[i], mark))) > 1)  # behind it words, as EOF
-    numbers = rows_of([(i + 1, lines[i]) for i in rows if first <= i <= last], mark, where)
+    numbers = split_rows([(i + 1, lines[i]) for i in rows if first <= i <= last], mark, where)
     width = len(numbers[0][1])  # without a mark at the end of each line
     above = [_heading(lines[i].lstrip("# "), mark, width) for i in range(first) if lines[i].strip()]
     headings = list(_headings([row for row in above if len(row) >= width], width))
@@ -146,7 +146,7 @@ def _sheet(text: str, asked: Mapping[str, Asked], where: str) -> tuple[Sheet, di
         )
     refusals = []
     for names, units in headings:
-        sheet = Sheet(names, units, Table(numbers, width, mark))
+        sheet = LogTable(names, units, CellTable(numbers, width, mark))
         try:
             places = _places(names, asked)
             _check_clocks(sheet, places)
@@ -226,7 +226,7 @@ def _channels(rows: Sequence[list[str]], width: int) -> tuple[list[str], list[st
     return names, units
 
 
-def _check_clocks(sheet: Sheet, places: Mapping[str, int]) -> None:
+def _check_clocks(sheet: LogTable, places: Mapping[str, int]) -> None:
     """Refuse channels whose samples are of other times than those of the first."""
     for key in (key for key in places if sheet.names[places[key] - 1] == CLOCKS):
         i = places[key] - 1
@@ -250,7 +250,7 @@ def _tail(name: str) -> tuple[str, str]:
     return (part[1], part[3]) if are_units([part[3]]) else (name, "")
 
 
-def _places(names: Sequence[str], asked: Mapping[str, Asked]) -> dict[str, int]:
+def _places(names: Sequence[str], asked: Mapping[str, WantedColumn]) -> dict[str, int]:
     """In which column each signal stands."""
     found: dict[str, list[int]] = {}
     for key, one in SIGNALS.items():
@@ -277,14 +277,14 @@ def _places(names: Sequence[str], asked: Mapping[str, Asked]) -> dict[str, int]:
 # ---- numbers and units ----------------------------------------------------------------------------------
 
 
-def _numbers(sheet: Sheet, place: int, name: str, where: str) -> Vector:
+def _numbers(sheet: LogTable, place: int, name: str, where: str) -> Vector:
     """A column as it stands there; NaN where it is empty."""
     return read_numbers(sheet.table, where, [Wanted((name,), "1")], [place], [""], missing=True).values[0]
 
 
-def _seconds(sheet: Sheet, place: int, asked: Asked | None, where: str, notes: list[str]) -> Vector:
+def _seconds(sheet: LogTable, place: int, asked: WantedColumn | None, where: str, notes: list[str]) -> Vector:
     """The times, of a clock or in a unit, s."""
-    _, factor, unit = asked or Asked("", 1.0, "")
+    _, factor, unit = asked or WantedColumn("", 1.0, "")
     cells = [row[place].strip() if place < len(row) else "" for _, row in sheet.table.rows]
     clocks = [CLOCK.fullmatch(cell) for cell in cells]
     if any(clocks):
@@ -307,7 +307,13 @@ def _seconds(sheet: Sheet, place: int, asked: Asked | None, where: str, notes: l
 
 
 def _size(
-    sheet: Sheet, places: Mapping[str, int], key: str, unit: str, time: Vector, raw: Vector, notes: list[str]
+    sheet: LogTable,
+    places: Mapping[str, int],
+    key: str,
+    unit: str,
+    time: Vector,
+    raw: Vector,
+    notes: list[str],
 ) -> float:
     """One of the unit of a column in SI: as it is asked for, as the file says, or as other columns tell."""
     place = places[key]
@@ -326,7 +332,7 @@ def _size(
 
 
 def _motion_size(
-    sheet: Sheet, places: Mapping[str, int], key: str, time: Vector, raw: Vector, notes: list[str]
+    sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector, notes: list[str]
 ) -> float:
     """One of the unit of an angle or a speed in SI; a column that is its derivative or integral checks it."""
     place, other = places[key], "speed" if key == "angle" else "angle"
@@ -381,7 +387,7 @@ def _unit(unit: str, key: str) -> float:
 
 
 def _alike(
-    sheet: Sheet, places: Mapping[str, int], key: str, time: Vector, raw: Vector
+    sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector
 ) -> Iterator[tuple[int, float]]:
     """The columns whose integral or derivative this one is, and by which ratio of the units.
 

@@ -19,8 +19,8 @@ from softstart.identification.logs import Log
 from softstart.kernel.records import ENDED, MACHINE
 from softstart.profile import TorqueProfile
 from softstart.start.engine import run_one
-from softstart.start.recorded import Recorded, Recorder
-from softstart.start.rows import Rows, rows_of
+from softstart.start.recorded import StartRecorder, Trajectory
+from softstart.start.rows import Rows, kernel_input
 
 POSITION: Final = "position"  # where in the gap a log begins, from -1 (opposite flank) to 1 (driving flank)
 DEAD_TIME: Final = "computing_delay"
@@ -134,17 +134,17 @@ class LogModel:
             found = filtered(self._fine, found.T, lag).T[::FINE]
         return np.asarray(found / math.sqrt(self.block))
 
-    def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Recorded:
+    def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Trajectory:
         """The start under the torque of the log and this error of it."""
         return next(self.motions([values], error))
 
     def motions(
         self, values: Sequence[Mapping[str, float]], error: Vector | None = None
-    ) -> Iterator[Recorded]:
+    ) -> Iterator[Trajectory]:
         """The start with each set of values."""
         players = {row.get(DEAD_TIME): self._player(row, error) for row in values}
         for row, plant in zip(values, self._plants(values), strict=True):
-            recorder = Recorder(plant, 0, 4 * self.times.size + 256)
+            recorder = StartRecorder(plant, 0, 4 * self.times.size + 256)
             until = float(self.times[-1]) * (1.0 + 1e-9)
             reason = run_one(players[row.get(DEAD_TIME)], self.drive, recorder, until)
             if reason != ENDED:
@@ -163,7 +163,7 @@ class LogModel:
         # numbers already, and within their ranges: to read and check them takes longer than the motion
         drive = Columns.of(self.drive)
         vars(drive).update(changes)
-        rows = rows_of(drive)
+        rows = kernel_input(drive)
         named = rows.machines.view(MACHINE)[:, 0]
         named["longest"], named["time_limit"] = math.inf, 1e9 + float(self.times[-1])
         return [rows.taken(slice(i, i + 1)) for i in range(len(values))]

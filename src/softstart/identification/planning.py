@@ -15,17 +15,17 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import Fitter, Point, Sizes
+from softstart.identification.fitting import ErrorScales, Fitter, Point
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import FRICTIONS
 from softstart.identification.unknowns import (
     USUAL,
     chosen,
+    model_parameters,
     position_is_unknown,
     unknowns_of,
     usual,
-    values_of,
 )
 from softstart.input.files import object_of
 from softstart.kernel.records import S_PHI
@@ -38,7 +38,9 @@ LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
 PLACE: Final = -0.6  # position in the gap for which widths are stated
-CHECKED: Final = 257  # start positions from which an experiment is simulated first, see `largest`
+CHECKED: Final = (
+    257  # start positions from which an experiment is simulated first, see `largest_over_position`
+)
 COARSE: Final = 4  # of these every fourth while a torque is designed, and for the travel
 KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
 EXACT: Final = 1e-9  # relative error of a largest value
@@ -67,7 +69,7 @@ class Experiment(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(Shown, sheet="identification.plan_sheet"):
+class ExperimentPlan(Shown, sheet="identification.plan_sheet"):
     """Experiments for a drive: the standard ones, then the planned one."""
 
     drive: Drive
@@ -118,7 +120,7 @@ def plan_experiments(
     max_travel: float | str | None = None,
     optimise: bool = True,
     progress: Callable[[str], None] | None = None,
-) -> Plan:
+) -> ExperimentPlan:
     """Find what standard experiments would tell about a drive, and a torque that tells more.
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
@@ -182,7 +184,7 @@ def plan_experiments(
         error = _between("ripple", ripple, "N*m", float(drive.Ms), "more is no error of the torque")
     asked = _asked(free, drive)
     aims = chosen(wanted, asked, asked, "this plan", key="wanted")
-    bench = Bench(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
+    bench = VirtualTest(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
     experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
         torque, travel = drive.limits.shaft_torque or max(one.peak for one in experiments), math.inf
@@ -193,7 +195,7 @@ def plan_experiments(
         if max_travel is not None:
             travel = _between("max_travel", quantity_of(drive, "gap", max_travel, "max_travel"), "rad")
         experiments.append(bench.designed(standard, torque, travel))
-    return Plan(drive, tuple(experiments), period, error)
+    return ExperimentPlan(drive, tuple(experiments), period, error)
 
 
 def _between(name: str, given: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
@@ -284,13 +286,14 @@ def standard_levels(drive: Drive) -> dict[str, tuple[Vector, Vector]]:
     return {name: (part * np.array(parts), np.array(levels)) for name, (parts, levels) in table.items()}
 
 
-def largest(figure: Callable[[Vector], Sequence[Vector] | Matrix], places: Vector) -> float:
+def largest_over_position(figure: Callable[[Vector], Sequence[Vector] | Matrix], places: Vector) -> float:
     """The largest value of a figure that is continuous in the start position, from values and contacts.
 
     An interval is halved while it may hold a larger value, by the values at its ends and the slopes there and
     beside; and where the contacts change: one that is only just made has a steep and narrow peak beside it.
 
-    >>> round(largest(lambda x: (1.0 - abs(x - 0.1234567), x > 0.12), np.linspace(0.0, 1.0, 5)), 9)
+    >>> positions = np.linspace(0.0, 1.0, 5)
+    >>> round(largest_over_position(lambda x: (1.0 - abs(x - 0.1234567), x > 0.12), positions), 9)
     1.0
     """
     span, (values, counts) = float(np.ptp(places)), figure(places)
@@ -320,7 +323,7 @@ def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class VirtualTest:
     """A drive, an inverter's log and an encoder: what any torque would tell."""
 
     drive: Drive
@@ -363,7 +366,7 @@ class Bench:
         x = np.array([
             one.number(float(numbers.get(one.name, getattr(drive, one.name, 0.0)))) for one in unknowns
         ])  # fmt: skip
-        signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([values_of(unknowns, x, 0)])[0]
+        signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([model_parameters(unknowns, x, 0)])[0]
         if count := _count_of(drive):
             signal = np.round(signal / count) * count
         model = LogModel.of(log.changed(values=signal, count=count), _at_rest(drive), SAMPLES)
@@ -371,7 +374,7 @@ class Bench:
         spot = fitter.spot(x, 0, np.zeros(model.blocks))
         spot = spot._replace(jacobian=spot.rotation @ fitter.jacobian(x, 0, spot.error))
         # a longer period stands for samples left out: the same error of the torque in each of them
-        sizes = Sizes(1.0, self.ripple * math.sqrt(self.period / period))
+        sizes = ErrorScales(1.0, self.ripple * math.sqrt(self.period / period))
         variances = np.diag(fitter.covariance(Point(x, sizes, (spot,))))
         reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
         found = {}
@@ -383,8 +386,10 @@ class Bench:
 
     def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
-        peak = largest(lambda places: self.loads(profile, end, places)[[0, 2]], self.places)
-        return peak, largest(lambda places: self.loads(profile, end, places)[1:], self.places[::COARSE])
+        peak = largest_over_position(lambda places: self.loads(profile, end, places)[[0, 2]], self.places)
+        return peak, largest_over_position(
+            lambda places: self.loads(profile, end, places)[1:], self.places[::COARSE]
+        )
 
     def loads(self, profile: TorqueProfile, end: float, places: Vector) -> Matrix:
         """From each position peak of the shaft torque, travel of the load, and changes of the contact.

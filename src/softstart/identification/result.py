@@ -241,7 +241,7 @@ class Identification(Shown, sheet="identification.identification_sheet"):
 
         if not self.logs:
             raise InputError("logs: an identification that was loaded has none; their figure is beside it.")
-        return views.figure(self)
+        return views.identification_figure(self)
 
 
 def _or_nan(value: Any) -> Any:

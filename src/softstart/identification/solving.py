@@ -16,7 +16,7 @@ from softstart.chain.machines import MachineLike, one_machine
 from softstart.chain.model import Chain
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
-from softstart.identification.fitting import MOST_RIPPLE, STEP, Fitter, Point, Sizes, Spot, agreeing
+from softstart.identification.fitting import MOST_RIPPLE, STEP, ErrorScales, Fitter, Point, Spot, agreeing
 from softstart.identification.log_files import MOTIONS, SIGNALS
 from softstart.identification.logs import TURN, Log
 from softstart.identification.model import FILTER, POSITION, LogModel
@@ -25,10 +25,10 @@ from softstart.identification.unknowns import (
     FREE,
     Unknown,
     chosen,
+    model_parameters,
     position_is_unknown,
     unknowns_of,
     usual,
-    values_of,
 )
 from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
@@ -123,21 +123,23 @@ def identify(
     minima = fitter.search(searches)
     fitter.progress("weights and fit")
     best, others = fitter.refined(minima[0][0]), list[Point]()
-    doubts = misfits(fitter, best)
-    if not doubts:
+    plausibility_warnings = misfits(fitter, best)
+    if not plausibility_warnings:
         seek, best = _untold(fitter, best), fitter.valued(best, best)
         if seek:
             fitter.progress("other explanations")
             best, others = fitter.explanations(best)
-        doubts = misfits(fitter, best)
-    estimates = _without_intervals(unknowns, best.x) if doubts else _estimates(fitter, best, others)
+        plausibility_warnings = misfits(fitter, best)
+    estimates = (
+        _without_intervals(unknowns, best.x) if plausibility_warnings else _estimates(fitter, best, others)
+    )
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     source = f"identified from {', '.join(one.name for one in read)}"
     found = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *_left_out(machine),
-        *(doubts or _unknown(estimates)),
+        *(plausibility_warnings or _unknown(estimates)),
         *_other_scale(drive, found),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
@@ -388,7 +390,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     had = {name: float(getattr(drive, name)) for name in steps}
     logs = []  # of each the shape of each effect in what is left
     for i, (model, spot) in enumerate(zip(fitter.models, best.spots, strict=True)):
-        values = values_of(fitter.unknowns, best.x, i) | had
+        values = model_parameters(fitter.unknowns, best.x, i) | had
         each = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
         signals = model.signals(each, spot.error)[:, model.rows] / model.root
         shapes = [(one - signals[0]) / step for one, step in zip(signals[1:], steps.values(), strict=True)]
@@ -419,7 +421,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     ]
 
 
-def _slow_torque(spot: Spot, sizes: Sizes) -> float:
+def _slow_torque(spot: Spot, sizes: ErrorScales) -> float:
     """Chance that no torque that changes slowly is left: the share of it in what is left is chi-square.
 
     Of the torques cos(k pi t/T), of which the parameters explain a part.

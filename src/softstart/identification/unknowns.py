@@ -160,7 +160,7 @@ def unknowns_of(
     return tuple(found)
 
 
-def values_of(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, float]:
+def model_parameters(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, float]:
     """The parameters of the model of one log at x."""
     return {
         one.name: one.value(number)

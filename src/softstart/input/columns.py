@@ -28,8 +28,15 @@ _SPACED = re.compile(
 )
 
 __all__ = [
-    "CLOCK", "Columns", "Wanted", "are_units", "cells_of", "read_columns", "read_numbers", "rows_of",
+    "CLOCK",
+    "Columns",
+    "Wanted",
+    "are_units",
+    "cells_of",
+    "read_columns",
+    "read_numbers",
     "split_heading",
+    "split_rows",
 ]  # fmt: skip
 
 Row = tuple[int, list[str]]  # the number of a line, and its cells
@@ -74,7 +81,7 @@ def read_columns(
     numbered = enumerate(text.splitlines(), start=1)
     lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     mark = next((mark for mark in (";", "\t", ",") if any(mark in line for _, line in lines)), " ")
-    rows = rows_of(lines, mark, where)
+    rows = split_rows(lines, mark, where)
     heading = [cell.strip() for cell in rows[0][1]] if rows else []
     first = show(mark.join(heading))
     units = [""] * len(wanted)
@@ -93,11 +100,11 @@ def read_columns(
     if not rows:
         names = " and ".join(one.names[0] for one in wanted)
         raise InputError(f"{where}: there are no numbers in it; write a line for each {names}.")
-    table = Table(rows, len(heading), mark)
+    table = CellTable(rows, len(heading), mark)
     return read_numbers(table, where, wanted, places, [units[place] for place in places], missing=missing)
 
 
-class Table(NamedTuple):
+class CellTable(NamedTuple):
     """Lines of cells: each has this number of them, divided by this mark."""
 
     rows: list[Row]
@@ -106,7 +113,7 @@ class Table(NamedTuple):
 
 
 def read_numbers(
-    table: Table,
+    table: CellTable,
     where: str,
     wanted: Sequence[Wanted],
     places: Sequence[int],
@@ -180,7 +187,7 @@ def cells_of(line: str, mark: str) -> list[str]:
     return next(csv.reader([line], delimiter=mark, skipinitialspace=True))
 
 
-def rows_of(lines: Sequence[tuple[int, str]], mark: str, where: str) -> list[Row]:
+def split_rows(lines: Sequence[tuple[int, str]], mark: str, where: str) -> list[Row]:
     """The cells of numbered lines, divided by a mark."""
     try:
         rows = [(n, cells_of(line, mark)) for n, line in lines]

@@ -35,12 +35,20 @@ MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer 
 _DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
 
 __all__ = [
-    "Table", "changed", "document_text", "literal", "made", "parsed", "placed", "read_document", "table_text",
+    "DocumentTable",
+    "apply_changes",
+    "construct",
+    "document_text",
+    "literal",
+    "parsed",
+    "placed",
+    "read_document",
+    "table_text",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Table:
+class DocumentTable:
     """One table of a document: `name` as in [name], "" for the keys above the first table.
 
     With `many` it is a list of tables, [[name]], of at least `least` entries. A single one that is not
@@ -73,7 +81,7 @@ class Table:
 
 def read_document(
     text: str,
-    tables: Sequence[Table],
+    tables: Sequence[DocumentTable],
     what: str,
     *,
     where: str = "",
@@ -86,7 +94,8 @@ def read_document(
     typed at a command line, {"table.key": value}, which go before what the text says; keys in `usual` have
     units, see `without_unit`. Raises one InputError for everything that is wrong.
 
-    >>> shaft = Table("shaft", (Parameter("stiffness", "N*m/rad", "stiffness", '"5 N*m/rad"', "above 0"),))
+    >>> stiffness = Parameter("stiffness", "N*m/rad", "stiffness", '"5 N*m/rad"', "above 0")
+    >>> shaft = DocumentTable("shaft", (stiffness,))
     >>> read_document("[shaft]\\nstiffness = '2 kN*m/rad'", [shaft], "a test")
     {'shaft': {'stiffness': 2000.0}}
     >>> read_document("[shaft]\\nstifness = -1", [shaft], "a test")
@@ -95,7 +104,7 @@ def read_document(
     """
     wording = Wording(where, style="toml")
     document = parsed(text, wording, what, tables)
-    wrong = list(changed(document, also or {}, tables, what))
+    wrong = list(apply_changes(document, also or {}, tables, what))
     given, mistakes = placed(document, tables, what, wording)
     found: dict[str, Any] = {}
     in_rows: list[str] = []
@@ -125,7 +134,7 @@ def read_document(
     return found
 
 
-def made(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: list[str]) -> T | None:
+def construct(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: list[str]) -> T | None:
     """What `make` returns for the values; where it refuses them, its sentences go to `wrong`."""
     try:
         return make(**values)
@@ -134,7 +143,7 @@ def made(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: l
         return None
 
 
-def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ()) -> dict[str, Any]:
+def parsed(text: str, wording: Wording, what: str, tables: Sequence[DocumentTable] = ()) -> dict[str, Any]:
     """The document that the TOML text holds; `what` names what it describes.
 
     Raises `InputError`, with the line, for text that is no TOML, or that is empty where there are `tables`.
@@ -184,8 +193,8 @@ def _invalid(message: str, text: str) -> tuple[str, str]:
     return subject, f"this is not valid TOML ({what}){remedy}"
 
 
-def changed(
-    document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[Table], what: str
+def apply_changes(
+    document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[DocumentTable], what: str
 ) -> Iterator[str]:
     """Put changes by path into the document; a sentence for each that cannot be."""
     paths = {
@@ -213,13 +222,13 @@ def changed(
 
 
 def placed(
-    document: Mapping[str, Any], tables: Sequence[Table], what: str, wording: Wording
+    document: Mapping[str, Any], tables: Sequence[DocumentTable], what: str, wording: Wording
 ) -> tuple[dict[str, Any], list[Mistake]]:
     """What stands in each table, by its name, and every key or table that stands where it should not.
 
     The keys within the rows of [[tables]] are not looked at.
     """
-    named = {"": Table("", ())} | {table.name: table for table in tables}
+    named = {"": DocumentTable("", ())} | {table.name: table for table in tables}
     everywhere = [p for table in tables for p in table.parameters]
     former = {p.formerly: p for p in everywhere if p.formerly}
     given: dict[str, Any] = {}
@@ -229,7 +238,7 @@ def placed(
     def note(subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
         mistakes.append(Mistake(wording.sentence(subject, reason), (), tuple(p.path for p in meant)))
 
-    def take(table: Table, content: object, written: str = "") -> None:
+    def take(table: DocumentTable, content: object, written: str = "") -> None:
         name = table.name
         if table.many:
             rows = isinstance(content, list) and all(isinstance(row, dict) for row in content)
@@ -280,7 +289,13 @@ def placed(
 
 
 def _unknown(
-    place: str, key: str, value: object, table: Table, tables: Sequence[Table], what: str, wording: Wording
+    place: str,
+    key: str,
+    value: object,
+    table: DocumentTable,
+    tables: Sequence[DocumentTable],
+    what: str,
+    wording: Wording,
 ) -> Mistake:
     """That a table has no such key, and those that were probably meant, in this table or in others."""
     everywhere = [p for one in tables for p in one.parameters]
@@ -302,12 +317,12 @@ def _unknown(
 # ---- writing --------------------------------------------------------------------------------------------
 
 
-def table_text(table: Table, values: Mapping[str, object], *, units: bool = True) -> str:
+def table_text(table: DocumentTable, values: Mapping[str, object], *, units: bool = True) -> str:
     """The lines of a table, each with unit and meaning in a comment (`units`), or speeds with units.
 
     Numbers are in SI, or as `shortest` writes them; None is left out.
 
-    >>> shaft = Table("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),))
+    >>> shaft = DocumentTable("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),))
     >>> print(table_text(shaft, {"gap": 0.5}), table_text(shaft, {"gap": 0.06981317007977318}), sep="\\n")
     [shaft]
     gap = 0.5  # rad: total gap
@@ -324,7 +339,7 @@ def table_text(table: Table, values: Mapping[str, object], *, units: bool = True
     return "\n".join(lines)
 
 
-def document_text(blocks: Iterable[tuple[Table, Mapping[str, object]]], *, units: bool = True) -> str:
+def document_text(blocks: Iterable[tuple[DocumentTable, Mapping[str, object]]], *, units: bool = True) -> str:
     """The text of a document: one table after the other, without those that have no keys."""
     texts = ((table.name, table_text(table, values, units=units)) for table, values in blocks)
     return "\n\n".join(text for name, text in texts if text and (name == "" or "\n" in text)) + "\n"

@@ -16,7 +16,7 @@ from softstart.errors import InputError
 from softstart.quantities import RefusedError, nearest, show
 from softstart.stopping import at_stop
 
-__all__ = ["ABSENT", "Library", "object_of", "read_text", "refusal_of", "text_of", "write_whole"]
+__all__ = ["ABSENT", "Library", "file_text", "object_of", "read_text", "refusal_of", "write_whole"]
 
 
 class Library:
@@ -150,10 +150,10 @@ def read_text(path: str | os.PathLike[str], also: str | None = None) -> str:
         raise RefusedError(f"the file is not UTF-8 text (line {line}); save it as UTF-8") from None
 
 
-def text_of(path: str | os.PathLike[str], what: str, form: str = "TOML") -> str:
+def file_text(path: str | os.PathLike[str], what: str, form: str = "TOML") -> str:
     """The text of a file, or an InputError in one sentence that names it; `form` is that of the file.
 
-    >>> text_of("nowhere.csv", "a table of the law", "CSV")
+    >>> file_text("nowhere.csv", "a table of the law", "CSV")
     Traceback (most recent call last):
     softstart.errors.InputError: "nowhere.csv": there is no such file; give the path of a table ...
     """

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from softstart.errors import InputError
 from softstart.hints import term
-from softstart.input.documents import Table, changed, placed
+from softstart.input.documents import DocumentTable, apply_changes, placed
 from softstart.input.gear import NO_GEAR, Gear
 from softstart.input.parameters import (
     REQUIRED,
@@ -97,7 +97,7 @@ class ParameterSet:
     SEVERAL: ClassVar[str] = ""
     BATCH: ClassVar[bool] = False
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
-    TABLES: ClassVar[tuple[Table, ...]] = ()
+    TABLES: ClassVar[tuple[DocumentTable, ...]] = ()
 
     def __init_subclass__(cls, kw_only: bool = True) -> None:
         own = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
@@ -110,7 +110,7 @@ class ParameterSet:
         }
         everyone = cls.PARAMETERS.values()
         tables = sorted({p.table: None for p in everyone}, key=bool)  # "" first
-        cls.TABLES = tuple(Table(one, tuple(p for p in everyone if p.table == one)) for one in tables)
+        cls.TABLES = tuple(DocumentTable(one, tuple(p for p in everyone if p.table == one)) for one in tables)
         cls.__replace__ = cls.replace  # type: ignore[attr-defined]  # copy.replace of Python 3.13
         arguments = sorted(map(_argument, everyone), key=lambda one: one.kind)
         cls.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
@@ -193,7 +193,7 @@ class ParameterSet:
     ) -> Self:
         """From the tables of a TOML document, after the changes of `also` ({path: value})."""
         wording = Wording(where, style="toml")
-        wrong = [Mistake(one) for one in changed(document, also or {}, cls.TABLES, cls.WHAT)]
+        wrong = [Mistake(one) for one in apply_changes(document, also or {}, cls.TABLES, cls.WHAT)]
         content, mistakes = placed(document, cls.TABLES, cls.WHAT, wording)
         given = {
             p.name: content[p.table][p.key]
@@ -284,21 +284,21 @@ def read_settings(
     >>> mistakes[0].sentence
     'gapp=1: there is no parameter "gapp"; did you mean shaft.gap?'
     """
-    by_path = {path: p for p in parameters.values() for path in (p.formerly, p.path) if path}
+    parameters_by_path = {path: p for p in parameters.values() for path in (p.formerly, p.path) if path}
     given: dict[str, object] = {}
     written: dict[str, str] = {}
     first: dict[str, str] = {}
     mistakes = []
     for setting in [settings] if isinstance(settings, str) else settings:
         key, equals, value = (part.strip() for part in str(setting).partition("="))
-        found = by_path.get(key) or parameters.get(key)
+        found = parameters_by_path.get(key) or parameters.get(key)
         subject = show(setting)
         if not equals or not key or not isinstance(setting, str):
             reason = "a setting is text: a key, an equals sign and a value, such as load.inertia=0.07"
         elif found is None:
             subject, reason = (
                 setting,
-                f"there is no parameter {show(key)}; {_remedy(key, by_path, parameters)}",
+                f"there is no parameter {show(key)}; {_remedy(key, parameters_by_path, parameters)}",
             )
         elif found.name in first:
             subject, reason = setting, f"it was set before ({first[found.name]}); keep one of the two"
@@ -311,9 +311,14 @@ def read_settings(
     return given, Wording(style="path", written=written), mistakes
 
 
-def _remedy(key: str, by_path: Mapping[str, Parameter], parameters: Mapping[str, Parameter]) -> str:
-    within = [path for path in by_path if path.startswith(f"{key}.")]
+def _remedy(
+    key: str, parameters_by_path: Mapping[str, Parameter], parameters: Mapping[str, Parameter]
+) -> str:
+    within = [path for path in parameters_by_path if path.startswith(f"{key}.")]
     if within:
         return f"{key} is a table, name one of its keys, such as {within[0]}"
-    meant, other = meant_by(key, parameters.values()), term(key) or f"there are {', '.join(by_path)}"
+    meant, other = (
+        meant_by(key, parameters.values()),
+        term(key) or f"there are {', '.join(parameters_by_path)}",
+    )
     return f"did you mean {' or '.join(p.path for p in meant)}?" if meant else other

@@ -16,8 +16,19 @@ from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
 from softstart.quantities import RefusedError, Value, nearest, parse, show, values_in, without_powers
 
 __all__ = [
-    "REQUIRED", "Knob", "Limit", "Mistake", "Parameter", "Wording", "at_motor", "bare", "meant_by",
-    "read_value", "read_values", "sentences_of", "without_unit",
+    "REQUIRED",
+    "Limit",
+    "Mistake",
+    "Parameter",
+    "ParameterValue",
+    "Wording",
+    "at_motor",
+    "bare",
+    "meant_by",
+    "read_value",
+    "read_values",
+    "sentences_of",
+    "without_unit",
 ]  # fmt: skip
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
@@ -105,7 +116,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Knob:
+class ParameterValue:
     """A parameter of a machine that can be varied: its word in Python, what it is, and its value."""
 
     name: str

@@ -13,7 +13,7 @@ import math
 from numba import types
 
 from softstart.arrays import Vector
-from softstart.kernel.jit import apart, inner
+from softstart.kernel.jit import separately_compiled, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
     MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
@@ -66,7 +66,7 @@ def safe_step(y: float, dy: float, bend: float, third: float, room: float) -> fl
     return step
 
 
-@apart(types.float64(WORK_TYPE, _I, _I, _F, _F))
+@separately_compiled(types.float64(WORK_TYPE, _I, _I, _F, _F))
 def crossing(s: Record, low: int, n: int, begin: float, end: float) -> float:
     """First x in [begin, end] at which s.f/x^low falls through zero; it is positive, or rises, at `begin`."""
     f = s.f
@@ -106,7 +106,7 @@ def crossing(s: Record, low: int, n: int, begin: float, end: float) -> float:
     return LOST
 
 
-@apart(types.float64(WORK_TYPE, _I, _F, _I, _F, _F))
+@separately_compiled(types.float64(WORK_TYPE, _I, _F, _I, _F, _F))
 def first_root(s: Record, n: int, end: float, zeros: int, noise: float, faint: float) -> float:
     """First x in [0, end] at which the event function f = s.f falls below zero.
 
@@ -161,7 +161,7 @@ REJOINED = 3
 
 
 @inner
-def swing(f: Vector, n: int) -> float:
+def deviation_bound(f: Vector, n: int) -> float:
     """How far a polynomial is from its beginning at most."""
     total = 0.0
     for o in range(1, n + 1):
@@ -211,7 +211,7 @@ def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]
     """The flank of an open gap that is reached first, or the end of impacts that pile up on one."""
     half, theta = s.half[k], s.theta[k]
     twist = s.twist[k]
-    if swing(twist, n) < half - abs(theta):
+    if deviation_bound(twist, n) < half - abs(theta):
         return NO_EVENT, end
     faint = rounding_of_twist(s, k, h)
     if s.rigid[k] != 0.0 and s.zeros[k] == 0 and abs(theta) == half and half > 0.0:
@@ -267,12 +267,12 @@ def parting(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
         set_line(s.f, s.torque[k], n, 0.0, side)
         faint = faint_torque(s, k, h, noise)
     elif s.law[k] != DEAD_ZONE and s.d[k] > 0.0:
-        if swing(s.torque[k], n) < side * s.torque[k, 0]:
+        if deviation_bound(s.torque[k], n) < side * s.torque[k, 0]:
             return NO_EVENT, end
         set_line(s.f, s.torque[k], n, 0.0, side)
         faint = faint_torque(s, k, h, noise)
     else:
-        if swing(s.twist[k], n) < side * s.theta[k] - s.half[k]:
+        if deviation_bound(s.twist[k], n) < side * s.theta[k] - s.half[k]:
             return NO_EVENT, end
         set_line(s.f, s.twist[k], n, -s.half[k], side)
         noise, faint = ROUNDING * s.half[k], rounding_of_twist(s, k, h)
@@ -307,7 +307,7 @@ def returning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, flo
 @inner
 def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     """Rigid flanks part when they would have to pull."""
-    if swing(s.torque[k], n) < s.side[k] * s.torque[k, 0]:
+    if deviation_bound(s.torque[k], n) < s.side[k] * s.torque[k, 0]:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.side[k])
     noise = 1e-14 * s.scale[s.first[k]]
@@ -353,7 +353,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if s.rubbing[i] == 0:
         return event, end
     if s.stuck[i] != 0:
-        if s.gears[i] == 0 and swing(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
+        if s.gears[i] == 0 and deviation_bound(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
             return event, end
         for which in range(2):
             set_line(s.f, s.held[i], n, s.hold[i], -1.0 + 2.0 * which)
@@ -361,7 +361,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
                 for o in range(n + 1):
                     s.f[o] += grip(s, i, 1.0 - 2.0 * which, o)
             # an excess that `first_root` would pass over in the speed of the body, once let go, is none
-            if s.f[0] < 0.0 and s.f[0] >= -FAINT * swing(s.f, n):
+            if s.f[0] < 0.0 and s.f[0] >= -FAINT * deviation_bound(s.f, n):
                 s.f[0] = 0.0
             x = first_root(s, n, end, 0, noise, noise)
             if x < NONE:
@@ -373,7 +373,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     j = i
     while s.rubs[j] == 0.0:
         j += 1
-    reach = swing(s.speed[i], n)
+    reach = deviation_bound(s.speed[i], n)
     if reach < s.direction[j] * s.w[i]:
         return event, end
     set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
@@ -401,7 +401,7 @@ def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, fl
         point = s.at[i, piece]
         set_line(s.f, course, n, sign * point, -sign)
         zeros = 1 if s.passed[i] == -sign else 0
-        if zeros == 0 and swing(s.f, n) < s.f[0]:
+        if zeros == 0 and deviation_bound(s.f, n) < s.f[0]:
             continue
         x = first_root(s, n, end, zeros, ROUNDING * abs(point), faint)
         if x < NONE:
@@ -432,7 +432,7 @@ def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int
     return event, end
 
 
-@apart(types.int64(WORK_TYPE, _F, _I))
+@separately_compiled(types.int64(WORK_TYPE, _F, _I))
 def next_event(s: Record, h: float, n: int) -> int:
     """The first event of the span; `s.where` is its shaft or mass, `s.share` the share of the span."""
     first = NO_EVENT
@@ -458,7 +458,7 @@ def next_event(s: Record, h: float, n: int) -> int:
             if event == UNSOLVED:
                 return first
     load = s.at_load
-    if math.isnan(s.start_time) and swing(s.speed[load], n) >= s.target - s.w[load]:
+    if math.isnan(s.start_time) and deviation_bound(s.speed[load], n) >= s.target - s.w[load]:
         set_line(s.f, s.speed[load], n, s.target, -1.0)
         x = first_root(s, n, s.share, 0, ROUNDING * s.target, 0.0)
         if x < NONE:
@@ -483,11 +483,11 @@ def keep_peak(s: Record, k: int, torque: float, time: float) -> None:
         s.peak[k] = torque
 
 
-@apart(types.int64(WORK_TYPE, _I, _I, _F, _F))
+@separately_compiled(types.int64(WORK_TYPE, _I, _I, _F, _F))
 def peak_within(s: Record, k: int, n: int, end: float, h: float) -> int:
     """Note the largest |T| of shaft k up to `end` if it is above the largest so far; 0 if it is lost."""
     f, torque = s.f, s.torque[k]
-    if abs(torque[0]) + swing(torque, n) <= abs(s.peak[k]):
+    if abs(torque[0]) + deviation_bound(torque, n) <= abs(s.peak[k]):
         return 1
     keep_peak(s, k, torque[0], s.time)
     keep_peak(s, k, value(torque, n, end), s.time + end * h)

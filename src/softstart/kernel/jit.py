@@ -90,30 +90,30 @@ def compile_now(module: Any) -> None:
             one.dispatcher  # noqa: B018
 
 
-def named(row: Any, dtype: Any) -> Any:
+def as_record(row: Any, dtype: Any) -> Any:
     """The same memory with names: row 0 of `row.view(dtype)`, in compiled functions at no cost.
 
     numba compiles `view` again for each pair of types, a tenth of a second each.
 
     >>> import numpy as np
-    >>> float(named(np.array([3.0, 4.0]), np.dtype([("x", float), ("y", float)]))["y"])
+    >>> float(as_record(np.array([3.0, 4.0]), np.dtype([("x", float), ("y", float)]))["y"])
     4.0
     """
     return row[: dtype.itemsize // row.itemsize].view(dtype)[0]
 
 
-@_type_callable(named)
+@_type_callable(as_record)
 def _typed(_: Any) -> Any:
     return lambda row, dtype: dtype.dtype
 
 
-@_lower_builtin(named, types.Array, types.DType)
+@_lower_builtin(as_record, types.Array, types.DType)
 def _lowered(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     data = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.bitcast(data, context.get_value_type(signature.return_type))
 
 
-def apart(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+def separately_compiled(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile by itself, once: the kernel calls it by its symbol, and its code is no part of its callers.
 
     LLVM optimises what a function calls again within each caller, and each caller of that one: what is large

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 
 from softstart.kernel.events import GRAZE, REJOINED
-from softstart.kernel.jit import apart, inner
+from softstart.kernel.jit import separately_compiled, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EXIT, IMPACT, JOINED,
     LET_GO, LOWER, MODELICA, MOST_NOTED, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN,
@@ -58,7 +58,7 @@ def path_closed(s: Record, but: int) -> bool:
 
 
 @inner
-def engage(s: Record, k: int, side: float) -> None:
+def engage_spring(s: Record, k: int, side: float) -> None:
     """The spring begins to act, in its damping regime."""
     s.side[k] = side
     s.mode[k] = CONTACT
@@ -102,7 +102,7 @@ def begin_modes(s: Record) -> None:
                 s.mode[k] = BEYOND
                 s.side[k] = math.copysign(1.0, theta)
             else:
-                engage(s, k, math.copysign(1.0, theta))
+                engage_spring(s, k, math.copysign(1.0, theta))
 
 
 @inner
@@ -207,7 +207,7 @@ def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
         s.zeros[k] = 2
     else:
         note(s, s.time, CLOSED, k, side, 0.0)
-        engage(s, k, side)
+        engage_spring(s, k, side)
 
 
 @inner
@@ -223,7 +223,7 @@ def part(s: Record, k: int) -> None:
 
 
 @inner
-def turn(s: Record, i: int, direction: float) -> None:
+def set_friction_state(s: Record, i: int, direction: float) -> None:
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
     for j in range(i, s.n):
         if s.first[j] != i:
@@ -265,7 +265,7 @@ def change(s: Record, event: int, k: int, rest: float) -> None:
         settle(s, k, rest)
     elif event == REJOIN:
         note(s, s.time, CLOSED, k, s.side[k], 0.0)
-        engage(s, k, s.side[k])
+        engage_spring(s, k, s.side[k])
         s.zeros[k] = REJOINED
     elif event == EXIT:
         part(s, k)
@@ -286,7 +286,7 @@ def change(s: Record, event: int, k: int, rest: float) -> None:
             s.sign[k] = -s.sign[k]
 
 
-@apart(types.int64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 3))
+@separately_compiled(types.int64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 3))
 def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -> int:
     """Change of mode at an event on shaft or mass k; 1 if the path from motor to load closed or opened."""
     was = path_closed(s, -1)
@@ -299,9 +299,9 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         meet(s, k, side, press, h)
         bounced = s.rigid[k] != 0.0 and s.path <= k < s.path_end and s.mode[k] == OPEN and s.zeros[k] == 0
     elif event == STOP:
-        turn(s, k, 0.0)
+        set_friction_state(s, k, 0.0)
     elif event in (BREAK_FORWARD, BREAK_BACK):
-        turn(s, k, 1.0 if event == BREAK_FORWARD else -1.0)
+        set_friction_state(s, k, 1.0 if event == BREAK_FORWARD else -1.0)
     elif event == LET_GO:
         release(s)
     elif event in (POINT_ABOVE, POINT_BELOW):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from softstart.kernel.jit import apart, compiled, inner
+from softstart.kernel.jit import separately_compiled, compiled, inner
 from softstart.kernel.records import (
     ASK, BAD_COMMAND, MEASURED, MEASURED_TYPE, MOST_PENDING, QUEUE_FULL, WORK_TYPE, Record, size,
 )  # fmt: skip
@@ -167,7 +167,7 @@ def note_excess(s: Record) -> None:
     s.excess_time += length
 
 
-@apart(types.void(WORK_TYPE, types.int64, MEASURED_TYPE))
+@separately_compiled(types.void(WORK_TYPE, types.int64, MEASURED_TYPE))
 def sample(s: Record, sees: int, measured: Record) -> None:
     """What the controller sees now: the encoder rounds, and what it has not declared is NaN.
 
@@ -196,7 +196,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     measured.load_speed = s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
 
 
-@apart(types.int64(WORK_TYPE, types.float64, types.float64, types.float64))
+@separately_compiled(types.int64(WORK_TYPE, types.float64, types.float64, types.float64))
 def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken.
 
@@ -243,7 +243,7 @@ def along_line(s: Record) -> None:
         s.follows = 0.0
 
 
-@apart(types.void(WORK_TYPE))
+@separately_compiled(types.void(WORK_TYPE))
 def begin_torque(s: Record) -> None:
     """The course of the torque from now on: ref' = slope up to `slew_end`, u' = (ref - u)/lag.
 

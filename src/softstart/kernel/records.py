@@ -78,7 +78,7 @@ class Machine:
     load: float
 
 
-class Mass:
+class MassRecord:
     """What is given of a mass."""
 
     J: float
@@ -90,7 +90,7 @@ class Mass:
     w0: float
 
 
-class Shaft:
+class ShaftRecord:
     """What is given of the shaft behind a mass."""
 
     c: float
@@ -123,7 +123,7 @@ class Tone:
     sine: float
 
 
-class Notes:
+class ResultRecord:
     """What is noted of a start."""
 
     status: float
@@ -228,7 +228,7 @@ class OfSpan:
     turned: float  # angles with a load curve
 
 
-class State:
+class StartState:
     """The rest of the state of a start."""
 
     t_end: float
@@ -293,7 +293,7 @@ class Measured(NamedTuple):
     load_speed: float  # rad/s
 
 
-class Answer:
+class Reply:
     """What a controller answers; its new state follows."""
 
     torque: float
@@ -316,17 +316,27 @@ def _parts() -> dict[str, Any]:
     )
     shapes |= dict.fromkeys(("due_time", "due_demand", "due_slope"), MOST_PENDING)
     shapes |= dict.fromkeys(OfSpan.__annotations__, (MOST_MASSES, ORDERS))
-    for part in (Mass, Shaft, OfMasses, OfShafts):
+    for part in (MassRecord, ShaftRecord, OfMasses, OfShafts):
         shapes = dict.fromkeys(part.__annotations__, MOST_MASSES) | shapes
     return shapes
 
 
-MACHINE, MASS, SHAFT, TONE = record(Machine), record(Mass), record(Shaft), record(Tone)
+MACHINE, MASS, SHAFT, TONE = record(Machine), record(MassRecord), record(ShaftRecord), record(Tone)
 CURVE = record(Curve, at=MOST_POINTS, torque=MOST_POINTS)
-NOTES, SHAFT_NOTES, EVENT = record(Notes), record(ShaftNotes), record(EventRow)
-MEASURED, ANSWER = record(Measured), record(Answer)
+NOTES, SHAFT_NOTES, EVENT = record(ResultRecord), record(ShaftNotes), record(EventRow)
+MEASURED, ANSWER = record(Measured), record(Reply)
 WORK = record(
-    Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts()
+    ResultRecord,
+    Machine,
+    Places,
+    MassRecord,
+    ShaftRecord,
+    OfMasses,
+    OfShafts,
+    OfSpan,
+    StartState,
+    whole=_WHOLE.split(),
+    **_parts(),
 )
 # for compiled functions
 WORK_TYPE: Any = from_dtype(WORK)

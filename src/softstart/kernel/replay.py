@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.kernel.events import crossing, peak_within, set_line, value
-from softstart.kernel.jit import compiled_as, inner, named
+from softstart.kernel.jit import compiled_as, inner, as_record
 from softstart.kernel.motor import along_line
 from softstart.kernel.records import (
     BEYOND, BUFFER_FULL, CONTACT, DOUBLED, ENDED, JOINED, NOT_LOCATED, OF_MASS, OF_SHAFT, OPEN, ORDERS,
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, WORK, Record,
 )  # fmt: skip
 from softstart.kernel.series import orders, set_piece
-from softstart.kernel.start import STEP, begin, expand_all, rate_of, run
+from softstart.kernel.start import STEP, begin, expand_all, rate_of, run_start
 
 _A = types.Array(types.float64, 1, "C")
 _I = types.Array(types.int64, 1, "C")
@@ -63,7 +63,7 @@ def states_at(
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
 ) -> None:  # fmt: skip
     """The states at times[j] within span index[j]: load angle, motor torque, speeds, twists, torques."""
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     last = -1
     n = 0
     for j in range(times.shape[0]):
@@ -95,12 +95,12 @@ def states_of_each(  # type: ignore[no-untyped-def]
 
     Returns ENDED, or BUFFER_FULL: call again with larger buffers.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     for r in range(parameters.shape[0]):
         state[:] = 0.0
         begin(work, machine, masses, shafts, curves, tones, until, on_gap)
         own = parameters[r]
-        reason = run(step, own, sees, work, tones, spans, events, measured, state, command)
+        reason = run_start(step, own, sees, work, tones, spans, events, measured, state, command)
         if reason == BUFFER_FULL:
             return BUFFER_FULL
         row, last = 0, int(s.n_spans) - 1
@@ -152,7 +152,7 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
     elastic energy. Flanks may part while the spring is still loaded, and meet again: that energy goes, or
     comes, and is counted with the shafts.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     rows = spans.shape[0] - 1
     restore(s, tones, spans, rows)
     stored = spring_energy(s)  # at the end
@@ -204,7 +204,7 @@ def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int
 
     Returns ENDED, or why it cannot be told. Stages that take no time have no row.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     at = -1
     for row in range(spans.shape[0]):
         if row == 0 or spans[row, S_STAGE] != spans[row - 1, S_STAGE]:
@@ -230,7 +230,7 @@ def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int
 @compiled_as(types.float64(_A, _M, _M, types.float64, types.float64))
 def load_settles(work: Vector, tones: Matrix, spans: Matrix, begin: float, floor: float) -> float:
     """From when on, not before `begin`, the load speed is not below `floor`; NaN if it is at the end."""
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     settled, above = begin, True
     for row in range(spans.shape[0]):
         start, end = spans[row, S_START], spans[row, S_END]
@@ -257,7 +257,7 @@ def torque_settles(
 
     The mean is what it carries while all masses speed up alike under the torques of the instant.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     J = 0.0
     for i in range(s.n):
         J += s.J[i]
@@ -305,7 +305,7 @@ def torque_settles(
 
 
 @inner
-def turn(kept: Vector, points: Matrix, time: float, torque: float, still: float) -> None:
+def add_turning_point(kept: Vector, points: Matrix, time: float, torque: float, still: float) -> None:
     """The next value of T; kept = (number of points, direction, time and torque of what may be the next)."""
     n = int(kept[0])
     if n >= points.shape[0]:
@@ -339,14 +339,14 @@ def turning_points(
     are roots of T'; T may jump between spans. Reversals by no more than `still` are passed over: they are
     rounding. `kept` (four zeros) is scratch.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     f = s.f
     for row in range(spans.shape[0]):
         n = restore(s, tones, spans, row)
         start = spans[row, S_START]
         h = spans[row, S_END] - start
         T = s.torque[k]
-        turn(kept, points, start, T[0], still)
+        add_turning_point(kept, points, start, T[0], still)
         sign, low = 0.0, 0  # far from the motor T begins with a high power of time
         for o in range(1, n + 1):
             if sign == 0.0 and T[o] != 0.0:
@@ -362,11 +362,11 @@ def turning_points(
             if x < 0.0:
                 break
             if x > begin or begin == 0.0:
-                turn(kept, points, start + x * h, value(T, n, x), still)
+                add_turning_point(kept, points, start + x * h, value(T, n, x), still)
             else:
                 break
             sign = -sign
-        turn(kept, points, start + h, value(T, n, 1.0), still)
+        add_turning_point(kept, points, start + h, value(T, n, 1.0), still)
     count = int(kept[0])
     if count >= points.shape[0]:
         return -1

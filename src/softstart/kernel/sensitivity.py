@@ -26,7 +26,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.jit import compiled_as, inner, named
+from softstart.kernel.jit import compiled_as, inner, as_record
 from softstart.kernel.records import (
     CONTACT, DEAD_ZONE, MODELICA, OF_MASS, OF_SHAFT, OPEN, ORDERS, S_END, S_MASSES, S_START, WORK, Record,
 )  # fmt: skip
@@ -92,7 +92,7 @@ def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
 
 
 @inner
-def carried(
+def propagated(
     series: Rows, n: int, x: float, X: Rows, hat: Rows, active: int, first: int, into: Rows
 ) -> None:  # fmt: skip
     """X after the share x of the span, its rows from `first` on; columns from `active` on are 0."""
@@ -203,7 +203,7 @@ def sensitivities(
     `marks` rise and lie within the run. At an event the value is the one after it. The arrays behind `states`
     are scratch.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     count = s.n
     joints = count - 1
     size = X.shape[0]
@@ -244,7 +244,7 @@ def sensitivities(
             until = end if part == parts - 1 else t + h
             while mark < marks.shape[0] and (marks[mark] < until or ends):
                 x = (marks[mark] - t) / h
-                carried(series, n, x, X, hat, active, first, states[mark])
+                propagated(series, n, x, X, hat, active, first, states[mark])
                 if s.lag == 0.0 and 0 <= motor < states.shape[1]:
                     for q in range(active):
                         states[mark, motor, q] = hat[0, q] + hat[1, q] * x
@@ -253,7 +253,7 @@ def sensitivities(
                 for k in range(joints):
                     carried_torque(s, k, series, n, (times[j] - t) / h, X, hat, active, torques, j)
                 j += 1
-            carried(series, n, 1.0, X, hat, active, 0, next_X)
+            propagated(series, n, 1.0, X, hat, active, 0, next_X)
             for i in range(size):
                 for q in range(active):
                     X[i, q] = next_X[i, q]

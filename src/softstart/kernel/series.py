@@ -28,7 +28,7 @@ import numpy as np
 from numba import types
 
 from softstart.arrays import Matrix
-from softstart.kernel.jit import apart, inner, named
+from softstart.kernel.jit import separately_compiled, inner, as_record
 from softstart.kernel.motor import expand_torque
 from softstart.kernel.records import (
     CONTACT,
@@ -160,7 +160,7 @@ def fastest_rate(s: Record) -> float:
     return 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
 
 
-@apart(types.void(WORK_TYPE))
+@separately_compiled(types.void(WORK_TYPE))
 def apply_modes(s: Record) -> None:
     """What follows from the modes: bodies and what holds them, springs that act, gears, the fastest rate."""
     first = 0
@@ -234,7 +234,7 @@ def orders(reach: float) -> int:
 # the series -----------------------------------------------------------------------------------------
 
 
-@apart(types.void(WORK_TYPE, TONE_TYPE, types.float64, types.int64))
+@separately_compiled(types.void(WORK_TYPE, TONE_TYPE, types.float64, types.int64))
 def add_tone(s: Record, tone: Record, h: float, n: int) -> None:
     """The coefficients of one harmonic of an exciting torque, added to those of its mass."""
     i = int(tone.mass)
@@ -259,7 +259,7 @@ def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
         for o in range(n + 1):
             s.outside[i, o] = 0.0
     for row in range(tones.shape[0]):
-        add_tone(s, named(tones[row], TONE), h, n)
+        add_tone(s, as_record(tones[row], TONE), h, n)
 
 
 @inner
@@ -331,7 +331,7 @@ def note_scale(s: Record) -> None:
         i = j
 
 
-@apart(types.void(WORK_TYPE, types.float64, types.int64))
+@separately_compiled(types.void(WORK_TYPE, types.float64, types.int64))
 def expand(s: Record, h: float, n: int) -> None:
     """All coefficients of the span of length h that begins with the present state and modes."""
     speed, twist, torque, held = s.speed, s.twist, s.torque, s.held

@@ -7,8 +7,8 @@ import math
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, swing, value
-from softstart.kernel.jit import apart, compiled_as, inner, named
+from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, deviation_bound, value
+from softstart.kernel.jit import separately_compiled, compiled_as, inner, as_record
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
     NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue,
@@ -32,11 +32,11 @@ FIRST_MACHINE = N_NOTES  # place of the machine's numbers in the work of a start
 
 
 @inner
-def load_machine(
+def set_machine(
     work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix
 ) -> None:
     """Put what is given into the work of a start."""
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     for j in range(machine.shape[0]):
         work[FIRST_MACHINE + j] = machine[j]
     s.n = masses.shape[0]
@@ -46,7 +46,7 @@ def load_machine(
     s.path_end = max(s.at_motor, s.at_load)
     s.motor_shaft = s.at_motor if s.at_load > s.at_motor or s.at_motor == 0 else s.at_motor - 1
     for i in range(s.n):
-        mass = named(masses[i], MASS)
+        mass = as_record(masses[i], MASS)
         s.J[i] = mass.J
         s.ground[i] = mass.ground
         s.active[i] = mass.active
@@ -57,7 +57,7 @@ def load_machine(
         s.rubs[i] = 1.0 if mass.Mc > 0.0 or mass.friction > 0.0 else 0.0
         s.points[i] = 0
     for k in range(s.n - 1):
-        shaft = named(shafts[k], SHAFT)
+        shaft = as_record(shafts[k], SHAFT)
         s.c[k] = shaft.c
         s.d[k] = shaft.d
         s.half[k] = shaft.half
@@ -71,7 +71,7 @@ def load_machine(
             s.rubs[k + int(shaft.gear)] = 1.0
     s.curves = 0.0
     for row in range(curves.shape[0]):
-        curve = named(curves[row], CURVE)
+        curve = as_record(curves[row], CURVE)
         if curve.mass >= 0.0:
             i = int(curve.mass)
             s.curves += 1.0
@@ -83,13 +83,13 @@ def load_machine(
     s.tones = tones.shape[0]
     s.tone_rate = 0.0
     for row in range(tones.shape[0]):
-        s.tone_rate = max(s.tone_rate, named(tones[row], TONE).omega)
+        s.tone_rate = max(s.tone_rate, as_record(tones[row], TONE).omega)
 
 
 @inner
 def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     for j in range(N_NOTES):
         work[j] = 0.0
     s.pending = 0.0
@@ -151,8 +151,8 @@ def note_span(s: Record, row: Vector) -> None:
         row[at + 3] = s.sign[k]
 
 
-@apart(types.void(WORK_TYPE, types.int64, types.float64, types.float64))
-def move(s: Record, n: int, x: float, time: float) -> None:
+@separately_compiled(types.void(WORK_TYPE, types.int64, types.float64, types.float64))
+def advance_state(s: Record, n: int, x: float, time: float) -> None:
     """The state after the share x of the span, `time` seconds later."""
     for i in range(s.n):
         s.w[i] = value(s.speed[i], n, x)
@@ -169,7 +169,7 @@ def move(s: Record, n: int, x: float, time: float) -> None:
     s.time += time
 
 
-@apart(types.float64(WORK_TYPE, types.int64, types.int64, *[types.float64] * 3))
+@separately_compiled(types.float64(WORK_TYPE, types.int64, types.int64, *[types.float64] * 3))
 def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> float:
     """The relative acceleration of the masses beside shaft k towards the flank `side`, rad/s^2.
 
@@ -178,7 +178,7 @@ def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> floa
     twist = s.twist[k]
     noise = rounding_of_twist(s, k, h)
     if x == 0.0:
-        noise = max(noise, FAINT * (swing(twist, n) - abs(twist[1]) - abs(twist[2])))
+        noise = max(noise, FAINT * (deviation_bound(twist, n) - abs(twist[1]) - abs(twist[2])))
     total = 0.0
     for o in range(n, 1, -1):
         total = total * x + o * (o - 1.0) * twist[o]
@@ -190,7 +190,7 @@ def note_events(s: Record, events: Matrix) -> None:
     """Record what has been noted since the last span."""
     if events.shape[0] > 0:
         for j in range(s.noted):
-            event = named(events[int(s.n_events)], EVENT)
+            event = as_record(events[int(s.n_events)], EVENT)
             event.time = s.note_time[j]
             event.kind = s.note_kind[j]
             event.place = s.note_place[j]
@@ -218,7 +218,7 @@ def rate_of(s: Record) -> float:
 
 
 @inner
-def stands(s: Record, spans: Matrix, events: Matrix) -> int:
+def stop_reason(s: Record, spans: Matrix, events: Matrix) -> int:
     """Why the start does not go on: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
     if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + MOST_NOTED >= events.shape[0]):
         return BUFFER_FULL
@@ -263,9 +263,9 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
 
     `spans` and `events` are filled row by row; with no rows nothing is recorded.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     while True:
-        reason = stands(s, spans, events)
+        reason = stop_reason(s, spans, events)
         if reason >= 0:
             return reason
         begin_torque(s)
@@ -297,7 +297,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         if x > 0.0:
             if spans.shape[0] > 0:
                 note_span(s, spans[int(s.n_spans)])
-            move(s, n, x, x * h)
+            advance_state(s, n, x, x * h)
             if spans.shape[0] > 0:
                 spans[int(s.n_spans), S_END] = s.time
             s.n_spans += 1.0
@@ -324,7 +324,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
             return EVENT_LIMIT
 
 
-@apart(types.float64(WORK_TYPE, types.int64))
+@separately_compiled(types.float64(WORK_TYPE, types.int64))
 def spring_torque(s: Record, k: int) -> float:
     """The torque of a shaft whose spring acts."""
     return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
@@ -348,8 +348,8 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
 @compiled_as(types.void(_A, types.int64, _M, _A))
 def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
     """What the controller sees now."""
-    s = named(work, WORK)
-    seen = named(measured, MEASURED)
+    s = as_record(work, WORK)
+    seen = as_record(measured, MEASURED)
     sample(s, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
@@ -357,15 +357,15 @@ def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
 
 
 @compiled_as(types.int64(_A, types.float64, types.float64, types.float64))
-def answer(work: Vector, torque: float, ask_again: float, slope: float) -> int:
+def take_reply(work: Vector, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken."""
-    return take_answer(named(work, WORK), torque, ask_again, slope)
+    return take_answer(as_record(work, WORK), torque, ask_again, slope)
 
 
 @compiled_as(types.void(_A, _A))
 def note_state(work: Vector, row: Vector) -> None:
     """The present state, as a span of no length."""
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     note_span(s, row)
     row[S_END] = s.time
 
@@ -376,17 +376,17 @@ def begin(
     until: float, on_gap: bool,
 ) -> None:  # fmt: skip
     """A start of this machine, at t = 0."""
-    load_machine(work, machine, masses, shafts, curves, tones)
+    set_machine(work, machine, masses, shafts, curves, tones)
     begin_start(work, until, on_gap)
 
 
 @compiled_as(types.int64(STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A))
-def run(  # type: ignore[no-untyped-def]
+def run_start(  # type: ignore[no-untyped-def]
     step, parameters, sees, work, tones, spans, events, measured, state, command
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
-    s = named(work, WORK)
-    told = named(command, ANSWER)
+    s = as_record(work, WORK)
+    told = as_record(command, ANSWER)
     while True:
         reason = advance(work, tones, spans, events)
         if reason == ASK:
@@ -415,18 +415,18 @@ def run_many(  # type: ignore[no-untyped-def]
     What is noted goes to notes[i] and shaft_notes[i]. The arrays from `work` on are scratch: the kernel
     allocates nothing.
     """
-    s = named(work, WORK)
+    s = as_record(work, WORK)
     nothing = curves[0, :0]
     for i in range(notes.shape[0]):
         for j in range(state.shape[0]):
             state[j] = 0.0
         begin(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
         own = parameters[i if parameters.shape[0] > 1 else 0]
-        run(step, own, sees, work, nothing, nothing, nothing, measured, state, command)
+        run_start(step, own, sees, work, nothing, nothing, nothing, measured, state, command)
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):
-            shaft = named(shaft_notes[i, k], SHAFT_NOTES)
+            shaft = as_record(shaft_notes[i, k], SHAFT_NOTES)
             shaft.peak = s.peak[k]
             shaft.peak_time = s.peak_time[k]
             shaft.impulse = s.impulse[k]

@@ -28,11 +28,11 @@ from softstart.controller.base import CompiledController, Controller, PlainContr
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
-from softstart.linear.plant import Plant, SampledPlant, in_contact, sampled, sizes_of
+from softstart.linear.plant import Plant, SampledPlant, contact_plant, plant_scales, sampled
 from softstart.linear.systems import System
 from softstart.start.engine import plain_answer
-from softstart.start.recorded import Recorder
-from softstart.start.rows import Rows, rows_of
+from softstart.start.recorded import StartRecorder
+from softstart.start.rows import Rows, kernel_input
 
 FAR = 1e9  # in target speeds: never reached
 CLOSED = (at.CONTACT, at.JOINED, at.PRESSED, at.WELDED)
@@ -111,7 +111,7 @@ class SampledStart:
     def of(cls, machine: Machine, controller: Controller, fitted_to: Machine | None = None) -> SampledStart:
         """The controller set up for this (or that) machine; no rounding or noise, the target speed far."""
         fitted, own = controller.set_up((fitted_to or machine).design_drive)
-        rows = rows_of(machine)
+        rows = kernel_input(machine)
         differencing = bool(rows.machine.encoder > 0.0)
         rows.machine.target *= FAR
         rows.machine.encoder = rows.machine.torque_noise = 0.0
@@ -141,7 +141,7 @@ class SampledStart:
 
     def samples(self, until: float, begin: Sample | None = None) -> Iterator[Sample]:
         """The start from its beginning or from a kept sample."""
-        recorder = Recorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, 0)
+        recorder = StartRecorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, 0)
         recorder.begin(until, bool(self.controller.sensors & Sensor.STAGE))
         now, state = recorder.state, self.first_state
         if begin is not None:
@@ -169,7 +169,7 @@ class SampledStart:
         delay = float(self.rows.machine.dead_time) + further
         return sampled(plant, period, delay, self.inputs, self.differencing)
 
-    def _measured(self, recorder: Recorder) -> tuple[Vector, float]:
+    def _measured(self, recorder: StartRecorder) -> tuple[Vector, float]:
         """What the controller sees, and the shaft torque, which it may not see."""
         now = recorder.state
         before, when = float(now.sample_angle), float(now.sample_time)
@@ -222,7 +222,7 @@ class SampledRun:
 
 def run_until_steady(start: SampledStart) -> SampledRun:
     """Run the start until it is steady, at most for LONGEST and STIFF."""
-    sizes = sizes_of(start.machine)
+    sizes = plant_scales(start.machine)
     samples: list[Sample] = []
     contact, kept = range(0), {}
     first, period, here = 0, math.nan, dict[int, Sample]()
@@ -338,7 +338,7 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
 
 
 def _linearised_at(start: SampledStart, run: SampledRun, index: int, sample: Sample) -> OperatingPoint:
-    sizes, inputs = sizes_of(start.machine), start.inputs
+    sizes, inputs = plant_scales(start.machine), start.inputs
     of_inputs = {
         exchange.M_MOTOR_ANGLE: sizes.windup,
         exchange.M_MOTOR_TORQUE: sizes.base,
@@ -372,8 +372,8 @@ def mismatch(start: SampledStart, sample: Sample, period: float, law: System) ->
 
     Displaced are the whole machine, each twist and the speed of each body.
     """
-    sizes, plant = sizes_of(start.machine), in_contact(start.machine, sample.plant["incline"])
-    loop, _, read = closed(start.sampled(plant, period), law)
+    sizes, plant = plant_scales(start.machine), contact_plant(start.machine, sample.plant["incline"])
+    loop, _, read = closed_loop(start.sampled(plant, period), law)
     until = sample.time + (WINDOW - 0.5) * period
     angles = plant.masses["w"].shape[1] - plant.inertias.size
     widths = [sizes.windup] * angles + [sizes.speed] * plant.inertias.size
@@ -396,7 +396,7 @@ def mismatch(start: SampledStart, sample: Sample, period: float, law: System) ->
     return worst
 
 
-def closed(plant: SampledPlant, law: System) -> tuple[Matrix, Vector, Matrix]:
+def closed_loop(plant: SampledPlant, law: System) -> tuple[Matrix, Vector, Matrix]:
     """The closed loop's transition matrix, its input of a torque added to the demand, and what is read.
 
     States are those of the plant and of the controller; read are the shaft torque and the demand.

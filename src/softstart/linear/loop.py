@@ -28,8 +28,8 @@ import numpy as np
 from softstart.arrays import Complex, Matrix, Vector
 from softstart.chain.machines import Machine
 from softstart.kernel import motor as exchange
-from softstart.linear.law import OperatingPoint, SampledStart, closed
-from softstart.linear.plant import Plant, in_contact, sizes_of
+from softstart.linear.law import OperatingPoint, SampledStart, closed_loop
+from softstart.linear.plant import Plant, contact_plant, plant_scales
 from softstart.linear.systems import Mode, System, frequencies, modes, zeros_of
 
 if TYPE_CHECKING:
@@ -235,13 +235,13 @@ class Loop:
     @cached_property
     def rotation(self) -> float:
         """Distance from 1 within which poles are the rotation as a whole."""
-        return ROTATION * sizes_of(self.machine).Omega * self.period
+        return ROTATION * plant_scales(self.machine).Omega * self.period
 
     def closed(self, delay: float = 0.0) -> tuple[Matrix, Vector, Matrix]:
-        """The closed loop with a further dead time, as `law.closed` has it."""
-        return closed(self.start.sampled(self._plant, self.period, delay), self.point.law)
+        """The closed loop with a further dead time, as `law.closed_loop` has it."""
+        return closed_loop(self.start.sampled(self._plant, self.period, delay), self.point.law)
 
     @cached_property
     def _plant(self) -> Plant:
         inclines = self.point.sample.plant["incline"]
-        return in_contact(self.machine, inclines, share=self.share, gaps_open=self.open)
+        return contact_plant(self.machine, inclines, share=self.share, gaps_open=self.open)

@@ -25,7 +25,7 @@ from softstart.errors import InputError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at
 from softstart.linear.systems import System
-from softstart.start.rows import Rows, rows_of
+from softstart.start.rows import Rows, kernel_input
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Plant:
     inertias: Vector
 
 
-class Sizes(NamedTuple):
+class PlantScales(NamedTuple):
     """Sizes of torques, N m, and twists, rad; frequency, rad/s, and period, s, of the first vibration.
 
     `speed`, rad/s, is that of a vibration with the windup as amplitude.
@@ -57,21 +57,21 @@ class Sizes(NamedTuple):
     speed: float
 
 
-def single(machine: Machine) -> Any:
+def at_one_position(machine: Machine) -> Any:
     """The machine at one of its positions: the loop in contact is the same from anywhere."""
     positions = list(machine.positions.values())
     return positions[len(positions) // 2]
 
 
-def sizes_of(machine: Machine) -> Sizes:
+def plant_scales(machine: Machine) -> PlantScales:
     """The sizes of a machine with all gaps closed."""
-    rows = rows_of(single(machine))
+    rows = kernel_input(at_one_position(machine))
     base, period = float(machine.mean_torque), float(rows.machine.period)
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
     c = rows.shafts.view(at.SHAFT)[0, :, 0]["c"]
     windup, Omega = base * float((1.0 / c[c > 0.0]).sum()), 2.0 * math.pi / period
-    return Sizes(base, windup, Omega, period, Omega * windup)
+    return PlantScales(base, windup, Omega, period, Omega * windup)
 
 
 def _motor_side(rows: Rows) -> slice:
@@ -82,7 +82,7 @@ def _motor_side(rows: Rows) -> slice:
     return slice(first, min((int(k) + 1 for k in open_ if k >= motor), default=rows.count))
 
 
-def in_contact(
+def contact_plant(
     machine: Machine, inclines: Vector | None = None, *, share: float = 1.0, gaps_open: bool = False
 ) -> Plant:
     """The machine while all flanks press, or the motor with what turns with it while all gaps are open.
@@ -91,7 +91,7 @@ def in_contact(
     `inclines` are those of the load curves of its masses at an instant: there a curve is a spring or a damper
     to the ground. `share` multiplies stiffness and damping of the shafts, as the describing function does.
     """
-    given = rows_of(single(machine))
+    given = kernel_input(at_one_position(machine))
     kept = _motor_side(given) if gaps_open else slice(0, given.count)
     motor, load = int(given.machine.motor) - kept.start, int(given.machine.load) - kept.start
     mass = given.masses.view(at.MASS)[0, kept, 0]

@@ -25,7 +25,7 @@ from softstart.errors import InputError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
 from softstart.linear.limit_cycles import Cycle, limit_cycles
 from softstart.linear.loop import Loop
-from softstart.linear.plant import single, sizes_of
+from softstart.linear.plant import at_one_position, plant_scales
 from softstart.linear.systems import Mode
 from softstart.notebook import Shown
 
@@ -95,7 +95,7 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
         varied = [
             replace(
                 self.loop,
-                machine=machine.with_values({key: factor * machine.knob(key).value}),
+                machine=machine.with_values({key: factor * machine.parameter_value(key).value}),
                 name=f"{symbol} x {factor:g}",
             )
             for symbol, key, factors in VARIATIONS
@@ -115,7 +115,7 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
         """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
         of_loop = () if self.loop is None else self.loop.modes
         swinging = [mode for mode in of_loop if mode.damping_ratio < 1.0 and mode.imag > 0.0]
-        Omega = sizes_of(self.drive).Omega
+        Omega = plant_scales(self.drive).Omega
         return min(swinging, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
 
     @property
@@ -123,7 +123,7 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
         """One sentence."""
         from softstart.views import linear as views
 
-        return views.conclusion(self)
+        return views.linear_conclusion(self)
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
@@ -221,12 +221,12 @@ def linear_view(
     for one in (drive, fitted_to or drive):
         if one.motor is None or one.target_speed is None:
             raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")
-    start = SampledStart.of(single(drive), made, fitted_to or drive)
+    start = SampledStart.of(at_one_position(drive), made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
     point = operating_point(start, run)
     if point is not None and point.feeds_back and point.is_sampled:
-        loop = Loop(start, point, single(drive))
+        loop = Loop(start, point, at_one_position(drive))
         return LinearView(drive, start.controller, "loop", _notes(name, run, loop), run, loop)
     kind = "open loop"
     sentence = f"{name} acts open loop: in contact nothing it measures changes its torque demand; "

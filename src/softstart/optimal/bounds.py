@@ -30,7 +30,13 @@ from softstart.drive import Drive
 from softstart.kernel import records as at
 from softstart.optimal.contact_motion import Contact
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, falls_back, off_course, reactive
+from softstart.optimal.pulse_coast_hold import (
+    PulseCoastHoldStarts,
+    fall_time,
+    falls_back,
+    off_course,
+    reactive,
+)
 from softstart.optimal.result import LowerBound
 from softstart.optimal.starts import parts
 
@@ -112,7 +118,7 @@ def _of_pair(problem: Problem) -> float:
         plain = moving if reactive(problem.drive) else max(plain, moving)
     if off_course(problem):
         return plain
-    starts = PulseCoastHold.of(problem)
+    starts = PulseCoastHoldStarts.of(problem)
     if drive.d == 0.0:
         return max(plain, starts.least_peak_for(problem.target, time))
     if starts.travel > 0.0 and drive.contact_law != "modelica":
@@ -120,7 +126,7 @@ def _of_pair(problem: Problem) -> float:
     return plain
 
 
-def _gentle_contact(problem: Problem, starts: PulseCoastHold, time: float, plain: float) -> float:
+def _gentle_contact(problem: Problem, starts: PulseCoastHoldStarts, time: float, plain: float) -> float:
     """The least P, N m, with P (time - t_c(P)) >= J2 (target - w2) + Mc time; damped shaft, gap open.
 
     t_c(P) is that of the soonest contact whose T, coasting, stays below P, on a grid: fewer instants only
@@ -188,7 +194,7 @@ def earliest_pull(problem: Problem) -> float:
     0.01661
     """
     # (a load that falls against friction is slowed by less than the pull of Mc: its contact is later)
-    drive, held, starts = problem.drive, reactive(problem.drive), PulseCoastHold.of(problem)
+    drive, held, starts = problem.drive, reactive(problem.drive), PulseCoastHoldStarts.of(problem)
     if falls_back(problem) or (held and starts.w2 < 0.0):  # the motor may bounce off the other flank first
         if held or (drive.contact_law == "dead-zone" and drive.d > 0.0):
             return 0.0

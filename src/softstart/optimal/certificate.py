@@ -29,7 +29,7 @@ from scipy.linalg import solve_banded
 from scipy.optimize import linprog
 
 from softstart.arrays import Indices, Matrix, Vector
-from softstart.optimal.contact_motion import Contact, Entries, entries, no_ideal
+from softstart.optimal.contact_motion import Contact, Entries, cells_before, no_ideal
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
 
@@ -75,7 +75,7 @@ def certified_bound(
     True
     """
     assert problem.start_time is not None
-    cells = entries(problem, problem.start_time * (1.0 + ROUNDING), entry_near)
+    cells = cells_before(problem, problem.start_time * (1.0 + ROUNDING), entry_near)
     goal = k_dyn * problem.base_torque * (1.0 - within)
     peak = _Search(problem, cells, goal, entry_near).least() if cells.te[0] < problem.start_time else math.inf
     closing = "whose gap closes once and stays closed" if cells.opens else "whose gap stays closed"

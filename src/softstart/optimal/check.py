@@ -18,7 +18,7 @@ from softstart.controller import make_controller
 from softstart.kernel import records as at
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, OptimumError, largest_heat
-from softstart.optimal.starts import Played, carried, wanted
+from softstart.optimal.starts import DemandRun, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -112,7 +112,7 @@ def torque_allowed(problem: Problem, w1: ArrayLike) -> Vector:
 def _torque_speed(problem: Problem, profile: TorqueProfile, run: Run) -> Iterator[str]:
     if not problem.torque_speed:
         return
-    times = Played(profile, run.recorded).instants(run.elastic_period / 64)
+    times = DemandRun(profile, run.recorded).instants(run.elastic_period / 64)
     state = run.recorded.at(times)
     over = state["u"] - torque_allowed(problem, state["w"][:, run.drive.motor_index])
     i = int(np.argmax(over))
@@ -131,7 +131,7 @@ def _terminal(problem: Problem, run: Run, end: float) -> Iterator[str]:
     if off > 1e-6:
         yield f"The speeds at {end:.6g} s are off their target of {target:.9g} rad/s by a share of {off:.3g}."
     if problem.terminal == "steady":
-        aim = wanted(carried(run.recorded.rows), problem.base_torque, run.drive.motor_index)
+        aim = wanted(steady_shaft_torques(run.recorded.rows), problem.base_torque, run.drive.motor_index)
         off = float(np.abs(state["T"][0] - aim).max())
         if off > SAME * problem.base_torque:
             yield f"The shaft torques at {end:.6g} s are off the load torques behind them by {off:.6g} N m."

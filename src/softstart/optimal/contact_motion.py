@@ -2,7 +2,7 @@
 
 With any torque between the limits at the motor's command (no lag, no rate limit), the part before the contact
 of a start whose gap closes once matters only through the instant te at which both masses begin to move in
-contact and the relative speed v = w1 - w2 that they have then. `entries` bounds v in cells of te: of all
+contact and the relative speed v = w1 - w2 that they have then. `cells_before` bounds v in cells of te: of all
 torques that close the gap at te an early pulse has the least v, a late one the greatest. A reactive load at
 rest moves only when the shaft is wound up to T = Mc, at the overlap z0 = Mc/c (docs/theory/optimum.md).
 """
@@ -19,7 +19,7 @@ from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import (
-    PulseCoastHold,
+    PulseCoastHoldStarts,
     fall_time,
     falls_back,
     falls_rubbing,
@@ -139,10 +139,10 @@ def no_ideal(problem: Problem) -> str:
     })  # fmt: skip
 
 
-def entries(problem: Problem, end: float, near: float | None = None) -> Entries:
+def cells_before(problem: Problem, end: float, near: float | None = None) -> Entries:
     """The cells up to `end` of a problem for which `no_ideal` gives no reason, finest `near` an instant, s.
 
-    >>> cells = entries(Problem(Drive.load("crane-4amtkf"), 0.5), 0.5)
+    >>> cells = cells_before(Problem(Drive.load("crane-4amtkf"), 0.5), 0.5)
     >>> round(float(cells.te[0]), 5), round(float(cells.fastest[0]), 2)
     (0.01661, 30.1)
     """
@@ -151,7 +151,7 @@ def entries(problem: Problem, end: float, near: float | None = None) -> Entries:
 
 def _through_gap(problem: Problem, end: float, near: float | None) -> Entries:
     """An active load; the gap may be closed at first."""
-    starts = PulseCoastHold.of(problem)
+    starts = PulseCoastHoldStarts.of(problem)
     v0, push, pull, travel, te = starts.v0, starts.push, starts.pull, starts.travel, np.zeros(2)
     if travel > 0.0:
         first, last = (fall_time(travel, v0, a) for a in (push + pull, pull))
@@ -171,7 +171,7 @@ def _through_gap(problem: Problem, end: float, near: float | None) -> Entries:
 
 def _through_standstill(problem: Problem, end: float) -> Entries:
     """A reactive load at rest: the cells are between the breakaways after first pulses of falling length."""
-    starts = PulseCoastHold.of(problem)
+    starts = PulseCoastHoldStarts.of(problem)
     c, Ms, travel, preload, z0 = starts.c, starts.Ms, starts.travel, starts.preload, starts.Mc / starts.c
     ws, a, mean = math.sqrt(c / starts.J1), starts.push, Ms / c
     crossing = fall_time(travel, 0.0, a)

@@ -18,7 +18,7 @@ and what is missed, m >= 0:
                 demand); smoothness adds its square. A square lies above tangent planes, added until near
 
 The instants of the peaks keep their place between the contacts and move with them, by dt/du v
-(`Played.along_contacts`): where a contact comes later, the torque after it does too. At fixed instants the
+(`DemandRun.along_contacts`): where a contact comes later, the torque after it does too. At fixed instants the
 program would be wrong beside each contact, and descents stall.
 
 CasADi hands the program to HiGHS. Of the rows of peaks and of the curve only those that matter are in it: it
@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.optimal.problem import Problem
-from softstart.optimal.starts import Played, Player, carried, wanted
+from softstart.optimal.starts import DemandRun, DemandSimulator, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
 
 KNOTS = 14  # in an elastic period
@@ -79,13 +79,13 @@ JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which 
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Candidate:
     """A demand, the exact starts under it, and how good they are."""
 
     torques: Vector
     end: float  # t_f, s; where only the load is to reach its speed the latest of `ends`
     ends: tuple[float, ...]  # t_f of each machine
-    starts: tuple[Played, ...]
+    starts: tuple[DemandRun, ...]
     peak: float  # of all shafts, machines and instants, N m
     missing: Vector  # what the terminal quantities of all machines lack, as shares; below 0 a surplus
     lacking: Vector  # the same as far as it counts
@@ -104,10 +104,10 @@ class Found:
 class Descent:
     """The descents of one problem; `time` are the knots in s, at which the torques of a demand stand."""
 
-    def __init__(self, problem: Problem, players: Sequence[Player] | None = None) -> None:
+    def __init__(self, problem: Problem, players: Sequence[DemandSimulator] | None = None) -> None:
         assert problem.start_time is not None
         self.problem = problem
-        self.players = tuple(players or map(Player, problem.machines))
+        self.players = tuple(players or map(DemandSimulator, problem.machines))
         self.latest = problem.start_time  # t_f at most
         self.period = max(player.period for player in self.players)
         self.until = self.latest + self.period
@@ -168,7 +168,7 @@ class Descent:
                 u[i + 1] = np.clip(u[i + 1], u[i] - rise, u[i] + rise)
         return u
 
-    def play(self, torques: Vector, end: float) -> Found | None:
+    def play(self, torques: Vector, end: float) -> Candidate | None:
         """The exact starts under a demand whose start ends at `end`; None if one cannot be finished."""
         profile = TorqueProfile(self.time, torques)
         reached = self.problem.terminal == "reached"
@@ -205,7 +205,7 @@ class Descent:
         over = max(peak / (problem.k_dyn * self.base) - 1.0, 0.0) if problem.k_dyn else 0.0
         over += max(heat / problem.heat - 1.0, 0.0) if problem.heat else 0.0
         cost = float(lacking.sum()) + beyond + over
-        return Found(
+        return Candidate(
             torques,
             end,
             tuple(ends),
@@ -220,19 +220,19 @@ class Descent:
             objective + self.penalty * cost,
         )
 
-    def _missing(self, player: Player, start: Played, end: float) -> Vector:
+    def _missing(self, player: DemandSimulator, start: DemandRun, end: float) -> Vector:
         state = start.recorded.at([end])
         lacking: Vector = 1.0 - state["w"][0] / player.target
         if self.problem.terminal == "reached":
             return lacking[[player.load]]
         if self.problem.terminal == "steady":
-            own = carried(player.rows)
+            own = steady_shaft_torques(player.rows)
             T, aim = state["T"][0], wanted(own, self.base, player.motor)
             open_too = (T == 0.0) & (np.abs(own) < np.abs(aim))  # flanks apart carry nothing either
             lacking = np.concatenate([lacking, np.where(open_too, 0.0, aim - T) / self.base])
         return lacking
 
-    def _beyond(self, player: Player, start: Played) -> float:
+    def _beyond(self, player: DemandSimulator, start: DemandRun) -> float:
         """By how much the realised torque exceeds the curve at worst, as a share of the highest torque."""
         times = start.instants(self.curve_step)
         state = start.recorded.at(times)
@@ -261,7 +261,7 @@ class Descent:
 
     def down(
         self, profile: TorqueProfile, end: float, steps: int = STEPS, least: float = 1e-4
-    ) -> Found | None:
+    ) -> Candidate | None:
         """Down from a first demand, until a program promises less than the share `least`.
 
         Where a condition is missed after all steps, missing it costs more: near the shortest start time.
@@ -273,14 +273,14 @@ class Descent:
         self.penalty = PENALTY
         return found
 
-    def into(self, profile: TorqueProfile, end: float) -> Found | None:
+    def into(self, profile: TorqueProfile, end: float) -> Candidate | None:
         """Down with missing a condition dear from the beginning: whether a start misses none."""
         self.penalty = DEAR
         found = self._down(self.onto(profile), end, INTO, 1e-3)
         self.penalty = PENALTY
         return found
 
-    def refined(self, found: Found, times: int = 4, least: float = 3e-5) -> Found:
+    def refined(self, found: Candidate, times: int = 4, least: float = 3e-5) -> Candidate:
         """The same on finer grids, where the torque changes much between two knots."""
         for _ in range(times):
             width = np.diff(self.time)
@@ -307,16 +307,16 @@ class Descent:
                 break
         return found
 
-    def around(self, found: Found, tries: int) -> Found:
+    def around(self, found: Candidate, tries: int) -> Candidate:
         """The best of local optima around one: its demand stretched in time, or with bumps, and down again.
 
         It begins at the best so far each time; the random numbers are the same each time.
         """
         rng = np.random.default_rng(1)
-        apart = self.apart
+        min_knot_spacing = self.apart
         for number in range(tries):
             kept, many = self.time, self.even.size > MANY  # else the knots of a long start double each time
-            self.apart = APART if many else apart
+            self.apart = APART if many else min_knot_spacing
             known = TorqueProfile(self.time, found.torques).simplified(BEND if many else 1e-9)
             if number % 2 == 0:
                 demand = TorqueProfile(known.time * rng.uniform(1.0 - STRETCH, 1.0 + STRETCH), known.torque)
@@ -332,10 +332,10 @@ class Descent:
                 found = down
             else:
                 self.time = kept
-        self.apart = apart
+        self.apart = min_knot_spacing
         return found
 
-    def _down(self, torques: Vector, end: float, steps: int, least: float) -> Found | None:
+    def _down(self, torques: Vector, end: float, steps: int, least: float) -> Candidate | None:
         found = self.play(torques, end)
         trust, self.fine = FIRST_TRUST, LET_THROUGH * least
         for _ in range(steps):
@@ -367,7 +367,7 @@ class Descent:
             found, trust = better, min(trust, MOST_TRUST)
         return found
 
-    def finished(self, found: Found, reserve: float = 1e-8, rounds: int = 8) -> Found | None:
+    def finished(self, found: Candidate, reserve: float = 1e-8, rounds: int = 8) -> Candidate | None:
         """The same with the terminal condition met to rounding, by the smallest changes of the torques."""
         from scipy.optimize import lsq_linear
 
@@ -397,7 +397,7 @@ class Descent:
         return found
 
 
-def terminal_rows(search: Descent, found: Found) -> tuple[Matrix, Vector]:
+def terminal_rows(search: Descent, found: Candidate) -> tuple[Matrix, Vector]:
     """By how much each terminal quantity rises, as a share, with each torque, and with t_f."""
     rows, rates = [], []
     for player, start, end in zip(search.players, found.starts, found.ends, strict=True):
@@ -534,7 +534,7 @@ class Model:
     """The linear model of the starts under a demand."""
 
     search: Descent
-    found: Found
+    found: Candidate
     shafts: Watched  # |T| of all shafts and machines, as shares of the base torque
     curve: Watched  # realised torque above the torque-speed curve, as shares of the highest torque
     terminal: Matrix
@@ -543,7 +543,7 @@ class Model:
     cuts: list[Vector]  # where squares have tangent planes
 
     @classmethod
-    def of(cls, search: Descent, found: Found) -> Model:
+    def of(cls, search: Descent, found: Candidate) -> Model:
         """The model at a demand."""
         problem, count = search.problem, found.torques.size
         shafts, curve = [], []
@@ -696,7 +696,7 @@ class Model:
 
 
 def _of_shafts(
-    search: Descent, start: Played, times: Vector, T: Matrix
+    search: Descent, start: DemandRun, times: Vector, T: Matrix
 ) -> tuple[Matrix, Vector, NDArray[np.bool_]]:
     """|T| of each shaft over time where it presses, as shares of the base torque, and its rows."""
     seen = np.flatnonzero(T.any(axis=1))

@@ -26,12 +26,14 @@ from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import SLOW
 from softstart.start.simulation import simulate
-from softstart.store import Records, Target
+from softstart.store import PartStore, Target
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
 
-YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
+COMPARISON_TERMINAL: Terminal = (
+    "reached"  # a controller is judged by the instant its load has the target speed
+)
 SHORT, LONG, COUNT = 1.02, 1.6, 12
 CHUNKS = 2  # stretches of start times for each worker
 SEARCHED = 10  # of so many points one is searched from all first demands
@@ -52,7 +54,7 @@ class FrontPoint(OneLine):
     of the profile, s and N m.
 
     >>> point = FrontPoint(0.3, "reached", "OPTIMAL", "", k_dyn=1.01, k_dyn_lower_bound=1.0)
-    >>> point.found, round(point.gap_percent, 6), FrontPoint.of_record(asdict(point)) == point
+    >>> point.found, round(point.optimality_gap_percent, 6), FrontPoint.of_record(asdict(point)) == point
     (True, 1.0, True)
     """
 
@@ -80,7 +82,7 @@ class FrontPoint(OneLine):
         return self.status == "OPTIMAL"
 
     @property
-    def gap_percent(self) -> float | None:
+    def optimality_gap_percent(self) -> float | None:
         """How far K_dyn lies above its bound, in per cent."""
         if self.k_dyn is None or self.k_dyn_lower_bound is None:
             return None
@@ -102,7 +104,11 @@ class FrontPoint(OneLine):
         """The figures under the names used everywhere."""
         about = asdict(self)
         profile = {"time": list(about.pop("time")), "torque": list(about.pop("torque"))}
-        return {**about, "gap_percent": self.gap_percent, "profile": profile if self.found else None}
+        return {
+            **about,
+            "gap_percent": self.optimality_gap_percent,
+            "profile": profile if self.found else None,
+        }
 
     @classmethod
     def of_record(cls, record: dict[str, Any]) -> FrontPoint:
@@ -318,15 +324,17 @@ def pareto(
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     found: dict[tuple[str, float], FrontPoint] = {}
     with (
-        Records(target, inputs, ["terminal", "start_time_bound"]) as saved,
-        Pool(count, scheduler=scheduler, describe=Stretch.__str__, kept="Finished points are kept.") as pool,
+        PartStore(target, inputs, ["terminal", "start_time_bound"]) as saved,
+        Pool(
+            count, scheduler=scheduler, describe=TimeRange.__str__, kept="Finished points are kept."
+        ) as pool,
     ):
-        for ending in dict.fromkeys([terminal, YARDSTICK]):
+        for ending in dict.fromkeys([terminal, COMPARISON_TERMINAL]):
             points: dict[float, FrontPoint] = {}
-            asked = {*(times if ending == terminal else ()), *(own if ending == YARDSTICK else ())}
+            asked = {*(times if ending == terminal else ()), *(own if ending == COMPARISON_TERMINAL else ())}
             known = {t: FrontPoint.of_record(one) for t in asked if (one := saved.find(ending, t))}
             for point in _points(
-                Stretch(drive, options, ending, tuple(sorted(asked, reverse=True))), known, pool, tell
+                TimeRange(drive, options, ending, tuple(sorted(asked, reverse=True))), known, pool, tell
             ):
                 t = point.start_time_bound
                 if point is not known.get(t) and point.status != "NOT_FOUND":  # another attempt may find it
@@ -342,7 +350,7 @@ def pareto(
     beside = [
         ControllerPoint(
             run.controller_name, run.k_dyn, run.start_time, run.status.value,
-            found.get((YARDSTICK, run.start_time)),
+            found.get((COMPARISON_TERMINAL, run.start_time)),
         )
         for run in runs
     ]  # fmt: skip
@@ -366,7 +374,7 @@ def default_start_times(
     return times
 
 
-class Stretch(NamedTuple):
+class TimeRange(NamedTuple):
     """Start times that follow each other, long ones first."""
 
     drive: Machine
@@ -394,7 +402,7 @@ class Stretch(NamedTuple):
 
 
 def computed(
-    asked: Stretch, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None
+    asked: TimeRange, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None
 ) -> Iterator[FrontPoint]:
     """The points of a stretch but those that are known; a better one comes again.
 
@@ -421,7 +429,7 @@ def computed(
         searched = number % SEARCHED == 0 or number == count - 1
         near, before = (found[-1].profile, found[-1].start_time_bound) if found else (None, 0.0)
         point = asked.point(t, near, 0.0 if searched else before)
-        gaps = [one.gap_percent or 0.0 for one in (*found[-2:], point)]
+        gaps = [one.optimality_gap_percent or 0.0 for one in (*found[-2:], point)]
         if point.found and not searched and gaps[-1] - gaps[-2] > 2.0 * max(gaps[-2] - gaps[0], 0.0) + JUMP:
             again = asked.point(t, near)
             searched = again.found and (again.k_dyn or 0.0) < (point.k_dyn or 0.0) * (1.0 - BETTER)
@@ -441,12 +449,12 @@ def computed(
             yield again
 
 
-def _listed(asked: Stretch) -> list[FrontPoint]:
+def _listed(asked: TimeRange) -> list[FrontPoint]:
     return list(computed(asked, {}))  # a generator does not leave its process
 
 
 def _points(
-    asked: Stretch, known: dict[float, FrontPoint], pool: Pool, tell: Progress
+    asked: TimeRange, known: dict[float, FrontPoint], pool: Pool, tell: Progress
 ) -> Iterator[FrontPoint]:
     """The points kept before, then the others; stretches of them by several workers."""
     yield from sorted(known.values(), key=lambda one: -one.start_time_bound)

@@ -18,9 +18,10 @@ from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
 from softstart.optimal.check import check, replayed
-from softstart.optimal.descent import APART, MANY, MISSED, MOST_KNOTS, TASTE, Descent, Found
+from softstart.optimal.descent import APART, MANY, MISSED, MOST_KNOTS, TASTE, Candidate, Descent
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
+    Infeasibility,
     InfeasibleError,
     Kept,
     Method,
@@ -28,13 +29,12 @@ from softstart.optimal.result import (
     Optimum,
     OptimumError,
     Trial,
-    Verdict,
 )
 from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve, rigid_start_time
 from softstart.parallel import on_one_thread
 from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
-from softstart.start.rows import rows_of
+from softstart.start.rows import kernel_input
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -213,7 +213,7 @@ def _by_formula(problem: Problem, began: float) -> Optimum | None:
     if pulse_coast_hold.applies(problem):
         return None
     try:
-        profile, end, k_dyn = pulse_coast_hold.solve(problem)
+        profile, end, k_dyn = pulse_coast_hold.solve_pulse_coast_hold(problem)
     except pulse_coast_hold.NotApplicable:
         return None
     return _checked(problem, profile, end, k_dyn, "closed-form", "pulse, coast, hold is optimal here", began)
@@ -245,13 +245,13 @@ def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float)
     return None
 
 
-def _answer(problem: Problem, name: str, best: Found, profile: TorqueProfile, began: float) -> Optimum:
+def _answer(problem: Problem, name: str, best: Candidate, profile: TorqueProfile, began: float) -> Optimum:
     claimed = {"k_dyn": best.peak / problem.base_torque, "heat": best.heat}[problem.minimise]
     why = f"successive linear programs on the exact start, from {name}"
     return _checked(problem, profile, best.end, claimed, "descent", why, began)
 
 
-def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
+def _sooner(problem: Problem) -> tuple[str, Candidate, TorqueProfile]:
     """A start from the shortest one found, where none was from others; the refusal if that takes longer."""
     shortest = _shortest(problem)
     assert problem.start_time is not None
@@ -261,7 +261,7 @@ def _sooner(problem: Problem) -> tuple[str, Found, TorqueProfile]:
     return _at_the_edge(replace(problem, start_time=end), shortest[1])
 
 
-def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Found, TorqueProfile]:
+def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Candidate, TorqueProfile]:
     """The gentlest start in the shortest time, in which a demand ends; else that of the demand itself."""
     assert problem.start_time is not None
     search = Descent(problem)
@@ -287,7 +287,7 @@ def _too_long(search: Descent) -> bool:
 
 def searched(
     problem: Problem, near: TorqueProfile | None = None, quick: bool = False
-) -> tuple[str, Found, TorqueProfile] | None:
+) -> tuple[str, Candidate, TorqueProfile] | None:
     """The best start by descents, the name of its first demand, and its profile; None if there was none.
 
     Where one torque serves several machines there are many local optima: a start of a shorter time is found
@@ -325,7 +325,7 @@ def _easier(problem: Problem) -> Iterator[Problem]:
     From strategies an undamped chain comes to poor local optima, and one torque for several machines often.
     """
     assert problem.start_time is not None
-    shafts = rows_of(problem.machines[0]).shafts[0].view(at.SHAFT)[:, 0]
+    shafts = kernel_input(problem.machines[0]).shafts[0].view(at.SHAFT)[:, 0]
     if len(problem.machines) > 1:
         for share in RUNGS:
             shorter = replace(problem, start_time=share * problem.start_time)
@@ -426,7 +426,7 @@ def _confirmed(best: Optimum) -> Optimum:
 
     problem, began = best.problem, time.perf_counter()
     try:
-        claim = statement.solve(problem, whole_run(best), straight=True)
+        claim = statement.solve_collocation(problem, whole_run(best), straight=True)
         search = Descent(problem)
         torques = search.onto(claim.profile)
         found = search.play(torques, min(claim.end_time, search.latest))
@@ -542,7 +542,7 @@ def _too_short(problem: Problem, shortest: float) -> InfeasibleError:
         f"No torque {'' if proved else 'was found that '}brings {problem.drive.name} to {problem.target:g} "
         f"rad/s ({problem.terminal}) within {problem.start_time:.6g} s{bounds}; {known}."
     )
-    return InfeasibleError(Verdict(problem, shortest, sentence))
+    return InfeasibleError(Infeasibility(problem, shortest, sentence))
 
 
 def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float) -> Optimum:
@@ -551,7 +551,7 @@ def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float
         found = _shortest(problem, near)
         if found is None:
             sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
-            raise InfeasibleError(Verdict(problem, math.inf, sentence))
+            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
         for edge in (EDGE, 10.0 * EDGE, SHORTEST):  # at the very edge no descent may end well
             timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + edge))
             with suppress(OptimumError):
@@ -652,7 +652,7 @@ def _first_that_keeps(
     if found is None:
         name = problem.drive.name
         sentence = f"limits: no start of {name} that keeps them was found up to {end:.4g} s."
-        raise InfeasibleError(Verdict(problem, math.inf, sentence))
+        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
     return found, soonest, refused
 
 
@@ -672,7 +672,7 @@ def _soonest(problem: Problem, most: float) -> float:
             sentence = (
                 f"limits: no start of {problem.drive.name} has a K_dyn below {least:.4g} within {high:.4g} s."
             )
-            raise InfeasibleError(Verdict(problem, math.inf, sentence))
+            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
         high *= 2.0
     while high - low > 1e-12 * high:
         middle = 0.5 * (low + high)

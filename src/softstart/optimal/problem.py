@@ -15,7 +15,7 @@ import numpy as np
 from softstart.chain.machines import one_machine
 from softstart.drive.records import is_machine
 from softstart.errors import InputError
-from softstart.quantities import multiple, to_si
+from softstart.quantities import read_multiple, to_si
 
 if TYPE_CHECKING:
     from softstart.start.run import Run
@@ -43,7 +43,7 @@ class StartTime:
         """
         either = 'or a multiple of the start time of direct, as "1.2x".'
         try:
-            number, ending = multiple(given, name) or (given, "")
+            number, ending = read_multiple(given, name) or (given, "")
             value: Any = to_si(number, "s", name=name) if isinstance(number, str) else number
         except InputError as error:
             raise InputError(f"{one.removesuffix('.')}, {either}" for one in error.sentences) from None
@@ -300,9 +300,9 @@ class Problem:
 def _rows(machine: Any) -> tuple[Any, Any]:
     """The machine as rows of the kernel, and its masses by names."""
     from softstart.kernel.records import MASS
-    from softstart.start.rows import rows_of
+    from softstart.start.rows import kernel_input
 
-    given = rows_of(machine)
+    given = kernel_input(machine)
     return given, given.masses[0].view(MASS)[:, 0]
 
 

@@ -42,11 +42,12 @@ class Course:
 
 
 @dataclass(frozen=True)
-class PulseCoastHold:
+class PulseCoastHoldStarts:
     """The starts of one drive and all that follows from their peak P: SI units, z0 < 0 while the gap is open.
 
     >>> from softstart import Drive
-    >>> starts = PulseCoastHold.of(Problem(Drive.load("crane-4amtkf").replace(target_speed=60), 0.2883042))
+    >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
+    >>> starts = PulseCoastHoldStarts.of(Problem(crane, 0.2883042))
     >>> course = starts.course(48.063)
     >>> round(course.t1, 5), round(course.t_contact, 5), round(course.t_peak, 5)
     (0.00757, 0.02171, 0.03592)
@@ -62,12 +63,12 @@ class PulseCoastHold:
     w2: float
 
     @classmethod
-    def of(cls, problem: Problem) -> PulseCoastHold:
+    def of(cls, problem: Problem) -> PulseCoastHoldStarts:
         """Those of a problem; damping is left out."""
         return cls.of_drive(problem.drive.two_masses, problem.highest_torque)
 
     @classmethod
-    def of_drive(cls, drive: Drive, Ms: float) -> PulseCoastHold:
+    def of_drive(cls, drive: Drive, Ms: float) -> PulseCoastHoldStarts:
         """Those of a drive under at most Ms N m; damping is left out."""
         z0, v0 = drive.theta0 - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
         given = drive.J1, drive.J2, drive.c, drive.Mc, Ms, z0, v0, drive.initial_load_speed
@@ -244,7 +245,7 @@ def off_course(problem: Problem) -> str:
 def applies(problem: Problem) -> str:
     """Why the closed form does not hold for a problem, in a few words; empty if it does.
 
-    That no hold with u_eq(P) <= Ms exists turns out in `solve`.
+    That no hold with u_eq(P) <= Ms exists turns out in `solve_pulse_coast_hold`.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
@@ -273,7 +274,7 @@ def applies(problem: Problem) -> str:
     return first_true(asked) or off_course(problem) or first_true(motor)
 
 
-def solve(problem: Problem) -> tuple[TorqueProfile, float, float]:
+def solve_pulse_coast_hold(problem: Problem) -> tuple[TorqueProfile, float, float]:
     """The gentlest start of the form Ms, 0, u_eq(P); raises NotApplicable where there is none.
 
     u_eq(P) = (P (J1 + J2) - Mc J1)/J2 holds T = P. t_f is the bound on the start time, or earlier where even
@@ -282,14 +283,14 @@ def solve(problem: Problem) -> tuple[TorqueProfile, float, float]:
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
-    >>> profile, end, k_dyn = solve(Problem(drive, start_time=0.2883042))
+    >>> profile, end, k_dyn = solve_pulse_coast_hold(Problem(drive, start_time=0.2883042))
     >>> round(k_dyn, 8), profile.torque.round(3).tolist()
     (0.90924722, [62.0, 62.0, 0.0, 0.0, 56.243])
     """
     if reason := applies(problem):
         raise NotApplicable(f"{reason}.")
     assert problem.start_time is not None
-    starts = PulseCoastHold.of(problem)
+    starts = PulseCoastHoldStarts.of(problem)
     target = problem.target * (1.0 + 1e-9)  # a little above, so that the exact plant finds it reached
     P = starts.least_peak_for(target, problem.start_time)
     if not math.isfinite(P):
@@ -316,7 +317,7 @@ def solve(problem: Problem) -> tuple[TorqueProfile, float, float]:
     return TorqueProfile.steps(edges, levels), end, course.peak / problem.base_torque
 
 
-def _end(starts: PulseCoastHold, course: Course, P: float, target: float, latest: float) -> float:
+def _end(starts: PulseCoastHoldStarts, course: Course, P: float, target: float, latest: float) -> float:
     """First instant at which the load has its target speed, s."""
 
     def missing(t: float) -> float:

@@ -211,7 +211,7 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
         return {"k_dyn": self.k_dyn, "heat": self.heat, "start_time": self.end_time}[self.problem.minimise]
 
     @property
-    def gap_percent(self) -> float:
+    def optimality_gap_percent(self) -> float:
         """How far K_dyn, or what was minimised instead, lies above its lower bound, in per cent."""
         found, least = self.k_dyn, self.bound.k_dyn
         if self.kept is not None:
@@ -254,7 +254,9 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
             "bound_kind": self.bound.kind,
             "bound_covers": self.bound.covers,
-            "gap_percent": self.gap_percent if bounded and math.isfinite(self.gap_percent) else None,
+            "gap_percent": self.optimality_gap_percent
+            if bounded and math.isfinite(self.optimality_gap_percent)
+            else None,
             "peak_torque": run.peak_torque,
             "start_time": self.end_time,
             "start_time_lower_bound": None if self.kept is None else self.kept.at_least,
@@ -278,7 +280,7 @@ class Optimum(Shown, sheet="optima.optimum_sheet"):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Infeasibility:
     """Why no start of the class asked for exists, and how short the start time may be."""
 
     problem: Problem
@@ -315,7 +317,7 @@ class InfeasibleError(RuntimeError):
     0.0804
     """
 
-    def __init__(self, verdict: Verdict) -> None:
+    def __init__(self, verdict: Infeasibility) -> None:
         self.verdict = verdict
         super().__init__(verdict.sentence)
 

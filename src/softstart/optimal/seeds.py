@@ -9,8 +9,8 @@ import numpy as np
 
 from softstart.errors import InputError, SimulationError
 from softstart.optimal.descent import Descent
-from softstart.optimal.pulse_coast_hold import PulseCoastHold
-from softstart.optimal.starts import Player
+from softstart.optimal.pulse_coast_hold import PulseCoastHoldStarts
+from softstart.optimal.starts import DemandSimulator
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
 
@@ -21,14 +21,14 @@ PULSES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 1.0)
 PHASES = (0.0, 0.06, 0.12, 0.18, 0.25, 0.4)
 
 
-def pulse_coast_hold(search: Descent, player: Player) -> TorqueProfile | None:
+def pulse_coast_hold(search: Descent, player: DemandSimulator) -> TorqueProfile | None:
     """Pulse, coast, hold of the least peak that brings this machine to its speed in time; None if none does.
 
     The instants are those of the two masses that stand for the machine, undamped and with an ideal torque;
     whether it is in time, its exact start says.
     """
     try:
-        starts = PulseCoastHold.of_drive(player.machine.two_masses, search.high)
+        starts = PulseCoastHoldStarts.of_drive(player.machine.two_masses, search.high)
     except InputError:
         return None
 
@@ -51,7 +51,7 @@ def pulse_coast_hold(search: Descent, player: Player) -> TorqueProfile | None:
     return demand(high)
 
 
-def _in_time(search: Descent, player: Player, demand: TorqueProfile) -> bool:
+def _in_time(search: Descent, player: DemandSimulator, demand: TorqueProfile) -> bool:
     try:
         return player.figures(demand, search.latest)[1] <= search.latest
     except SimulationError:
@@ -80,7 +80,7 @@ def pulse_coast_level(search: Descent) -> list[TorqueProfile]:
     return [one for _, one in sorted(found, key=lambda one: one[0])]
 
 
-def _first_contact(player: Player, demand: TorqueProfile, until: float) -> float:
+def _first_contact(player: DemandSimulator, demand: TorqueProfile, until: float) -> float:
     """When a gap first closes, s; infinite if none does."""
     try:
         return player.first_contact(demand, until)
@@ -111,7 +111,7 @@ def _level(search: Descent, t1: float, t2: float, low: float) -> tuple[float, To
     return max(player.figures(demand(b), search.latest)[0] for player in search.players), demand(b)
 
 
-def trace(search: Descent, player: Player, name: str) -> TorqueProfile | None:
+def trace(search: Descent, player: DemandSimulator, name: str) -> TorqueProfile | None:
     """The torque of a strategy on this machine, as a demand; None where it does not start it."""
     try:
         run = simulate(player.machine, name)

@@ -16,16 +16,16 @@ from softstart.controller import make_controller
 from softstart.kernel import records as at
 from softstart.profile import TorqueProfile
 from softstart.start.engine import ended, run_one
-from softstart.start.recorded import Recorded, Recorder
-from softstart.start.rows import MAX_EVENTS, Rows, rows_of
+from softstart.start.recorded import StartRecorder, Trajectory
+from softstart.start.rows import MAX_EVENTS, Rows, kernel_input
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class DemandRun:
     """A start under a demand, from 0 to its end."""
 
     profile: TorqueProfile
-    recorded: Recorded
+    recorded: Trajectory
 
     @property
     def peak(self) -> float:
@@ -104,7 +104,7 @@ class Played:
         return self.recorded.sensitivities(self.profile.time, (), marks)[1]
 
 
-class Player:
+class DemandSimulator:
     """Runs demands on one machine."""
 
     def __init__(self, machine: Machine) -> None:
@@ -119,17 +119,17 @@ class Player:
         self.fastest = 2.0 * math.pi / fastest
         self._loads = float((masses["Mc"] + masses["active"]).sum())
 
-    def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[Recorder, int]:
+    def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[StartRecorder, int]:
         made: Any = make_controller("profile", {"profile": profile})
-        recorder = Recorder(self.rows, int(made.sensors), room)
+        recorder = StartRecorder(self.rows, int(made.sensors), room)
         return recorder, run_one(made, self.machine, recorder, until)
 
-    def play(self, profile: TorqueProfile, until: float) -> Played:
+    def play(self, profile: TorqueProfile, until: float) -> DemandRun:
         """The start from 0 to `until` in s; SimulationError if it cannot be finished."""
         recorder, reason = self._run(profile, until, self._room)
         ended(recorder.state, reason, until, MAX_EVENTS, self.machine.name)
         self._room = max(self._room, recorder.spans.shape[0])
-        return Played(profile, recorder.finished())
+        return DemandRun(profile, recorder.finished())
 
     def figures(self, profile: TorqueProfile, until: float) -> tuple[float, float, float]:
         """Largest |T| of all shafts until then, N m; start time, s (inf if none); load speed then, rad/s."""
@@ -157,15 +157,15 @@ class Player:
 
 def parts(machine: Machine) -> tuple[Rows, Any, Any]:
     """A machine as rows of the kernel, and its masses and shafts by names."""
-    rows = rows_of(machine)
+    rows = kernel_input(machine)
     return rows, rows.masses[0].view(at.MASS)[:, 0], rows.shafts[0].view(at.SHAFT)[:, 0]
 
 
-def carried(rows: Rows) -> Vector:
+def steady_shaft_torques(rows: Rows) -> Vector:
     """The torques of the shafts of a machine while all masses turn at its target speed, N m.
 
     >>> from softstart import Drive
-    >>> carried(rows_of(Drive.load("crane-4amtkf"))).tolist()
+    >>> steady_shaft_torques(kernel_input(Drive.load("crane-4amtkf"))).tolist()
     [7.16]
     """
     masses, motor = rows.masses[0].view(at.MASS)[:, 0], int(rows.machine.motor)

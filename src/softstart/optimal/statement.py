@@ -39,7 +39,7 @@ from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged
-from softstart.optimal.starts import carried, parts
+from softstart.optimal.starts import parts, steady_shaft_torques
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 
@@ -68,7 +68,7 @@ class Slot(NamedTuple):
     component: int = 0
 
 
-class Table(NamedTuple):
+class PhaseTable(NamedTuple):
     """A phase in numbers: its duration, s; states at shares of it; demands, N m, at edges of elements."""
 
     length: float
@@ -79,14 +79,14 @@ class Table(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Claim:
+class CollocationSolution:
     """The demand found, the figure that is minimised as the collocation has it, t_f in s, and the rest."""
 
     profile: TorqueProfile
     value: float
     end_time: float
     peak: float  # the largest |T|, N m
-    phases: list[Table]
+    phases: list[PhaseTable]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +110,9 @@ class CasadiProblem:
     lbg: Vector
     ubg: Vector
     slots: tuple[Slot, ...]
-    reading: Callable[[Vector], Claim]
+    reading: Callable[[Vector], CollocationSolution]
 
-    def _of(self, x: Any) -> Claim:
+    def _of(self, x: Any) -> CollocationSolution:
         values = np.array(x, dtype=float).ravel()
         if values.shape != self.x0.shape:
             raise InputError(f"x: {values.size} numbers; give the {self.x0.size} of nlpsol's out['x'].")
@@ -132,7 +132,7 @@ class CasadiProblem:
 
 
 @dataclass(frozen=True, eq=False)
-class Phase:
+class ContactPhase:
     """A stretch without a change of contact, s; one entry for each shaft, or for each mass."""
 
     begin: float
@@ -150,7 +150,7 @@ class Phase:
         return self.end - self.begin
 
 
-def phases_of(problem: Problem, run: Run) -> list[Phase]:
+def phases_of(problem: Problem, run: Run) -> list[ContactPhase]:
     """The phases of a run: to t_f, and to one elastic period after it."""
     t_f, first = problem.start_time, run.start_time
     if math.isnan(first):  # the speed comes to its target from below
@@ -161,7 +161,7 @@ def phases_of(problem: Problem, run: Run) -> list[Phase]:
         raise InputError(
             f"run: it ends at {run.end_time:.6g} s; give one to an elastic period after the start time."
         )
-    recorded, phases = run.recorded, list[Phase]()
+    recorded, phases = run.recorded, list[ContactPhase]()
     times, modes = recorded.spans[:, [at.S_START, at.S_END]], recorded.of_shafts(1)[:-1]
     sides = np.where(modes == at.CONTACT, recorded.of_shafts(2)[:-1], 2.0 * (modes == at.JOINED)).astype(int)
     moving, braked = recorded.of_masses(1)[:-1].astype(int), recorded.spans[:, at.S_BRAKED] != 0.0
@@ -172,7 +172,7 @@ def phases_of(problem: Problem, run: Run) -> list[Phase]:
             spans = list(group)
             reached, is_open = phases[-1].end if phases else 0.0, modes[spans] == at.OPEN
             until = min(float(times[spans[-1], 1]), end)
-            phases.append(Phase(reached, until, *kind, is_open.all(axis=0), is_open[-1]))
+            phases.append(ContactPhase(reached, until, *kind, is_open.all(axis=0), is_open[-1]))
         phases[-1] = replace(phases[-1], end=end, last=end == t_f)
     return phases
 
@@ -190,7 +190,7 @@ class _Machine:
         self.lag, self.rate, self.release_at = float(given.lag), float(given.rate), float(given.release_at)
         self.first_torque = [float(given.initial_torque)]
         self.first = [*shaft["theta0"], *mass["w0"], *self.first_torque * bool(self.lag)]
-        self.masses, self.shafts, self.carried = mass.size, shaft.size, carried(rows)
+        self.masses, self.shafts, self.carried = mass.size, shaft.size, steady_shaft_torques(rows)
         self.at_motor = ca.DM(np.eye(self.masses)[self.motor])
         self.not_covered = {
             "efficiency: no gears with losses": (shaft["eta"] != 1.0).any(),
@@ -204,24 +204,24 @@ class _Machine:
         k, n = self.shafts, self.shafts + self.masses
         return x[:k, :], x[k:n, :], x[n, :] if self.lag else u
 
-    def flanks(self, phase: Phase) -> Vector:
+    def flanks(self, phase: ContactPhase) -> Vector:
         """The twists at which the flanks that press begin to, rad."""
         return np.where(np.abs(phase.pressing) == 1, phase.pressing * self.half, 0.0)
 
-    def torques(self, phase: Phase, x: SX) -> SX:
+    def torques(self, phase: ContactPhase, x: SX) -> SX:
         """T = c z + d z' of the shafts that press, N m."""
         twist, w, _ = self.split(x, 0.0)
         pressing = np.array(phase.pressing) != 0
         return pressing * self.c * (twist - self.flanks(phase)) + pressing * self.d * (w[:-1, :] - w[1:, :])
 
-    def push(self, phase: Phase, x: SX, u: SX) -> SX:
+    def push(self, phase: ContactPhase, x: SX, u: SX) -> SX:
         """T_(i-1) - T_i - loads (+ M at the motor), N m: the torque on each mass but friction and brake."""
         _, w, M = self.split(x, u)
         T, none = self.torques(phase, x), ca.DM.zeros(1, x.shape[1])
         shafts = ca.vertcat(none, T) - ca.vertcat(T, none)
         return ca.mtimes(self.at_motor, M) + shafts - self.ground * w - self.load_torque
 
-    def slopes(self, phase: Phase, x: SX, u: SX) -> SX:
+    def slopes(self, phase: ContactPhase, x: SX, u: SX) -> SX:
         """The derivatives x' = f(x, u)."""
         _, w, M = self.split(x, u)
         moving = np.array(phase.moving)
@@ -235,7 +235,7 @@ class _Machine:
 class _Program:
     """Variables and conditions, as the phases are written down; demands and P in base torques."""
 
-    def __init__(self, problem: Problem, phases: list[Phase], period: float) -> None:
+    def __init__(self, problem: Problem, phases: list[ContactPhase], period: float) -> None:
         self.problem, self.machine, self.phases = problem, _Machine(problem), phases
         self.base, self.target, self.period = problem.base_torque, problem.target, period
         self.low, self.high = problem.lowest_torque / self.base, problem.highest_torque / self.base
@@ -263,7 +263,7 @@ class _Program:
         self.g.append(ca.vec(value))
         self.bounds += [(low, high)] * value.numel()
 
-    def write(self, mesh: list[Vector], guesses: list[Table], peak: float) -> CasadiProblem:
+    def write(self, mesh: list[Vector], guesses: list[PhaseTable], peak: float) -> CasadiProblem:
         """The program on a mesh, the edges of the elements of each phase as shares of it; P in N m."""
         self.x, self.limits, self.slots = list[SX](), list[tuple[float, float, float]](), list[Slot]()
         self.g, self.bounds = list[SX](), list[tuple[float, float]]()
@@ -284,7 +284,7 @@ class _Program:
         f = f / (1.0 if self.problem.minimise == "k_dyn" else self.period)
         return self.finished(f + 1e-5 * (self.steps + self.peak), value, t_f, mesh)
 
-    def phase(self, number: int, edges: Vector, guess: Table) -> None:
+    def phase(self, number: int, edges: Vector, guess: PhaseTable) -> None:
         """The states x' = f(x, u) at the Radau points of a phase; what holds there and at its end."""
         machine, phase, widths = self.machine, self.phases[number], np.diff(edges)
         then = self.phases[number + 1] if number + 1 < len(self.phases) else phase
@@ -327,7 +327,7 @@ class _Program:
         """The Radau points of elements, as shares of their phase."""
         return np.asarray((edges[:-1, None] + np.diff(edges)[:, None] * self.points).ravel())
 
-    def scales(self, phase: Phase) -> tuple[Vector, Vector]:
+    def scales(self, phase: ContactPhase) -> tuple[Vector, Vector]:
         """Origin and size of twists, speeds and realised torque in a phase, SI."""
         machine, pressing = self.machine, np.array(phase.pressing)
         twists = np.where((pressing != 0) | (machine.half == 0.0), self.base / machine.c, machine.half)
@@ -342,7 +342,7 @@ class _Program:
             line = ca.fmax(torque + incline * (w[self.machine.motor, :] - speed), self.low * self.base)
             self.between(-math.inf, (M - line) / self.base, 0.0)
 
-    def kept(self, phase: Phase, then: Phase, x: SX, u: SX) -> None:
+    def kept(self, phase: ContactPhase, then: ContactPhase, x: SX, u: SX) -> None:
         """What holds in a phase; at its end not for what changes there (`then` follows)."""
         machine, points = self.machine, x.shape[1]
         twist, w, _ = machine.split(x, u)
@@ -369,7 +369,7 @@ class _Program:
             inner = slice(points if then.braked else points - 1)
             self.between(-math.inf, push[machine.motor, inner] / self.base, 0.0)
 
-    def change(self, phase: Phase, then: Phase, u: SX) -> None:
+    def change(self, phase: ContactPhase, then: ContactPhase, u: SX) -> None:
         """What vanishes where one phase becomes the next; at an impact T of a damped shaft jumps."""
         machine, base, x = self.machine, self.base, self.state
         push, struck = machine.push(phase, x, u) / base, set()
@@ -396,7 +396,7 @@ class _Program:
             else:
                 self.between(0.0, push[i] - next_sign * machine.hold[i] / base, 0.0)
 
-    def terminal(self, phase: Phase) -> None:
+    def terminal(self, phase: ContactPhase) -> None:
         """What holds at t_f, and the bounds on t_f and heat."""
         machine, problem = self.machine, self.problem
         _, w, _ = machine.split(self.state, 0.0)
@@ -417,16 +417,16 @@ class _Program:
         problem, x = self.problem, ca.vertcat(*self.x)
         read = ca.Function("read", [x], [self.base * self.peak, value, t_f, *self.read])
 
-        def reading(values: Vector) -> Claim:
+        def reading(values: Vector) -> CollocationSolution:
             (peak, figure, end), rest = np.split(np.array(read(values), dtype=object), [3])
             phases, times, begin = [], [], 0.0
             for edges, (length, u, x) in zip(mesh, rest.reshape(-1, 3), strict=True):
                 demands = np.array(u).ravel().clip(problem.lowest_torque, problem.highest_torque)
-                phases.append(Table(float(length), self.shares(edges), np.array(x), edges, demands))
+                phases.append(PhaseTable(float(length), self.shares(edges), np.array(x), edges, demands))
                 times.append(begin + float(length) * edges)
                 begin = times[-1][-1]
             profile = TorqueProfile(np.concatenate(times), np.concatenate([one.demands for one in phases]))
-            return Claim(profile, float(figure), float(end), float(peak), phases)
+            return CollocationSolution(profile, float(figure), float(end), float(peak), phases)
 
         nlp = {"x": x, "p": ca.SX.sym("p", 0), "f": f, "g": ca.vertcat(*self.g)}
         (x0, lbx, ubx), (lbg, ubg) = np.array(self.limits).T, np.array(self.bounds).T
@@ -448,12 +448,12 @@ class _Program:
             values = run.recorded.at(phase.begin + phase.length * shares)
             states = [values["twist"], values["w"], *[values["u"][:, None]] * bool(machine.lag)]
             demands = np.full(edges.size, demands.mean()) if straight else demands
-            guesses.append(Table(phase.length, shares, np.concatenate(states, axis=1), edges, demands))
+            guesses.append(PhaseTable(phase.length, shares, np.concatenate(states, axis=1), edges, demands))
             mesh.append(edges)
         return self.write(mesh, guesses, run.peak_torque)
 
 
-def _halved(phase: Table, span: float, rate: float) -> Vector:
+def _halved(phase: PhaseTable, span: float, rate: float) -> Vector:
     """The edges, and one more in each element beside a bend of the demand by a fifth of its `span`."""
     widths = np.diff(phase.edges)
     slopes, steepest = np.diff(phase.demands) / (widths * phase.length), span / (widths * phase.length)
@@ -481,7 +481,7 @@ def as_casadi(problem: Problem, run: Run, straight: bool = False) -> CasadiProbl
     return _Program(problem, phases_of(problem, run), run.elastic_period).from_run(run, straight)
 
 
-def solve(problem: Problem, run: Run, straight: bool = False) -> Claim:
+def solve_collocation(problem: Problem, run: Run, straight: bool = False) -> CollocationSolution:
     """The best start in the order of contacts of `run` by IPOPT; elements beside jumps are then halved.
 
     Raises InputError as `as_casadi`, and NotConverged where IPOPT finds no solution on the first mesh.

@@ -19,8 +19,8 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.kernel.records import CURVE, MASS
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import InfeasibleError, Verdict
-from softstart.start.rows import rows_of
+from softstart.optimal.result import Infeasibility, InfeasibleError
+from softstart.start.rows import kernel_input
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -35,7 +35,7 @@ class RigidStart:
     """
 
     def __init__(self, machine: Any, corners: Corners) -> None:
-        given = rows_of(next(iter(machine.positions.values())))
+        given = kernel_input(next(iter(machine.positions.values())))
         masses = given.masses[0].view(MASS)[:, 0]
         self.corners = corners
         self.most = float(min(machine.motor.starting_torque, machine.motor.maximum_torque))
@@ -109,7 +109,7 @@ def refuse_weak_curve(problem: Problem) -> None:
         motor, load = float(start.motor(w)[0]), float(start.load(w)[0])
         if motor <= load:
             raise InfeasibleError(
-                Verdict(
+                Infeasibility(
                     problem, math.inf,
                     f"torque_speed: at {w[0]:.4g} rad/s the motor has {motor:.4g} N m and the load takes "
                     f"{load:.4g} N m, so {machine.name} does not come to {start.end:.4g} rad/s; give a curve "

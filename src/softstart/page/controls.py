@@ -120,7 +120,7 @@ class Controls:
 
     def _reset(self, path: str) -> None:
         """A parameter of the machine as it was loaded, or the default of one of the strategy."""
-        _, loaded = self._session.origin.by_path().get(self._entry(path).path, (None, None))
+        _, loaded = self._session.origin.parameters_by_path().get(self._entry(path).path, (None, None))
         self._session.set(path, loaded)
 
     def _leave(self, path: str) -> None:

@@ -22,7 +22,7 @@ from softstart.drive.data_sheet_words import (
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
-from softstart.page.panel_parts import Troubles, action, box, choice, field, hint, notify, reveal, save
+from softstart.page.panel_parts import Troubles, action, box, choice, hint, notify, reveal, save, text_field
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
@@ -57,7 +57,7 @@ class DataSheetPanel:
                     ui.html(title, tag="h3", sanitize=False).classes("panel-title")
                 with box("panel-form"):
                     for p in tables[name]:
-                        self._fields[p.name] = made(p)
+                        self._fields[p.name] = data_sheet_field(p)
         machine = self._fields["machine"]
         machine.on_value_change(lambda event: self._about(str(event.value)))
         self._about(str(machine.value))
@@ -87,7 +87,7 @@ class DataSheetPanel:
         reveal(self._answer, "nearest")
         try:
             found = DataSheet.from_settings(answered(written))
-            title, sentences = "Check these values.", found.doubts
+            title, sentences = "Check these values.", found.plausibility_warnings
         except InputError as error:
             found, title, sentences = None, "There is no drive yet.", list(error.sentences)
         self._troubles.say(sentences, title)
@@ -105,7 +105,7 @@ class DataSheetPanel:
             save(found.drive_toml(), drive_file(found.drive))
 
 
-def made(p: Parameter) -> Any:
+def data_sheet_field(p: Parameter) -> Any:
     """The field of one parameter with an example; below it its value in SI, or what is used without."""
     needed = p.required or p.name == "mass"
     unit = USUAL.get(p.name, p.unit)
@@ -115,7 +115,7 @@ def made(p: Parameter) -> Any:
         words = {word: f"{word}: {about}" for word, about in MACHINES.items()}
         return choice(f"{label} *", words, p.example.strip('"'), name)
     example = "such as " + p.example.strip('"').removesuffix(f" {unit}")
-    one = field(label + (" *" if needed else ""), "", name, TYPICAL.get(p.name, ("", example))[1])
+    one = text_field(label + (" *" if needed else ""), "", name, TYPICAL.get(p.name, ("", example))[1])
     with one.parent_slot.parent:
         note = ui.label().props(f'data-testid="{name}-note"')
 

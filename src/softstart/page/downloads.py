@@ -52,10 +52,10 @@ def file_name(*parts: str, suffix: str) -> str:
     return (stem or "softstart") + suffix
 
 
-def text_of(write: Callable[[Path], Any], suffix: str) -> str:
+def written_text(write: Callable[[Path], Any], suffix: str) -> str:
     """The text that `write(path)` would write into a file of its own.
 
-    >>> text_of(lambda path: path.write_text("hello"), ".txt")
+    >>> written_text(lambda path: path.write_text("hello"), ".txt")
     'hello'
     """
     with tempfile.TemporaryDirectory(prefix="softstart-") as folder:

@@ -14,7 +14,14 @@ from softstart.errors import InputError
 from softstart.input.documents import parsed
 from softstart.input.parameters import Wording
 from softstart.page import tasks
-from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
+from softstart.page.downloads import (
+    command_text,
+    drive_file,
+    file_name,
+    profile_of,
+    shipped_drives,
+    written_text,
+)
 from softstart.page.machines import Loaded, machine_from
 from softstart.page.panel_parts import (
     POLL,
@@ -149,7 +156,7 @@ class Exports:
         found = self._session.result(self._session.selected)
         if found.run is None:
             raise InputError(f"{found.name} has no traces: {found.trouble}")
-        save(text_of(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
+        save(written_text(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
 
     def _profile(self, suffix: str) -> None:
         label = self._session.selected
@@ -162,14 +169,14 @@ class Exports:
             ".toml": lambda path: profile.to_toml(path, about),
             ".c": lambda path: profile.to_c(path, about=about),
         }
-        save(text_of(writers[suffix], suffix), file_name(label, suffix=suffix))
+        save(written_text(writers[suffix], suffix), file_name(label, suffix=suffix))
 
     def _begin_report(self) -> None:
         session = self._session
         strategies = dict(session.controllers)
         name, self._text = self._named("report", suffix=".html"), ""
         command = command_text(session.seen, strategies, "report", f"--out={name}")
-        work = tasks.report, session.possible, list(strategies.values()), command
+        work = tasks.report_task, session.possible, list(strategies.values()), command
         self._view.begin("report", *work, subject=name)
 
     def _done(self, text: str) -> None:

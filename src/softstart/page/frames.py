@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Vector
 from softstart.controller.tuned import Tuned
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.kernel import records as at
 from softstart.page import links, machines
 from softstart.page.machines import STRATEGY, Axes, Entry
@@ -67,7 +67,7 @@ class Screen:
         if self._about[0] is origin and self._about == about:
             return
         if self._about[0] is not origin:
-            self.axes, self._machine = machines.axes_about(origin), machines.entries(origin)
+            self.axes, self._machine = machines.axes_about(origin), machines.parameter_fields(origin)
             self.mistakes.clear()
         self._about = about
         try:
@@ -115,7 +115,11 @@ class Screen:
         if slow or self.late > TOO_LATE or self._about[0] is not session.origin:
             return None
         found = self._result(session.selected)
-        return {"stamp": self.stamp, "version": session.version, "figure": figure(session, found, self.units)}
+        return {
+            "stamp": self.stamp,
+            "version": session.version,
+            "figure": figure_view(session, found, self.units),
+        }
 
     def first(self) -> Frame:
         """Fields, the large figure and the traces of the selected strategy."""
@@ -135,7 +139,7 @@ class Screen:
             "added": list(session.added),
             "changed": list(session.changed),
             "selected": session.selected,
-            "figure": figure(session, found, units),
+            "figure": figure_view(session, found, units),
             "traces": {session.selected: drawn(found, units, window=self.window)},
             "rows": [row(session, found)],
             "reference": self._reference(),
@@ -155,7 +159,7 @@ class Screen:
 
     def _filled(self) -> list[str]:
         """The groups in which something is not as it was when the drive was loaded: no fold hides that."""
-        now, before = self.session.machine.by_path(), self.session.origin.by_path()
+        now, before = self.session.machine.parameters_by_path(), self.session.origin.parameters_by_path()
         return sorted({one.group for path, one in self._machine.items() if now.get(path) != before.get(path)})
 
     def _grouped(self, known: Mapping[str, Entry]) -> list[Frame]:
@@ -193,7 +197,7 @@ class Screen:
                 text = f"{self.units.shown(float(value), one.unit):.4g}"
             else:
                 text = written_value(value, one, self.units)
-            shown[path] = field(one, text, value, marks, self.units)
+            shown[path] = field_view(one, text, value, marks, self.units)
             shown[path]["changed"] = given is not None and not isinstance(given, str)
         return shown
 
@@ -252,7 +256,7 @@ class Screen:
             "recommendation": " ".join(
                 [session.recommendation().text, *([NO_STIFFNESS] if session.soft else [])]
             ),
-            "doubts": doubts(machine),
+            "plausibility_warnings": plausibility_warnings(machine),
             "assumed": [one for one in machine.assumed.split("; ") if one],
         }
         yield from self._map()
@@ -315,14 +319,14 @@ class Screen:
         }
 
 
-def number(value: float) -> float | None:
+def json_number(value: float) -> float | None:
     """A number that JSON can carry."""
     return float(value) if math.isfinite(value) else None
 
 
 def numbers(values: Any) -> list[float | None]:
     """Numbers that JSON can carry."""
-    return [number(value) for value in values.tolist()]
+    return [json_number(value) for value in values.tolist()]
 
 
 # fields -------------------------------------------------------------------------------------------------
@@ -334,7 +338,7 @@ def described(one: Entry, units: Units) -> Frame:
     return vars(one) | {"unit": unit(units.of(one.unit)), "scale": one.scale is not None, "text": text}
 
 
-def field(one: Entry, text: str, value: Any, marks: Any, units: Units) -> Frame:
+def field_view(one: Entry, text: str, value: Any, marks: Any, units: Units) -> Frame:
     """What a field shows: its text, where its slider is, and marks on that, each with what it means."""
     scale = one.scale
     if scale is None:
@@ -360,7 +364,7 @@ def written_value(value: Any, one: Entry, units: Units) -> str:
 
 def machine_fields(session: Session, known: Mapping[str, Entry], units: Units) -> dict[str, Frame]:
     """By path what the fields of the machine show; a mark is where its value was when it was loaded."""
-    now, before = session.machine.by_path(), session.origin.by_path()
+    now, before = session.machine.parameters_by_path(), session.origin.parameters_by_path()
     shown = {}
     for path, one in known.items():
         if path in now:
@@ -374,28 +378,28 @@ def machine_fields(session: Session, known: Mapping[str, Entry], units: Units) -
                 text = typed
             if path == "units":
                 text = text or units.text  # as the machine was given
-            shown[path] = field(one, text, value, [("as loaded", first)], units)
+            shown[path] = field_view(one, text, value, [("as loaded", first)], units)
     return shown
 
 
 # figures ------------------------------------------------------------------------------------------------
 
 
-def figure(session: Session, found: Strategy, units: Units) -> Frame:
+def figure_view(session: Session, found: Strategy, units: Units) -> Frame:
     """The large figure and the numbers around it."""
     run = found.run
     facts = outcomes(found) | {
-        "time_lost": number(session.time_lost(found)),
+        "time_lost": json_number(session.time_lost(found)),
         "status": found.status,
-        "base": number(float(session.machine.mean_torque)),
+        "base": json_number(float(session.machine.mean_torque)),
         "speed_unit": units.of("rad/s"),
     }
     if run is not None:
         facts |= {
             "reached": math.isfinite(run.start_time),
-            "output_torque": number(run.peak_torque_at_output),
+            "output_torque": json_number(run.peak_torque_at_output),
             "contacts": run.contacts,
-            "impact_speed": number(units.shown(run.impact_speed, "rad/s")),
+            "impact_speed": json_number(units.shown(run.impact_speed, "rad/s")),
             "position": "".join(position_notes([run])),
         }
     return facts
@@ -405,9 +409,9 @@ def outcomes(found: Strategy) -> Frame:
     """What came out of a start by itself."""
     return {
         "name": found.name,
-        "k_dyn": number(found.k_dyn),
-        "start_time": number(found.start_time),
-        "peak_torque": number(found.peak_torque),
+        "k_dyn": json_number(found.k_dyn),
+        "start_time": json_number(found.start_time),
+        "peak_torque": json_number(found.peak_torque),
     }
 
 
@@ -417,10 +421,10 @@ def row(session: Session, found: Strategy) -> Frame:
     flags = () if known is None else known.flags
     trouble = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
     return outcomes(found) | {
-        "time_lost": number(session.time_lost(found)),
-        "worn": None if known is None else number(known.k_dyn_worn_gap),
-        "soft": number(known.cases[SOFT_END].k_dyn) if known and SOFT_END in known.cases else None,
-        "settled": None if known is None else number(known.run.settled_time),
+        "time_lost": json_number(session.time_lost(found)),
+        "worn": None if known is None else json_number(known.k_dyn_worn_gap),
+        "soft": json_number(known.cases[SOFT_END].k_dyn) if known and SOFT_END in known.cases else None,
+        "settled": None if known is None else json_number(known.run.settled_time),
         "limits": "" if known is None else known.against_limits,
         "flag": ", ".join(flag.word for flag in flags),
         "trouble": trouble or "; ".join(flag.text for flag in flags),
@@ -441,7 +445,7 @@ def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
     controller, other = kept.controller, session.controllers.get(kept.label)
     words = [
         f"{one.name} {'default' if value is None else value}"
-        for one in (machines.parameters_of(controller) if type(other) is type(controller) else ())
+        for one in (machines.page_parameters(controller) if type(other) is type(controller) else ())
         if (value := getattr(controller, one.name)) != getattr(other, one.name)
     ]
     return kept.label, *words, differences(kept.drive, session.seen)
@@ -483,7 +487,7 @@ def drawn(
             "motor": machine.motor_index,
             "load": machine.load_index,
             "target": units.shown(machine.target_speed, "rad/s"),
-            "allowed": number(run.permissible_torque),
+            "allowed": json_number(run.permissible_torque),
             "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "turn": units.size("rad/s")},
         }
     return picture

@@ -29,7 +29,7 @@ MISTAKE = (
 log = logging.getLogger("softstart.page")
 
 
-class State(Enum):
+class JobState(Enum):
     """Where a job is; the values are the sentences shown."""
 
     WAITING = "Queued."
@@ -41,7 +41,7 @@ class State(Enum):
     @property
     def over(self) -> bool:
         """Whether nothing more will come."""
-        return self not in {State.WAITING, State.RUNNING}
+        return self not in {JobState.WAITING, JobState.RUNNING}
 
 
 class Job:
@@ -55,7 +55,7 @@ class Job:
 
     def __init__(self, user: Hashable, title: str, packed: bytes, ahead: Callable[[Job], int]) -> None:
         self.user, self.title, self._packed, self._ahead = user, title, packed, ahead
-        self.state = State.WAITING
+        self.state = JobState.WAITING
         self.share: float | None = None
         self.message = ""
         self.result: Any = None
@@ -95,18 +95,18 @@ class Job:
             if self._worker is not None:
                 self._worker.kill()
             elif not self.state.over:
-                self._conclude(State.CANCELLED)
+                self._conclude(JobState.CANCELLED)
 
     def run(self, start: Callable[[], Worker]) -> None:
         """Run it in a process and listen to that, unless it was cancelled; the process is ended."""
         sentences: tuple[str, ...] = (MISTAKE,)
-        state = State.FAILED
+        state = JobState.FAILED
         try:
             with self._lock:
                 if self.state.over:
                     return
                 self._worker = start()
-                self.pid, self._began, self.state = self._worker.pid, time.monotonic(), State.RUNNING
+                self.pid, self._began, self.state = self._worker.pid, time.monotonic(), JobState.RUNNING
                 self.changes += 1
             state, sentences = self._heard(self._worker)
         except Exception:
@@ -116,7 +116,7 @@ class Job:
                 self._worker.kill()
         self._conclude(state, *sentences)
 
-    def _heard(self, worker: Worker) -> tuple[State, tuple[str, ...]]:
+    def _heard(self, worker: Worker) -> tuple[JobState, tuple[str, ...]]:
         worker.submit(_unpacked, self._packed, reports=True)
         try:
             while message := worker.receive():
@@ -127,22 +127,22 @@ class Job:
                         self.result, self.share = result, 1.0
                         break
                     case Message("error", (InputError() as error, _)):
-                        return State.FAILED, error.sentences
+                        return JobState.FAILED, error.sentences
                     case Message("error", (SimulationError() as error, _)):
-                        return State.FAILED, (str(error),)
+                        return JobState.FAILED, (str(error),)
                     case Message("error", (MemoryError(), _)):
-                        return State.FAILED, (OUT_OF_MEMORY,)
+                        return JobState.FAILED, (OUT_OF_MEMORY,)
                     case Message("error", (_, text)):
                         log.error("In the process of %r:\n%s", self.title, text)
-                        return State.FAILED, (MISTAKE,)
+                        return JobState.FAILED, (MISTAKE,)
                 self.changes += 1
         except DiedError as death:
             if self._stop.is_set():
-                return State.CANCELLED, ()
-            return State.FAILED, (DIED.format(death),)
-        return State.DONE, ()
+                return JobState.CANCELLED, ()
+            return JobState.FAILED, (DIED.format(death),)
+        return JobState.DONE, ()
 
-    def _conclude(self, state: State, *sentences: str) -> None:
+    def _conclude(self, state: JobState, *sentences: str) -> None:
         self._ended = time.monotonic() if self._began else 0.0
         self.sentences, self.state = sentences, state
         self.changes += 1
@@ -227,7 +227,7 @@ class Jobs:
         self._threads.shutdown()
 
     def _ahead(self, job: Job) -> int:
-        waiting = [one for one in self._jobs if one.state is State.WAITING]
+        waiting = [one for one in self._jobs if one.state is JobState.WAITING]
         return waiting.index(job) if job in waiting else 0
 
     def _attend(self, job: Job) -> None:

@@ -56,14 +56,14 @@ def style() -> str:
 
 def warm(drive: Loaded) -> None:
     """Do what the first tab would wait for, and others behind it."""
-    gentlest(drive)
+    gentlest_strategy(drive)
     for _, module, _ in PANELS:
         with suppress(Exception):  # said in its tab
             import_module(f"softstart.page.{module}")
 
 
 @cache
-def gentlest(drive: Loaded) -> str:
+def gentlest_strategy(drive: Loaded) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
     session.select_gentlest()
@@ -75,7 +75,7 @@ def build(drive: Loaded) -> Session:
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.select(gentlest(drive))
+    session.select(gentlest_strategy(drive))
     session.restore(session.bench)  # the page begins here: that is no step to undo
     screen = Screen(session)
     with instrument()() as element:

@@ -19,14 +19,14 @@ from typing import Any
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, make_controller
 from softstart.errors import InputError
-from softstart.page.machines import machine_from, single
-from softstart.page.session import SOFT, Bench, Reference, Session
+from softstart.page.machines import machine_from, startable
+from softstart.page.session import SOFT, Inputs, Reference, Session
 
 MOST_KEPT = 64  # benches of tabs that may be reloaded
 LONGEST = 16_384  # characters of a link
 LARGEST = 65_536  # bytes that it may hold
 
-_kept: OrderedDict[str, tuple[str, Bench]] = OrderedDict()  # link and bench
+_kept: OrderedDict[str, tuple[str, Inputs]] = OrderedDict()  # link and bench
 
 
 def keep(session: Session) -> tuple[str, str]:
@@ -39,7 +39,7 @@ def keep(session: Session) -> tuple[str, str]:
     return name, link
 
 
-def kept(name: str, link: str) -> Bench | None:
+def kept(name: str, link: str) -> Inputs | None:
     """The bench that is kept under this name, if this is its link: a tab may not know of the latest one."""
     known, bench = _kept.get(name, ("", None))
     return bench if known == link else None
@@ -79,7 +79,7 @@ def _given(controller: Controller) -> dict[str, Any]:
     return {name: value for name, value in values.items() if isinstance(value, str | int | float)}
 
 
-def bench_of(link: str, now: Bench) -> Bench:
+def bench_of(link: str, now: Inputs) -> Inputs:
     """The bench of a link; the strategies that it does not name are those of `now`, or for another machine
     those of them that are installed.
 
@@ -106,11 +106,11 @@ def bench_of(link: str, now: Bench) -> Bench:
         ) from None
     for one in (drive, origin, *([reference.drive] if reference else [])):
         try:
-            single(one)
+            startable(one)
         except InputError as error:
             raise InputError([f"the address after #: {sentence}" for sentence in error.sentences]) from None
     made = {name: make_controller(name, values) for name, values in given.items()}
-    return Bench(
+    return Inputs(
         drive,
         origin,
         {**own, **made},
@@ -121,7 +121,7 @@ def bench_of(link: str, now: Bench) -> Bench:
     )
 
 
-def _reference(content: Any, now: Bench) -> Reference | None:
+def _reference(content: Any, now: Inputs) -> Reference | None:
     """The reference of a link; like all strategies, only one that the page has can be given parameters."""
     if content is None or (label := str(content["label"])) not in now.controllers:
         return None

@@ -16,11 +16,11 @@ from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
-from softstart.drive.doubts import TwoMasses
+from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
 from softstart.start.batch import prepared
-from softstart.tuning.ranges import ranges_of, tunable
+from softstart.tuning.ranges import ranges_of, tunable_parameters
 
 STEPS = 600
 DIGITS = 4
@@ -132,16 +132,16 @@ class Entry:
     scale: Scale | None = None
 
 
-def entries(machine: Machine) -> Mapping[str, Entry]:
+def parameter_fields(machine: Machine) -> Mapping[str, Entry]:
     """The fields of a drive or chain by their paths, in their order on the page.
 
-    >>> list(entries(Drive.load("crane-4amtkf")))[:3]
+    >>> list(parameter_fields(Drive.load("crane-4amtkf")))[:3]
     ['units', 'name', 'motor.starting_torque']
-    >>> gap = entries(Chain.load("crane-4-mass"))["shaft[2].gap"]
+    >>> gap = parameter_fields(Chain.load("crane-4-mass"))["shaft[2].gap"]
     >>> gap.group, gap.symbol, gap.scale
     ('pinion - wheel shaft', '\N{GREEK SMALL LETTER DELTA}\N{SUBSCRIPT TWO}', Scale(low=0.0, high=0.8, ...))
     """
-    values, lumped, found = machine.by_path(), machine.lumped, {}
+    values, lever_rule_model, found = machine.parameters_by_path(), machine.lever_rule_model, {}
     for place, table, k in _places(machine):
         for key in FIELDS[table].split():
             path, word = f"{place}.{key}".lstrip("."), f"{table}.{key}".lstrip(".")
@@ -158,7 +158,7 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), one.unit,
                 f"{one.meaning}; write for example {', '.join([*words, one.example])}", one.example,
                 () if one.unit else one.choices, words, one.default is None,
-                _scale(word, value, machine, lumped, k),
+                _scale(word, value, machine, lever_rule_model, k),
             )  # fmt: skip
     return found
 
@@ -181,7 +181,7 @@ def _has_field(place: str, key: str, values: Values, load: bool) -> bool:
     return key != "contact_law" and (key != "torque" or load or bool(values[f"{place}.torque"][1]))
 
 
-def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) -> Scale | None:
+def _scale(word: str, value: Any, origin: Machine, lever_rule_model: TwoMasses, k: int) -> Scale | None:
     """The slider of a main parameter, about the machine as it was loaded; `k` numbers a part of a chain."""
     drive: Any = origin.motor
     motor, ratio = float(drive.starting_torque), 1.0
@@ -190,7 +190,7 @@ def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) ->
         ratio = origin.speed_ratios()[k - (not after)]
     match word.split("."):
         case ["motor", "starting_torque"]:
-            weakest = rounded(min(max(1.1 * lumped.Mc, 0.1 * motor), 0.9 * motor), 2)
+            weakest = rounded(min(max(1.1 * lever_rule_model.Mc, 0.1 * motor), 0.9 * motor), 2)
             return Scale(weakest, max(float(drive.maximum_torque), motor))
         case ["motor", "torque_lag"]:
             return Scale(0.0, rounded(max(0.02, 4.0 * value), 2))
@@ -203,7 +203,12 @@ def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) ->
         case ["shaft", "damping"]:
             if k:
                 return Scale(0.0, rounded(5.0 * value))
-            critical = 2.0 * math.sqrt(lumped.c * lumped.J1 * lumped.J2 / (lumped.J1 + lumped.J2))
+            critical = 2.0 * math.sqrt(
+                lever_rule_model.c
+                * lever_rule_model.J1
+                * lever_rule_model.J2
+                / (lever_rule_model.J1 + lever_rule_model.J2)
+            )
             return Scale(0.0, rounded(max(0.3 * critical, 2.0 * value), 2))
         case ["shaft", "damping_ratio"]:
             return Scale(0.0, max(MOST_DAMPING, 2.0 * (value or 0.0)))
@@ -212,13 +217,13 @@ def _scale(word: str, value: Any, origin: Machine, lumped: TwoMasses, k: int) ->
     return None
 
 
-def parameters_of(controller: Controller) -> list[Field[Any]]:
+def page_parameters(controller: Controller) -> list[Field[Any]]:
     """The parameters that the page can change: quantities, and texts with a choice.
 
     None of tuned gains and profiles, which come from files.
 
     >>> from softstart.controller import make_controller
-    >>> [one.name for one in parameters_of(make_controller("ramp"))]
+    >>> [one.name for one in page_parameters(make_controller("ramp"))]
     ['initial', 'time', 'full_torque', 'period']
     """
     given = () if isinstance(controller, Tuned) else fields(controller)
@@ -233,8 +238,8 @@ def strategy_entries(controller: Controller, origin: Machine, label: str) -> Map
     >>> found["strategy.rounding"].scale
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
-    own = parameters_of(controller)
-    default, names = controller.defaults(origin.design_drive) if own else {}, tunable(controller)
+    own = page_parameters(controller)
+    default, names = controller.defaults(origin.design_drive) if own else {}, tunable_parameters(controller)
     scales = {}
     for one in ranges_of(controller, names) if own and names else ():
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
@@ -253,10 +258,10 @@ def strategy_entries(controller: Controller, origin: Machine, label: str) -> Map
     }  # fmt: skip
 
 
-def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
+def with_typed_changes(machine: Machine, settings: Mapping[str, str]) -> Machine:
     """The machine with changes as typed, by the paths of their parameters.
 
-    >>> changed(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
+    >>> with_typed_changes(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
     0.03490...
     """
     if isinstance(machine, Chain):
@@ -271,7 +276,7 @@ def without(machine: Machine, path: str) -> Machine:
     >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
     None
     """
-    knob = machine.knob(path)
+    knob = machine.parameter_value(path)
     assert knob is not None
     return machine.with_values({knob.name: None})
 
@@ -284,7 +289,7 @@ def machine_from(text: str, where: str = "") -> Machine:
 Loaded = Machine | UnknownStiffness  # what a page may be given
 
 
-def single(machine: Machine) -> Machine:
+def startable(machine: Machine) -> Machine:
     """The machine if the page can start it; InputError if nothing moves it."""
     if machine.motor is None:
         raise InputError("[motor] is missing: the page starts the chain by its motor; add it to the file.")
@@ -315,7 +320,7 @@ def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> A
     gap, inertia = origin.gap_and_inertia
     widest = 4.0 * gap if gap > 0.0 else 0.1
     try:
-        origin.moved(widest, inertia)
+        origin.with_gap_and_inertia(widest, inertia)
     except InputError:
         return None
     return Axes(
@@ -344,10 +349,10 @@ def placeless(machine: Machine, axes: Axes, origin: Machine) -> tuple[Any, ...]:
 
     >>> chain = Chain.load("crane-4-mass")
     >>> axes = axes_about(chain)
-    >>> placeless(chain.moved(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
+    >>> placeless(chain.with_gap_and_inertia(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
-    there = machine.moved(axes.gaps[-1], axes.inertias[0], origin).by_path()
+    there = machine.with_gap_and_inertia(axes.gaps[-1], axes.inertias[0], origin).parameters_by_path()
     values = [value for parameter, value in there.values() if parameter.name not in WORDS]
     return tuple(rounded(one, SAME) if isinstance(one, float) else one for one in values)
 
@@ -366,7 +371,11 @@ def k_dyn_row(
     are the figures of `softstart.simulate`, to the bit.
     """
     try:
-        opened = machine.moved(max(gaps), inertia, origin) if machine.gap_and_inertia[0] == 0.0 else machine
+        opened = (
+            machine.with_gap_and_inertia(max(gaps), inertia, origin)
+            if machine.gap_and_inertia[0] == 0.0
+            else machine
+        )
         machines = varied(opened, {"gap": list(gaps), "load_inertia": inertia})
         starts, set_ups = prepared(machines, None, MAP_EVENTS), controller.set_ups(nominal or machines)
         k: Vector = starts.figures(set_ups, (nominal or machines).mean_torque)["k_dyn"][0]
@@ -380,4 +389,4 @@ def k_dyn_row(
 def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
     """The mean torques to which K_dyn refers along the inertias of a map, N m."""
     gap = machine.gap_and_inertia[0]
-    return np.array([machine.moved(gap, inertia).mean_torque for inertia in inertias])
+    return np.array([machine.with_gap_and_inertia(gap, inertia).mean_torque for inertia in inertias])

@@ -13,14 +13,14 @@ from nicegui import app, context, ui
 from softstart.chain.machines import Machine
 from softstart.controller.base import Controller
 from softstart.errors import MORE_MISTAKES, InputError
-from softstart.page.jobs import Job, Jobs, State
-from softstart.page.sentences import changed_since, clipped, plain, sentence_of
+from softstart.page.jobs import Job, Jobs, JobState
+from softstart.page.sentences import changed_since, clipped, page_sentence, sentence_of
 from softstart.page.session import Session
 
 if TYPE_CHECKING:
     from nicegui.events import UiEventArguments, UploadEventArguments
 
-    from softstart.page.tasks import Answer
+    from softstart.page.tasks import TaskResult
 
 POLL = 0.2  # s between two checks of a job
 MOST_SENTENCES = 12  # about one input; whoever has mended these sees the next ones
@@ -49,7 +49,7 @@ def box(classes: str) -> Any:
     return ui.element("div").classes(classes)
 
 
-def field(label: str, value: str, name: str, example: str = "") -> Any:
+def text_field(label: str, value: str, name: str, example: str = "") -> Any:
     """A text field below its label."""
     with box("panel-field"):
         ui.label(label)
@@ -138,7 +138,7 @@ def hint(text: str) -> Any:
 def save(text: str, name: str) -> None:
     """Let the browser save a text as a file."""
     suffix = name[name.rindex(".") :]
-    ui.download.content(text, name, f"{MEDIA.get(suffix, 'text/plain')}; charset=utf-8")
+    ui.download.content(text, name, f"{MEDIA.get(suffix, 'text/page_sentence')}; charset=utf-8")
 
 
 def few(sentences: Sequence[str]) -> list[str]:
@@ -151,7 +151,7 @@ def few(sentences: Sequence[str]) -> list[str]:
     if left > 0 and (rest := MORE_MISTAKES.fullmatch(sentences[-1])):  # an InputError counts some itself
         left += int(rest[1]) - 1
     return [
-        *map(plain, sentences[:MOST_SENTENCES]),
+        *map(page_sentence, sentences[:MOST_SENTENCES]),
         *([f"There are {left:,} more of them."] if left > 0 else []),
     ]
 
@@ -233,13 +233,13 @@ def state_of(job: Job) -> str:
     """The state of a job in a line."""
     if job.stopping:
         return "Stopping ..."
-    if job.state is State.WAITING:
-        return f"{State.WAITING.value} {job.ahead} before it." if job.ahead else State.WAITING.value
-    if job.state is State.RUNNING:
+    if job.state is JobState.WAITING:
+        return f"{JobState.WAITING.value} {job.ahead} before it." if job.ahead else JobState.WAITING.value
+    if job.state is JobState.RUNNING:
         return f"Computing: {job.message or 'starting a process'}, {duration(job.seconds)}"
-    if job.state is State.CANCELLED:
-        return f"Cancelled after {duration(job.seconds)}." if job.seconds else State.CANCELLED.value
-    return f"Done in {duration(job.seconds)}." if job.state is State.DONE else job.state.value
+    if job.state is JobState.CANCELLED:
+        return f"Cancelled after {duration(job.seconds)}." if job.seconds else JobState.CANCELLED.value
+    return f"Done in {duration(job.seconds)}." if job.state is JobState.DONE else job.state.value
 
 
 class JobView:
@@ -289,7 +289,7 @@ class JobView:
     @property
     def failed(self) -> bool:
         """Whether the last job failed."""
-        return self.job is not None and self.job.state is State.FAILED
+        return self.job is not None and self.job.state is JobState.FAILED
 
     @property
     def busy(self) -> bool:
@@ -333,7 +333,7 @@ class JobView:
         # the job goes on in a thread of its own: each is read once, the count first, since it is raised last
         changes, state = job.changes, job.state
         second = -1 if state.over else int(job.seconds)
-        if changes == self._seen and second == self._second and state is not State.WAITING:
+        if changes == self._seen and second == self._second and state is not JobState.WAITING:
             return
         news = changes != self._seen
         self._seen, self._second = changes, second
@@ -342,7 +342,7 @@ class JobView:
             return
         self._show(job, state)
         try:
-            if state is State.DONE and not self._given:
+            if state is JobState.DONE and not self._given:
                 self._given = True
                 self._on_done(job.result)
                 if self.mine:
@@ -350,16 +350,16 @@ class JobView:
         finally:
             self._on_state()
 
-    def _show(self, job: Job, state: State) -> None:
+    def _show(self, job: Job, state: JobState) -> None:
         self._box.set_visibility(True)
-        each = {one: f"job-{one.name.lower()}" for one in State}
+        each = {one: f"job-{one.name.lower()}" for one in JobState}
         self._box.classes(
             add=each[state], remove=" ".join(text for one, text in each.items() if one is not state)
         )
         self._cancel.set_visibility(not state.over)
         self._cancel.set_enabled(not job.stopping)
         self._bar.set_visibility(not state.over)
-        share = job.share if state is State.RUNNING else None
+        share = job.share if state is JobState.RUNNING else None
         self._bar.props(
             add="indeterminate" if share is None else "", remove="" if share is None else "indeterminate"
         )
@@ -368,7 +368,7 @@ class JobView:
 
 
 class TaskPanel:
-    """A form, a job, and its `softstart.page.tasks.Answer`; built in the current slot.
+    """A form, a job, and its `softstart.page.tasks.TaskResult`; built in the current slot.
 
     A subclass builds its fields in `form` and says in `question` what is computed: a title, a function of
     `softstart.page.tasks`, and its arguments; InputError for a wrong field.
@@ -381,7 +381,7 @@ class TaskPanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self.session = session
-        self._found: Answer | None = None
+        self._found: TaskResult | None = None
         with box("panel-form"):
             self.form()
             if self.verb:
@@ -420,7 +420,7 @@ class TaskPanel:
         if self.view.failed or self.view.job is None:
             self._result.set_visibility(False)  # it answers another question
 
-    def _done(self, found: Answer) -> None:
+    def _done(self, found: TaskResult) -> None:
         self._found = found
         self._shown.set_content(found.html)
         self._hint.set_visibility(False)

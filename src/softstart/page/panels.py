@@ -12,7 +12,7 @@ from softstart.controller.finding import controller_class, controller_names
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
-from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, field, upload
+from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, text_field, upload
 from softstart.page.sentences import clipped
 from softstart.quantities import values_in
 from softstart.tuning.question import gaps_of, inertias_of
@@ -36,7 +36,7 @@ class OptimumPanel(TaskPanel):
     def form(self) -> None:
         """Start time and what holds at its end."""
         example = "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
-        self.time = field("Start time", "1.2x", "optimum-time", example).classes("panel-narrow")
+        self.time = text_field("Start time", "1.2x", "optimum-time", example).classes("panel-narrow")
         self.time.on("keydown.enter", self.begin)
         self.end = choice("At its end", TERMINALS, "reached", "optimum-terminal")
 
@@ -44,7 +44,7 @@ class OptimumPanel(TaskPanel):
         """The gentlest start."""
         text = str(self.time.value).strip()
         StartTime.of(text, "Start time")
-        return "optimal start", tasks.gentlest, self.session.seen, text, self.end.value
+        return "optimal start", tasks.optimum_task, self.session.seen, text, self.end.value
 
 
 class LimitPanel(TaskPanel):
@@ -93,13 +93,13 @@ class TuningPanel(TaskPanel):
 
     def form(self) -> None:
         """The controller, the grid, and how long to search."""
-        names = tunable()
+        names = tunable_controllers()
         first = "shaped" if "shaped" in names else names[0]
         self.controller = choice("Strategy", names, first, "tuning-controller")
         example = "0.5 (in the page's unit), 30 deg, or 2x the drive's"
-        self.gaps = field("Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", example)
+        self.gaps = text_field("Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", example)
         example = "0.1 (kg m2), 2x of the drive's own, or 5J1 of the motor's"
-        self.inertias = field("Load inertias", "0.4x, 1x, 2x", "tuning-inertias", example)
+        self.inertias = text_field("Load inertias", "0.4x, 1x, 2x", "tuning-inertias", example)
         self.searches = choice("Search", SEARCHES, "3", "tuning-searches")
         self.certified = ui.checkbox("optimum of each cell", value=False).classes("panel-check")
         self.certified.props('dense data-testid="tuning-certified"')
@@ -112,16 +112,16 @@ class TuningPanel(TaskPanel):
         return f"tuning of {name}", tasks.tuning, self.session.possible, name, *grid, *more
 
 
-def tunable() -> list[str]:
+def tunable_controllers() -> list[str]:
     """Names of the installed controllers that say where tuning may look.
 
-    >>> "shaped" in tunable(), "direct" in tunable()
+    >>> "shaped" in tunable_controllers(), "direct" in tunable_controllers()
     (True, False)
     """
     found = []
     for name in controller_names():
         try:
-            metadata = [field.metadata for field in fields(controller_class(name))]
+            metadata = [text_field.metadata for text_field in fields(controller_class(name))]
         except InputError:  # somebody's broken plug-in
             continue
         if any(one.get("multiples") or one.get("between") for one in metadata):
@@ -145,9 +145,9 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
         (gaps, "Gaps", gaps_of, "rad"),
         (inertias, "Load inertias", inertias_of, "kg*m^2"),
     ):
-        with wrong.noted():
+        with wrong.collect():
             found.append(list(read(drive, [units.typed(one, si) for one in values_in(text, name)], name)))
-    wrong.settle()
+    wrong.raise_if_any()
     if len(found[0]) * len(found[1]) > MOST_CELLS:
         raise InputError(
             f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
@@ -173,7 +173,7 @@ class LogPanel(TaskPanel):
         """What the columns are, and the file."""
         kinds = {"demand": "a demand", "measured": "measured"}
         self.torque_is = choice("The torque is", kinds, "demand", "log-torque-is")
-        self.columns = field("Column names, optional", "", "log-columns", "torque=M, speed=n[rpm]")
+        self.columns = text_field("Column names, optional", "", "log-columns", "torque=M, speed=n[rpm]")
         remedy = "cut the log to the start"
         self.go = upload("Load a log ...", "log", ".csv,text/csv", LARGEST, remedy, self.take, self.refuse)
 

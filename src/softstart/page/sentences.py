@@ -34,9 +34,9 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
     "This did not work, and that is a mistake in softstart, not in your input (KeyError: 'x')."
     """
     if isinstance(error, InputError):
-        return " ".join(map(plain, error.sentences))
+        return " ".join(map(page_sentence, error.sentences))
     if isinstance(error, SimulationError):
-        return plain(" ".join(str(error).split()))
+        return page_sentence(" ".join(str(error).split()))
     if isinstance(error, MemoryError):
         return "There is not enough memory for this."
     text = " ".join(str(error).split())
@@ -47,10 +47,10 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
     return otherwise.format(what)
 
 
-def plain(sentence: str) -> str:
+def page_sentence(sentence: str) -> str:
     """A sentence without the words of the command line, which a page does not have.
 
-    >>> plain("minimise = life: it is below 0; leave out --max-torque (softstart plan).")
+    >>> page_sentence("minimise = life: it is below 0; leave out --max-torque (softstart plan).")
     'it is below 0; leave out max torque.'
     """
     text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)
@@ -112,7 +112,7 @@ class Change(NamedTuple):
 
 def changes(old: Machine, new: Machine) -> list[Change]:
     """The parameters in which two machines differ; those that follow another one only where they do not."""
-    first, second = old.by_path(), new.by_path()
+    first, second = old.parameters_by_path(), new.parameters_by_path()
     found = []
     for path in dict.fromkeys([*first, *second]):
         parameter, value = first.get(path) or (second[path][0], None)

@@ -206,7 +206,9 @@ def application(drive: Loaded) -> App:
     return app
 
 
-def run(drive: Loaded, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
+def run_server(
+    drive: Loaded, address: Address, listener: socket.socket, ready: Callable[[str], None]
+) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
     import uvicorn
 

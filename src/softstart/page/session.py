@@ -1,6 +1,6 @@
 """The state of one user: a drive, the strategies that start it, and what came out. No NiceGUI here.
 
-What a user changes is one immutable `Bench`; undo and redo go from one to another. Everything happens in the
+What a user changes is one immutable `Inputs`; undo and redo go from one to another. Everything happens in the
 thread of the page's event loop; a session belongs to one client.
 """
 
@@ -19,7 +19,7 @@ from softstart.controller.finding import changed_controller, make_controller, re
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import STRATEGY, Loaded, changed, single, without
+from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import Units, nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, SOFT_END, as_far_as_known, changed_case
@@ -83,7 +83,7 @@ class Reference:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Inputs:
     """All that a user can change.
 
     Parameters
@@ -127,9 +127,9 @@ class Session:
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = _main(names)
         self._first = {name: make_controller(name) for name in names}
-        self.bench = Bench(drive, drive, self._first, selected, frozenset((selected,)), soft=soft)
-        self._past: list[Bench] = []
-        self._future: list[Bench] = []
+        self.bench = Inputs(drive, drive, self._first, selected, frozenset((selected,)), soft=soft)
+        self._past: list[Inputs] = []
+        self._future: list[Inputs] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
         self.name = secrets.token_urlsafe(9)
         self.version = 0  # how often anything was changed
@@ -170,7 +170,7 @@ class Session:
     def seen(self) -> Machine:
         """The machine in these units, for what is computed and written elsewhere, as reports and tabs."""
         same = units_of(self.machine) == self.units
-        return self.machine if same else changed(self.machine, {"units": self.units.text})
+        return self.machine if same else with_typed_changes(self.machine, {"units": self.units.text})
 
     @property
     def soft(self) -> Drive | None:
@@ -263,7 +263,7 @@ class Session:
         if path.startswith(STRATEGY):
             self.set_parameter(path.removeprefix(STRATEGY), value, gesture)
         elif value is None:
-            self._put(drive=single(without(self.machine, path)))
+            self._put(drive=startable(without(self.machine, path)))
         else:
             self.set_all({path: value}, gesture)
 
@@ -271,14 +271,14 @@ class Session:
         """Change several parameters of the machine in one step, or none of them."""
         settings = {path: value if isinstance(value, str) else repr(float(value))
                     for path, value in changes.items()}  # fmt: skip
-        self._put(gesture, drive=single(changed(self.machine, settings)))
+        self._put(gesture, drive=startable(with_typed_changes(self.machine, settings)))
         if texts := {path: text for path, text in changes.items() if isinstance(text, str)}:
-            values = self.machine.by_path()
+            values = self.machine.parameters_by_path()
             self.typed |= {(path, values[path][1]): text for path, text in texts.items() if path in values}
 
     def move(self, gap: float, load_inertia: float) -> None:
         """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""
-        self._put(drive=self.machine.moved(gap, load_inertia, self.origin))
+        self._put(drive=self.machine.with_gap_and_inertia(gap, load_inertia, self.origin))
 
     def set_parameter(self, name: str, value: str | float | None, gesture: str = "") -> None:
         """Change one parameter of the selected strategy; None gives it back its default.
@@ -286,7 +286,7 @@ class Session:
         >>> session = Session()
         >>> session.select("ramp")
         >>> session.set_parameter("time", "200 ms")
-        >>> session.controllers["ramp"].time, session.changed
+        >>> session.controllers["ramp"].time, session.with_typed_changes
         (0.2, ('ramp',))
         """
         controller = changed_controller(self.controllers[self.selected], {name: value})
@@ -300,7 +300,7 @@ class Session:
         drawn = self.bench.drawn.intersection(own)
         self._put(drive=drive, origin=drive, controllers=own, selected=selected, drawn=drawn, soft=soft)
 
-    def restore(self, bench: Bench) -> None:
+    def restore(self, bench: Inputs) -> None:
         """Begin with a bench of before, or of somebody else; nothing can be undone then."""
         self._past, self._future = [], []
         self._go_to(bench)
@@ -479,7 +479,7 @@ class Session:
         self._future = []
         self._go_to(replace(self.bench, **changes), (gesture, now))
 
-    def _go_to(self, bench: Bench, gesture: tuple[str, float] = ("", -math.inf)) -> None:
+    def _go_to(self, bench: Inputs, gesture: tuple[str, float] = ("", -math.inf)) -> None:
         self.bench, self._gesture = bench, gesture
         self.version += 1
         for listener in tuple(self._listeners):
@@ -495,7 +495,7 @@ class Session:
 def _loaded(given: Loaded) -> tuple[Machine, dict[str, float]]:
     """The machine of now, and what differs at the soft end of an unknown stiffness."""
     known, _, soft = as_far_as_known(given)
-    return single(known), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
+    return startable(known), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
 
 
 def _main(labels: Iterable[str]) -> str:

@@ -22,9 +22,9 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.errors import InputError, SimulationError
-from softstart.page.downloads import file_name, text_of
-from softstart.page.machines import Loaded, changed
-from softstart.page.sentences import plain
+from softstart.page.downloads import file_name, written_text
+from softstart.page.machines import Loaded, with_typed_changes
+from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
 from softstart.quantities import show
 from softstart.start.comparison import Comparison, compare
@@ -48,7 +48,7 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 
 
 @dataclass(frozen=True)
-class Answer:
+class TaskResult:
     """What a task found: HTML to show, texts of files by their names, and what may be taken over from it.
 
     `controllers` may join the strategies, by label; `drive` may become that of the page.
@@ -64,11 +64,14 @@ def shown(*sheets: Sheet, first: bool = False) -> str:
     """The sheets of a terminal as HTML, figures `first` or last, without words of the command line."""
     from softstart.views.sheet import as_html
 
-    each = (replace(one, found=[*map(plain, one.found)], notes=[*map(plain, one.notes)]) for one in sheets)
+    each = (
+        replace(one, found=[*map(page_sentence, one.found)], notes=[*map(page_sentence, one.notes)])
+        for one in sheets
+    )
     return "\n".join(as_html(one, len(one.figures), first=first, width=COLUMN) for one in each)
 
 
-def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> Answer:
+def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> TaskResult:
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     from softstart.optimal.optimize import optimize
     from softstart.views.optima import optimum_sheet
@@ -80,13 +83,13 @@ def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: P
     for name in ready_controller_names():
         with suppress(InputError, SimulationError):
             others.append(simulate(drive, name))
-    label = label_of(best)
-    return Answer(
+    label = optimum_label(best)
+    return TaskResult(
         shown(optimum_sheet(best, others)), profile_files(best, label), {label: player_of(best, label)}
     )
 
 
-def label_of(best: Optimum) -> str:
+def optimum_label(best: Optimum) -> str:
     """What the optimum is called among the strategies."""
     from softstart.optimal.problem import best_start
 
@@ -107,15 +110,15 @@ def profile_files(best: Optimum, label: str) -> dict[str, str]:
     drive = best.problem.drive.name
     about = {"drive": drive, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     return {
-        file_name(label, suffix=".csv"): text_of(profile.to_csv, ".csv"),
-        file_name(label, suffix=".toml"): text_of(lambda path: profile.to_toml(path, about), ".toml"),
-        file_name(label, suffix=".c"): text_of(lambda path: profile.to_c(path, about=about), ".c"),
+        file_name(label, suffix=".csv"): written_text(profile.to_csv, ".csv"),
+        file_name(label, suffix=".toml"): written_text(lambda path: profile.to_toml(path, about), ".toml"),
+        file_name(label, suffix=".c"): written_text(lambda path: profile.to_c(path, about=about), ".c"),
     }
 
 
 def curve(
     drive: Machine, controllers: Sequence[Controller], terminal: Terminal, *, progress: Progress
-) -> Answer:
+) -> TaskResult:
     """The least K_dyn over the start time, and each strategy beside that of its own start time."""
     from softstart.optimal import front
     from softstart.views.optima import front_sheet
@@ -133,7 +136,7 @@ def curve(
 
         found = front.pareto(drive, times, terminal=terminal, controllers=controllers, progress=doing)
     name = file_name(drive.name, "limit", suffix=".csv")
-    return Answer(shown(front_sheet(found), first=True), {name: text_of(found.to_csv, ".csv")})
+    return TaskResult(shown(front_sheet(found), first=True), {name: written_text(found.to_csv, ".csv")})
 
 
 @contextmanager
@@ -156,7 +159,7 @@ def tuning(
     restarts: int = 3,
     *,
     progress: Progress,
-) -> Answer:
+) -> TaskResult:
     """Gains of a controller for each gap and load inertia, and one set for all."""
     from softstart.tuning.solving import tune
     from softstart.views.tuning import tuning_sheet
@@ -170,14 +173,14 @@ def tuning(
     files = {}
     for name, write in sheet.files.items():
         stem, suffix = Path(name).stem, Path(name).suffix
-        text = write if isinstance(write, str) else text_of(write, suffix)
+        text = write if isinstance(write, str) else written_text(write, suffix)
         files[file_name(controller, stem, suffix=suffix)] = text
     controllers: dict[str, Controller] = {}
     if found.robust is not None:
         controllers[f"{controller} (robust)"] = found.robust.controller
     if found.schedule is not None:
         controllers[f"{controller} (schedule)"] = found.scheduled
-    return Answer(shown(sheet), files, controllers)
+    return TaskResult(shown(sheet), files, controllers)
 
 
 class _Throttled:
@@ -229,7 +232,7 @@ def identified(
     columns: Mapping[str, str],
     *,
     progress: Progress,
-) -> Answer:
+) -> TaskResult:
     """The drive from the log in these bytes, with its intervals, from this guess.
 
     Of a chain with one dominant gap it is the two masses that stand for it.
@@ -248,10 +251,10 @@ def identified(
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
     found = identify(log, guess, progress=lambda doing: progress(None, doing))
     files = {"identified-drive.toml": found.drive.to_toml()}
-    return Answer(shown(identification_sheet(found)), files, drive=found.drive)
+    return TaskResult(shown(identification_sheet(found)), files, drive=found.drive)
 
 
-def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> Answer:
+def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     from softstart.optimal.optimize import optimize
     from softstart.views import optima
@@ -271,26 +274,26 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     if (
         not machine.limits or machine.limits.used_torque is not None
     ):  # those of single shafts bound no optimum
-        return Answer(shown(*sheets))
+        return TaskResult(shown(*sheets))
     progress(0.8, "the quickest start that keeps the limits")
     try:
         with no_solution_as_sentence():
             best = optimize(machine, limits=True)
     except (InputError, SimulationError) as error:
-        return Answer(shown(*sheets, Sheet("The quickest start within limits", notes=[str(error)])))
+        return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=[str(error)])))
     label = f"quickest {best.end_time:.4g} s"
     quickest = optima.optimum_sheet(best, [row.run for row in compared.rows])
-    return Answer(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
+    return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
 
 
 def _positions(machine: Machine, controllers: Mapping[str, Controller]) -> Sheet:
     """K_dyn from each position at which a start may begin."""
-    from softstart.views.numbers import Table, number
+    from softstart.views.numbers import TextTable, number
     from softstart.views.sheet import Sheet
 
     title = "K_dyn by start position"
     try:
-        unknown = changed(machine, {"start.position": "unknown"})
+        unknown = with_typed_changes(machine, {"start.position": "unknown"})
     except InputError as error:
         return Sheet(title, notes=["It starts from one position alone.", *error.sentences])
     rows = []
@@ -304,12 +307,12 @@ def _positions(machine: Machine, controllers: Mapping[str, Controller]) -> Sheet
         return Sheet(title, notes=["There is one position alone: no gap, or one that is wound up."])
     names = (one.replace("-", " ") for one in UNKNOWN_POSITIONS)
     rows.sort(key=lambda row: float(row[-1]))
-    return Sheet(title, tables=[Table.of_rows("", ("strategy",), (*names, "worst"), rows)])
+    return Sheet(title, tables=[TextTable.of_rows("", ("strategy",), (*names, "worst"), rows)])
 
 
 def _margins(compared: Comparison) -> Sheet:
     """The worst figure of each strategy beside each limit, and the margin that decides; the largest first."""
-    from softstart.views.numbers import Table, short
+    from softstart.views.numbers import TextTable, short
     from softstart.views.sheet import Sheet
 
     title, limits = "Margins to the limits", compared.recommendation.limits
@@ -323,11 +326,11 @@ def _margins(compared: Comparison) -> Sheet:
         for row, margins, least in each
     ]  # fmt: skip
     heads = [f"{one.name}\n{one.unit}, at most {one.limit:.4g}" for one in each[0][1]]
-    table = Table.of_rows("", ("strategy", "least margin", "worst with"), heads, rows)
+    table = TextTable.of_rows("", ("strategy", "least margin", "worst with"), heads, rows)
     return Sheet(title, tables=[table])  # what is recommended stands on the page already
 
 
-def report(
+def report_task(
     drive: Loaded,
     controllers: Sequence[str | Controller],
     command: str,

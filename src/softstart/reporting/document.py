@@ -14,7 +14,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
 
-from softstart.drive import doubts
+from softstart.drive import plausibility
 from softstart.errors import listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
@@ -30,7 +30,7 @@ from softstart.views.drawing import drawing
 from softstart.views.numbers import (
     RPM,
     Column,
-    Table,
+    TextTable,
     at_output,
     digits,
     fixed,
@@ -133,7 +133,7 @@ def templates() -> Environment:
     return found
 
 
-def answer(report: Report) -> str:
+def text_answer(report: Report) -> str:
     """The answer without HTML."""
     return Markup(
         templates().get_template("answer.html.j2").render(report=report, choice=report.choice)
@@ -187,7 +187,8 @@ def document(report: Report) -> str:
         "geared": drive.gear is not None, "gear_in_words": gear_in_words(drive),
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
         "ends": starts.both_ends(report.comparison),
-        "doubts": doubts.doubts(drive), "units": units_of(drive), "most_torque": report.most_torque,
+        "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units_of(drive),
+        "most_torque": report.most_torque,
         "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
@@ -211,13 +212,13 @@ def inverters() -> dict[str, Any]:
     return tomllib.loads((HERE / "inverters.toml").read_text("utf-8"))
 
 
-def strategies(report: Report) -> Table:
+def strategies(report: Report) -> TextTable:
     """The figures of all strategies, the gentlest first."""
     rows, gear = report.ordered, report.drive.gear
     output = starts.Figure("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
     shown = (
-        *starts.GENTLE, *([output] if gear else []), *starts.of_the_unknown(rows),
-        starts.TIMES[0], *starts.QUICK, starts.TIMES[1], starts.AT_THE_GAP[-1],
+        *starts.PEAK_COLUMNS, *([output] if gear else []), *starts.of_the_unknown(rows),
+        starts.TIMES[0], *starts.TIME_COLUMNS, starts.TIMES[1], starts.AT_THE_GAP[-1],
     )  # fmt: skip
     # a digit more than a terminal holds
     exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
@@ -251,7 +252,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
     project, units, gear = report.project, units_of(report.drive), report.drive.gear
     rows, absent = list[list[str]](), list[str]()
-    for path, (parameter, value) in report.drive.by_path().items():
+    for path, (parameter, value) in report.drive.parameters_by_path().items():
         source, si, meaning = project.source_of(path), parameter.unit, of_part(report.drive, path, parameter)
         if value is None or value == "" or parameter.name in HIDDEN:
             continue

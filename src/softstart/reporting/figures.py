@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from softstart.optimal.problem import best_start
 from softstart.quantities import Units
 from softstart.reporting.choice import Choice
-from softstart.reporting.limit import Limit
+from softstart.reporting.limit import OptimumCurve
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import (
@@ -159,7 +159,7 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
     return figure
 
 
-def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> Any:
+def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: OptimumCurve) -> Any:
     """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
     placed, optima = [row for row in rows if not math.isnan(row.run.start_time)], limit.found
     own = [row.run.start_time for row in placed] + [p.start_time_bound for p in optima]

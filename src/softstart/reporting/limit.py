@@ -14,10 +14,10 @@ import numpy as np
 from softstart.errors import InputError
 from softstart.notebook import OneLine
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
-from softstart.optimal.front import FrontPoint, Stretch
+from softstart.optimal.front import FrontPoint, TimeRange
 from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import Problem, Terminal
-from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve
+from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve_pulse_coast_hold
 from softstart.parallel import DiedError, Worker
 from softstart.parallel import Progress as WorkerProgress
 from softstart.profile import TorqueProfile
@@ -32,7 +32,7 @@ POLL = 0.1  # s
 
 
 @dataclass(frozen=True, repr=False)
-class Limit(OneLine):
+class OptimumCurve(OneLine):
     """What no start can go below, and what the best ones found reach.
 
     `times` (s) and `bounds`: a K_dyn that no torque over time within the motor's limits can go below, however
@@ -71,7 +71,7 @@ class Limit(OneLine):
         """
         every, single, loose = list[float](), list[tuple[float, float]](), list[float]()
         for p in self.found:
-            bound, left = bound_at(drive, p.start_time_bound), p.gap_percent
+            bound, left = bound_at(drive, p.start_time_bound), p.optimality_gap_percent
             over = math.inf if not bound or p.k_dyn is None else 100.0 * (p.k_dyn / bound - 1.0)
             if over <= TIGHT:
                 every.append(max(over, 0.001))
@@ -121,7 +121,7 @@ def limit(
     budget: float,
     progress: Callable[[float, str], object],
     meanwhile: Callable[[], object] = lambda: None,
-) -> Limit:
+) -> OptimumCurve:
     """The limit for start times around those of the strategies, `own`, of which those `chosen` matter most.
 
     Where there is a formula the optima are computed at once. At the others, those chosen and shares of the
@@ -132,12 +132,14 @@ def limit(
         problem = Problem(drive, 1.0, TERMINAL)
     except InputError as error:
         meanwhile()
-        return Limit(refusal=error.sentences[0])
+        return OptimumCurve(refusal=error.sentences[0])
     shortest = momentum_shortest_time(problem)
     least = reference if math.isfinite(reference) else min(own, default=math.nan)
     if not (math.isfinite(least) and math.isfinite(shortest)):
         meanwhile()
-        return Limit(refusal="No strategy reaches the target speed, so there is no start time to judge by.")
+        return OptimumCurve(
+            refusal="No strategy reaches the target speed, so there is no start time to judge by."
+        )
     asked = list(dict.fromkeys([*chosen, *(share * least for share in SHARES)]))
     early, late = max(1.0005 * shortest, EARLIER * min(*asked, *own)), max(*asked, *own, 1.05 * shortest)
     times = np.linspace(early, late, INSTANTS).tolist()
@@ -146,7 +148,7 @@ def limit(
     left = [t for t in asked if t not in {p.start_time_bound for p in points}]
     points += _in_own_process(drive, left if budget > 0.0 else [], budget, progress, meanwhile)
     settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
-    return Limit(
+    return OptimumCurve(
         tuple(t for t, _ in curve),
         tuple(bound for _, bound in curve),
         shortest,
@@ -161,7 +163,7 @@ def _by_formula(drive: Any, asked: Iterable[float]) -> Iterator[FrontPoint]:
     """Optima of the closed form, where it holds."""
     for start_time in asked:
         with suppress(NotApplicable):
-            solve(Problem(drive, start_time, TERMINAL))
+            solve_pulse_coast_hold(Problem(drive, start_time, TERMINAL))
             yield FrontPoint.of_optimum(optimize(drive, start_time, terminal=TERMINAL), start_time)
 
 
@@ -179,7 +181,7 @@ def _in_own_process(
     points: list[FrontPoint] = []
     worker = Worker(quiet=True)
     try:
-        worker.submit(optima, drive, asked, reports=True)
+        worker.submit(stream_optima, drive, asked, reports=True)
         began = time.monotonic()
         meanwhile()
         message = None
@@ -198,13 +200,13 @@ def _in_own_process(
     return points
 
 
-def optima(drive: Any, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
+def stream_optima(drive: Any, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
     """Look for the optima of start times and send each at once: the first one first, then by distance to it.
 
     Each begins with the optimum of the nearest start time that has one.
     """
     near: dict[float, TorqueProfile] = {}
-    question = Stretch(drive, {}, TERMINAL)
+    question = TimeRange(drive, {}, TERMINAL)
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
         nearest = min(near, key=lambda one: abs(one - start_time), default=math.nan)
         point = question.point(start_time, near.get(nearest))

@@ -10,8 +10,8 @@ from typing import Self
 
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, Mistakes
-from softstart.input.documents import Table, read_document
-from softstart.input.files import text_of
+from softstart.input.documents import DocumentTable, read_document
+from softstart.input.files import file_text
 from softstart.input.parameters import REQUIRED, Parameter
 from softstart.quantities import nearest
 
@@ -25,7 +25,7 @@ def _line(key: str, meaning: str, example: str, default: object = "", choices: s
 
 
 TABLES = (
-    Table("project", required=False, parameters=(
+    DocumentTable("project", required=False, parameters=(
         _line("customer", "who the report is for", "Harbour Cranes Ltd"),
         _line("project", "name of the project", "Gantry crane 3"),
         _line("number", "number of the document", "SC-0147"),
@@ -37,13 +37,13 @@ TABLES = (
         _line("paper", "paper size", "A4", "A4", "A4, letter"),
         _line("decimal", "decimal sign", "point", "point", "point, comma"),
     )),
-    Table("revision", many=True, parameters=(
+    DocumentTable("revision", many=True, parameters=(
         _line("number", "number of the revision", "A"),
         _line("date", "its date, in quotes", "2026-11-20"),
         _line("author", "who made it", "A. Engineer"),
         _line("change", "what has changed", "first issue"),
     )),
-    Table("source", many=True, parameters=(
+    DocumentTable("source", many=True, parameters=(
         _line("parameter", "the parameter of the drive file", "shaft.gap", REQUIRED),
         _line("origin", "what its value is from", "identified",
               choices="data sheet, drawing, measured, identified, guessed"),
@@ -79,7 +79,7 @@ class Project:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """From a TOML file; the logo is looked for beside it."""
-        return cls.read(text_of(path, "a project"), str(path), Path(path).parent)
+        return cls.read(file_text(path, "a project"), str(path), Path(path).parent)
 
     @classmethod
     def read(cls, text: str, where: str = "", folder: Path = Path()) -> Self:
@@ -93,9 +93,9 @@ class Project:
                 hint = f"did you mean {near}?" if near else "write it as --set does, as shaft.gap."
                 place = f'[source] {number}, parameter = "{path}"'
                 wrong.sentences.append(f"{place}: a drive has no such parameter; {hint}")
-        with wrong.noted():
+        with wrong.collect():
             made = replace(made, logo=_picture(made.logo, folder))
-        wrong.settle(f"{where}: " if where else "")
+        wrong.raise_if_any(f"{where}: " if where else "")
         return made
 
     def source_of(self, path: str) -> str:

@@ -51,7 +51,7 @@ class Resolution:
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if not (is_number and 0.0 < value < math.inf) and not (one.name == "torque" and value is None):
                 wrong.sentences.append(f"{one.name} = {value!r}: a step is a number above 0.")
-        wrong.settle()
+        wrong.raise_if_any()
 
     @classmethod
     def read(cls, given: str | Mapping[str, object], option: str = "resolution") -> Self:
@@ -72,7 +72,7 @@ class Resolution:
             pairs = list(given.items())
         made, mistakes, seen = cls(), Mistakes(), set[str]()
         for key, value in pairs:
-            with mistakes.noted(f'{option} "{key}={value}": '):
+            with mistakes.collect(f'{option} "{key}={value}": '):
                 if key not in _KEYS:
                     near = nearest(str(key), _KEYS)
                     hint = f"did you mean {near}?" if near else f"there are {', '.join(_KEYS)}."
@@ -81,7 +81,7 @@ class Resolution:
                     raise InputError(f"{key} is given twice; keep one of the two.")
                 seen.add(key)
                 made = replace(made, **_read(key, value))  # type: ignore[arg-type]
-        mistakes.settle()
+        mistakes.raise_if_any()
         return made
 
     def step(self, name: str, unit: str, rated_torque: float) -> float | None:

@@ -23,10 +23,10 @@ from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.input.files import write_whole
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
-from softstart.reporting.limit import Limit, bound_at, limit
+from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
-from softstart.reporting.sheet import Sheet, make_sheet
+from softstart.reporting.sheet import ParameterSheet, make_sheet
 from softstart.start.comparison import (
     REFERENCE,
     Comparison,
@@ -107,9 +107,9 @@ class Report:
 
     drive: Any
     failed: tuple[tuple[str, str], ...]
-    limit: Limit
+    limit: OptimumCurve
     choice: Choice
-    sheets: tuple[Sheet, ...]
+    sheets: tuple[ParameterSheet, ...]
     resolution: Resolution
     provenance: dict[str, Any]
     project: Project = field(default_factory=Project)
@@ -182,12 +182,12 @@ class Report:
         """The recommendation, what the steps of the inverter do to it, and what no start can go below.
 
         >>> from softstart import report
-        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-49:]
+        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).text_answer[-49:]
         ' below 0.977; the gentlest start known has 0.978.'
         """
-        from softstart.reporting.document import answer  # which renders a Report
+        from softstart.reporting.document import text_answer  # which renders a Report
 
-        return answer(self)
+        return text_answer(self)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON, under the names used everywhere."""
@@ -298,21 +298,21 @@ def report(
     machine: Any = one_machine(known)
     if budget is None:
         budget = SHAFTS_BUDGET if len(machine.shaft_names) > 1 else BUDGET
-    mapped = "load.inertia" in machine.by_path()  # what a map varies is a parameter of the file
+    mapped = "load.inertia" in machine.parameters_by_path()  # what a map varies is a parameter of the file
     mistakes, steps = Mistakes(), Resolution()
     if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < math.inf:
         mistakes.sentences.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")
-    with mistakes.noted():
+    with mistakes.collect():
         if resolution is not None:
             steps = resolution if isinstance(resolution, Resolution) else Resolution.read(resolution)
     for source in about.sources:
-        if source["parameter"] not in machine.by_path():
+        if source["parameter"] not in machine.parameters_by_path():
             mistakes.sentences.append(
                 f'project: [[source]] "{source["parameter"]}" is a parameter of a drive, and '
                 f'"{machine.name}" has none of this name; leave these tables out, and name assumed values '
                 "in its file."
             )
-    mistakes.settle()
+    mistakes.raise_if_any()
     made = make_controllers(controllers, parameters or {})
     labels = [label_of(one) for one in made]
     if wrong := [one for one in dict.fromkeys(labels) if labels.count(one) > 1]:
@@ -349,7 +349,7 @@ def report(
     rows = tuple(row for _, row in started)
     there = None if soft is None else Comparison(soft, tuple(at_soft_end))
     choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case, soft_end=there), maps)
-    sheets: list[Sheet] = []
+    sheets: list[ParameterSheet] = []
 
     def round_off() -> None:
         import softstart.reporting.document  # noqa: F401  takes half a second, for which nobody waits here

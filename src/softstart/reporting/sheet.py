@@ -98,21 +98,21 @@ class Setting:
             other = f"{digits(self.rounded)} rad/s"
         elif self.unit == "N*m":
             rated, basis = rated_torque(drive)
-            percent = multiple(100.0 * self.rounded / rated, self.step and 100.0 * self.step / rated)
+            percent = step_multiple(100.0 * self.rounded / rated, self.step and 100.0 * self.step / rated)
             other = f"{percent} % of the {basis}"
         value, exact = factor * self.rounded, short(float(f"{factor * self.exact:.5g}"))
         if self.name in KEPT:
             digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
             most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
             return f"≤ {short(float(f'{most:.3g}'))}", name, "", exact
-        text = short(float(f"{value:.4g}")) if self.step is None else multiple(value, factor * self.step)
+        text = short(float(f"{value:.4g}")) if self.step is None else step_multiple(value, factor * self.step)
         return text, name, other, exact
 
 
-def multiple(value: float, step: float | None) -> str:
+def step_multiple(value: float, step: float | None) -> str:
     """A multiple of a step: all its decimals if the step is a short decimal, else those that tell it apart.
 
-    >>> multiple(62.0, 0.5), multiple(34.5683, 0.0238732), multiple(123.4567, 0.0238732)
+    >>> step_multiple(62.0, 0.5), step_multiple(34.5683, 0.0238732), step_multiple(123.4567, 0.0238732)
     ('62.0', '34.57', '123.46')
     """
     if not step:
@@ -145,7 +145,7 @@ class Rise(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sheet(OneLine):
+class ParameterSheet(OneLine):
     """What to set for one strategy, and what comes of it.
 
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
@@ -197,8 +197,8 @@ class Sheet(OneLine):
         for torque in (float(np.max(demand)), min(float(np.min(demand)), 0.0)):
             if torque:
                 limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
-                percent = multiple(100.0 * limit / rated, 100.0 * step / rated)
-                found.append(f"{multiple(limit, step)} N m ({percent} % of the {basis})")
+                percent = step_multiple(100.0 * limit / rated, 100.0 * step / rated)
+                found.append(f"{step_multiple(limit, step)} N m ({percent} % of the {basis})")
         return found
 
     def summary(self) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def make_sheet(
     row: Row | None = None,
     drawn: Records | None = None,
     soft: Drive | None = None,
-) -> Sheet:
+) -> ParameterSheet:
     """The sheet of a strategy on a drive or chain; `exact` is its start there.
 
     With the `row` by which the strategy was chosen, the values of the sheet keep what that row keeps, on the
@@ -239,7 +239,9 @@ def make_sheet(
     rated = rated_torque(drive)[0]
     name, settings = label_of(exact.controller or controller), _settings(ready, drive, resolution)
     torque_step = resolution.step("", "N*m", rated) or 0.0
-    sheet = Sheet(name, kind_of(controller), settings, own, exact, torque_step, computes_with(ready, own))
+    sheet = ParameterSheet(
+        name, kind_of(controller), settings, own, exact, torque_step, computes_with(ready, own)
+    )
     two_masses = len(machine.shaft_names) == 1
     try:
         values = _within_the_rule(machine, ready, own, sheet.varied, row, drawn, soft)
@@ -346,7 +348,7 @@ def _rises(drive: Drive, ready: Any, own: Drive, rated: float, step: float) -> d
     return found
 
 
-def _half_steps_off(sheet: Sheet, machine: Any, ready: Controller, corners: bool) -> Sheet:
+def _half_steps_off(sheet: ParameterSheet, machine: Any, ready: Controller, corners: bool) -> ParameterSheet:
     """The sheet with the worst of the starts whose values are half a step off, and of that of the sheet."""
     varied, count, rounded = sheet.varied, len(sheet.varied), sheet.rounded
     assert rounded is not None

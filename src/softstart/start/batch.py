@@ -21,8 +21,8 @@ from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.parallel import Pool, checked_workers
 from softstart.start.engine import run_one, watched
-from softstart.start.recorded import Recorder
-from softstart.start.rows import MAX_EVENTS, Rows, blank, joined, rows_of
+from softstart.start.recorded import StartRecorder
+from softstart.start.rows import MAX_EVENTS, Rows, blank, joined, kernel_input
 from softstart.start.status import status_of
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ _LATEST = ("start_time", "excess", "excess_time")  # of several positions the la
 
 
 @dataclass(frozen=True, eq=False)
-class Notes:
+class StartResults:
     """What the kernel notes of many starts: a row for each, of each shaft a column."""
 
     starts: NDArray[np.void]
@@ -75,7 +75,7 @@ class Notes:
         return np.array([status_of(int(one), True, False).finished for one in kinds], dtype=bool)[which]
 
 
-def worst_of(notes: Sequence[Notes]) -> Notes:
+def worst_position(notes: Sequence[StartResults]) -> StartResults:
     """Of the same starts from several positions the worst, figure by figure, as a `Run` has them.
 
     They are the notes of the position with the largest |T|, or of one whose start could not be finished, with
@@ -86,7 +86,7 @@ def worst_of(notes: Sequence[Notes]) -> Notes:
     rows = np.arange(starts.shape[1])
     broken = np.stack([~one.finished for one in notes]) | (starts["braked"] == 1.0)
     which = np.argmax(np.where(broken, np.inf, np.abs(shafts["peak"]).max(axis=2)), axis=0)
-    worst = Notes(starts[which, rows], shafts[which, rows])
+    worst = StartResults(starts[which, rows], shafts[which, rows])
     worst.starts["position"] = which + 1.0
     for name in _LATEST:
         worst.starts[name] = np.max(starts[name], axis=0)
@@ -103,29 +103,29 @@ def worst_of(notes: Sequence[Notes]) -> Notes:
 Ready = tuple[CompiledController, Matrix] | list[SetUp]
 
 
-def notes_of(rows: Rows, ready: Ready, until: float | None, workers: int = 1) -> Notes:
+def run_set_ups(rows: Rows, ready: Ready, until: float | None, workers: int = 1) -> StartResults:
     """The kernel's notes of starts; set-ups, by `numbers_of`, serve all, one each, or as many in a row."""
     count = rows.machines.shape[0]
     if isinstance(ready, tuple):
         made, numbers = ready
         if len(numbers) > 1:
             numbers = np.repeat(numbers, count // len(numbers), axis=0)
-        return notes_under(rows, made, numbers, until, workers)
+        return start_results(rows, made, numbers, until, workers)
     notes = np.zeros((count, at.N_NOTES))
     shafts = np.zeros((count, rows.count - 1), at.SHAFT_NOTES)
     for i in range(count):
         controller, own = ready[i * len(ready) // count]
-        recorder = Recorder(rows.taken(slice(i, i + 1)), int(controller.sensors), room=0)
+        recorder = StartRecorder(rows.taken(slice(i, i + 1)), int(controller.sensors), room=0)
         run_one(controller, own, recorder, until)
         notes[i] = recorder.work[: at.N_NOTES]
         for name in at.SHAFT_NOTES.names:
             shafts[name][i] = recorder.state[name][: rows.count - 1]
-    return Notes(notes.view(at.NOTES)[:, 0], shafts)
+    return StartResults(notes.view(at.NOTES)[:, 0], shafts)
 
 
-def notes_under(
+def start_results(
     rows: Rows, controller: Any, numbers: Matrix, until: float | None = None, workers: int = 1
-) -> Notes:
+) -> StartResults:
     """The kernel's notes of starts under a compiled controller: numbers a row each, or one for all."""
     count = rows.machines.shape[0]
     notes = np.zeros((count, at.N_NOTES))
@@ -150,7 +150,7 @@ def notes_under(
         with Pool(min(workers, len(parts)), threads=True) as pool:
             for _ in pool.results(run, iter(parts)):
                 pass
-    return Notes(notes.view(at.NOTES)[:, 0], of_shafts.view(at.SHAFT_NOTES)[..., 0])
+    return StartResults(notes.view(at.NOTES)[:, 0], of_shafts.view(at.SHAFT_NOTES)[..., 0])
 
 
 def _parts(count: int) -> Iterator[slice]:
@@ -187,7 +187,7 @@ class Batch:
         until: float | None = None,
         time_limit: float | None = None,
         workers: int = 1,
-    ) -> Notes:
+    ) -> StartResults:
         """The kernel's notes of machines `which[i]` in place i, of several positions the worst; or of all.
 
         The set-ups of the controller serve all places, one each, or as many in a row.
@@ -197,10 +197,10 @@ class Batch:
         alone = isinstance(which, slice) and len(self.places) == 1
         each = [slice(None)] if alone else self.places[: int(sizes.max(initial=1)), which]
         taken = (self.rows.taken(rows).limited(time_limit) for rows in each)
-        notes = [notes_of(rows, ready, until, workers) for rows in taken]
+        notes = [run_set_ups(rows, ready, until, workers) for rows in taken]
         if len(notes) == 1:
             return notes[0]
-        worst = worst_of(notes)
+        worst = worst_position(notes)
         worst.starts["position"][sizes == 1] = 0.0
         return worst
 
@@ -219,7 +219,7 @@ class Batch:
         return self.read(notes, base, which, until)
 
     def read(
-        self, notes: Notes, base: Any, which: Which | slice = slice(None), until: float | None = None
+        self, notes: StartResults, base: Any, which: Which | slice = slice(None), until: float | None = None
     ) -> Figures:
         """The figures in the kernel's notes."""
         found, names = figures(notes, base, until), self.shaft_names
@@ -237,13 +237,13 @@ class Batch:
         every: Any = (self.limits.shaft_torque, self.limits.start_time)
         torque, time_limit = (None if most is None else most[which] for most in every)
         limits = replace(self.limits, shaft_torque=torque, start_time=time_limit)
-        return {**found, **margins(found, limits), "status": status}
+        return {**found, **limit_margins(found, limits), "status": status}
 
 
-def named(shaft_names: tuple[str, ...]) -> Figures:
+def figure_columns(shaft_names: tuple[str, ...]) -> Figures:
     """The names of all figures, with units and meanings, of starts of machines with these shafts."""
     count, zero = len(shaft_names), np.zeros(1, dtype=np.int64)
-    notes = Notes(np.zeros(1, at.NOTES), np.zeros((1, count), at.SHAFT_NOTES))
+    notes = StartResults(np.zeros(1, at.NOTES), np.zeros((1, count), at.SHAFT_NOTES))
     notes.starts["release_time"] = math.nan
     limits: Any = Limits(shaft_torque=np.ones(1), used_torque=1.0)  # type: ignore[arg-type]
     rows, permissible = blank((), count + 1), np.ones((1, count))
@@ -263,7 +263,7 @@ def prepared(
     """
     parts = machines.parts if isinstance(machines, Records) else tuple(machines)
     each = [list(part.positions.values()) for part in parts]
-    rows = [[rows_of(one, time_limit, max_events) for one in several] for several in each]
+    rows = [[kernel_input(one, time_limit, max_events) for one in several] for several in each]
     counts = [len(several[0].machines) for several in rows]
     positions = np.repeat([len(several) for several in rows], counts)
     begins = np.cumsum([0, *(len(several) * count for several, count in zip(rows, counts, strict=True))])
@@ -292,7 +292,7 @@ def _limits_of(parts: Sequence[Any]) -> Limits:
     return Limits(every("shaft_torque"), every("start_time"), used_torque=limits[0].used_torque)
 
 
-def figures(notes: Notes, base: Any, until: float | None = None) -> Figures:
+def figures(notes: StartResults, base: Any, until: float | None = None) -> Figures:
     """The figures of many starts as name -> (values, unit, meaning).
 
     `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
@@ -311,7 +311,7 @@ def figures(notes: Notes, base: Any, until: float | None = None) -> Figures:
     rows, worst = np.arange(good.size), notes.peaks.argmax(axis=1)
     peak = notes.peaks[rows, worst]
     first = np.abs(notes.shafts["first_peak"]).max(axis=1)
-    # of several positions `worst_of` has left out those without a stage 2
+    # of several positions `worst_position` has left out those without a stage 2
     first = np.where(np.isnan(notes["stage_2_end"]) & (notes["position"] == 0.0), np.nan, first)
     k_dyn = formulas.dynamic_coefficient(np.where(good, peak, 0.0), base)
     k_first = formulas.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
@@ -341,7 +341,7 @@ def has_margin(limits: Limits) -> bool:
     return any(one is not None for one in (limits.shaft_torque, limits.start_time, limits.used_torque))
 
 
-def margins(found: Figures, limits: Limits) -> Figures:
+def limit_margins(found: Figures, limits: Limits) -> Figures:
     """Of starts with these figures what is left of the limits of torque and time; nothing without limits."""
     if not has_margin(limits):
         return {}
@@ -375,13 +375,13 @@ def simulate_many(
         shape, means = machines.shape, machines.mean_torque
         dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
         coordinates: dict[str, Any] = {name: (dims, one.copy()) for name, one in machines.fields.items()}
-        named = {machines.parts[0].shaft_names}
+        figure_columns = {machines.parts[0].shaft_names}
     else:
         shape, dims = (len(machines),), ("start",)
         means = np.array([one.mean_torque for one in machines], dtype=np.float64)
         coordinates = {"drive": (dims, [one.name for one in machines])}
         coordinates |= {name: (dims, values) for name, values in _different(machines)}
-        named = {one.shaft_names for one in machines}
+        figure_columns = {one.shaft_names for one in machines}
     found = batch.figures(
         controller.set_ups(fitted_to or machines), means if base is None else base.mean_torque,
         until=until, workers=workers or checked_workers(None),
@@ -396,7 +396,7 @@ def simulate_many(
             columns = [found[f"{one}_{k + 1}"] for k in range(count)]
             values = np.stack([column[0].reshape(shape) for column in columns], axis=-1)
             data[many] = ((*dims, "shaft"), values, columns[0][1], f"{found[one][2]}, of each shaft")
-        if len(named) == 1:
+        if len(figure_columns) == 1:
             coordinates["shaft"] = (("shaft",), list(batch.shaft_names))
     return _dataset(data, coordinates)
 

@@ -16,7 +16,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.data_sheet import BAND, DataSheet, UnknownStiffness
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.start import metrics
@@ -159,7 +159,7 @@ class Comparison:
             "fitted_to": None if self.fitted_to is None else self.fitted_to.name,
             "recommendation": self.recommendation.summary(),
             "strategies": [row.summary() for row in self.rows],
-            "doubts": doubts(self.drive),
+            "plausibility_warnings": plausibility_warnings(self.drive),
             **({} if self.soft_end is None else {"soft_end": self.soft_end.summary()}),
         }
 
@@ -269,9 +269,9 @@ def make_controllers(
         )
     made: list[Controller] = []
     for one in asked:
-        with wrong.noted():
+        with wrong.collect():
             made.append(make_controller(one, parameters.get(one) if isinstance(one, str) else None))
-    wrong.settle()
+    wrong.raise_if_any()
     return made
 
 
@@ -318,9 +318,9 @@ def changed_case(
     if soft is not None:
         changed = soft
     elif case == "gap x4":
-        changed = drive.changed(gaps=WORN_GAP)
+        changed = drive.scaled(gaps=WORN_GAP)
     else:
-        changed = drive.changed(load_inertia=LIGHT_INERTIA)
+        changed = drive.scaled(load_inertia=LIGHT_INERTIA)
     try:
         return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:

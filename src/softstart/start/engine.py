@@ -23,7 +23,7 @@ from softstart.controller.base import (
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as at
 from softstart.kernel.motor import M_TIME, NEW_STATE
-from softstart.start.recorded import Recorder
+from softstart.start.recorded import StartRecorder
 from softstart.start.status import Status, status_of
 
 SILENCE = 60.0  # s after which a controller that has not returned is named
@@ -80,7 +80,7 @@ def _watch() -> None:
                 )
 
 
-def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until: float | None) -> int:
+def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, until: float | None) -> int:
     """A start from its beginning to `until`; returns why it ended. Without a controller the motor is off.
 
     `drive` is the one for which the (fitted) controller is set up.
@@ -112,7 +112,7 @@ def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until
 
 
 def run_compiled(
-    controller: CompiledController, numbers: Vector, recorder: Recorder, until: float | None
+    controller: CompiledController, numbers: Vector, recorder: StartRecorder, until: float | None
 ) -> int:
     """The same under a compiled controller with these numbers: the loop itself runs in the kernel."""
     recorder.begin(math.inf if until is None else float(until), bool(controller.sensors & Sensor.STAGE))

@@ -297,13 +297,13 @@ def fatigue(
     return Fatigue(machine, curve, tuple(rows), given, estimate, gap)
 
 
-def turning_points(run: Run, shaft: int = 0) -> Matrix:
+def torque_turning_points(run: Run, shaft: int = 0) -> Matrix:
     """Times, s, and values, N m, of a shaft's torque at its reversals and both ends; located, not sampled.
 
     Where damping makes the torque jump at a contact, both sides count.
 
     >>> from softstart import simulate
-    >>> points = turning_points(simulate("hoist-15kw", "direct"))
+    >>> points = torque_turning_points(simulate("hoist-15kw", "direct"))
     >>> [round(float(torque), 1) for torque in points[:2, 1]]
     [120.0, 180.8]
     """
@@ -410,7 +410,7 @@ class Damage(NamedTuple):
 
 def damage_of(run: Run, curve: SNCurve, shaft: int = 0) -> Damage:
     """The damage of one start to a shaft, by Miner's rule."""
-    points = turning_points(run, shaft)
+    points = torque_turning_points(run, shaft)
     spectrum = rainflow_cycles(points[:, 1].tolist(), repeated=True)
     return Damage(run, shaft, points, spectrum, miner(spectrum, curve))
 

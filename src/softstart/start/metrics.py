@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from softstart.kernel import records as at
-from softstart.start.recorded import Recorded
+from softstart.start.recorded import Trajectory
 
 REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
 # share of the target speed by which a load that has settled may still be below it
 SETTLED_BAND = 0.001
 
 
-def settled_time(recorded: Recorded, target_speed: float, band: float = SETTLED_BAND) -> float:
+def settled_time(recorded: Trajectory, target_speed: float, band: float = SETTLED_BAND) -> float:
     """First instant, not before the start time, from which on the load keeps its speed, s.
 
     It keeps it where w2 >= (1 - band) target_speed to the end of the run; NaN if it is below at the end. The
@@ -70,7 +70,7 @@ class Energy:
         return self.ground + self.shafts + self.gears + self.impacts
 
 
-def energy_balance(recorded: Recorded) -> Energy:
+def energy_balance(recorded: Trajectory) -> Energy:
     """The energy balance of a recorded start; the residual is computed, not assumed."""
     motor, exciting, load, ground, shafts, gears, elastic = recorded.work().tolist()
     masses = recorded.rows.masses[0].view(at.MASS)[:, 0]

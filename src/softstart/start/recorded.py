@@ -21,7 +21,7 @@ FIRST_ROWS = 256
 MOST_BYTES = 1 << 30  # of the record of one start
 
 
-class Recorder:
+class StartRecorder:
     """One start in the kernel: its work and its growing records; `sees` are the sensors of the controller."""
 
     def __init__(self, rows: Rows, sees: int, room: int = FIRST_ROWS) -> None:
@@ -51,7 +51,7 @@ class Recorder:
 
     def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
         """To the end, or a full record, under a compiled controller."""
-        reason: int = start.run(
+        reason: int = start.run_start(
             step, numbers, self.sees, self.work, self.rows.tones, self.spans, self.events,
             self.measured, state, command,
         )  # fmt: skip
@@ -79,7 +79,7 @@ class Recorder:
 
     def answer(self, torque: float, ask_again: float, slope: float) -> int:
         """Take the controller's answer; returns ASK, or why it cannot be taken."""
-        reason: int = start.answer(self.work, torque, ask_again, slope)
+        reason: int = start.take_reply(self.work, torque, ask_again, slope)
         return reason
 
     def grow(self) -> None:
@@ -91,7 +91,7 @@ class Recorder:
         else:
             self.events = np.concatenate([self.events, np.zeros_like(self.events)])
 
-    def finished(self) -> Recorded:
+    def finished(self) -> Trajectory:
         """What has been recorded."""
         now = self.state
         spans, events = min(int(now.n_spans), len(self.spans)), int(now.n_events)
@@ -101,14 +101,14 @@ class Recorder:
         shafts = np.zeros(self.rows.count - 1, at.SHAFT_NOTES)
         for name in at.SHAFT_NOTES.names:
             shafts[name] = now[name][: shafts.size]
-        return Recorded(
+        return Trajectory(
             self.rows, rows, self.events[:events].view(at.EVENT)[:, 0].copy(),
             self.work[: at.N_NOTES].copy().view(at.NOTES)[0], shafts,
         )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class Trajectory:
     """A start as it was recorded: any instant of it, exactly.
 
     Attributes

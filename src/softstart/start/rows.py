@@ -98,7 +98,7 @@ def joined(rows: Sequence[Rows]) -> Rows:
     )
 
 
-def rows_of(
+def kernel_input(
     machine: Drive | Chain,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,

@@ -22,7 +22,7 @@ from softstart.kernel import records as at
 from softstart.notebook import Shown
 from softstart.start import metrics
 from softstart.start.engine import run_one
-from softstart.start.recorded import Recorded, Recorder
+from softstart.start.recorded import StartRecorder, Trajectory
 from softstart.start.rows import MAX_EVENTS
 from softstart.start.status import Status, status_of
 
@@ -163,7 +163,7 @@ class Run(Shown, sheet="starts.run_sheet"):
     controller: Controller | None
     base: Any
     status: Status
-    recorded: Recorded
+    recorded: Trajectory
     told: Drive | None = None
     positions: Mapping[str, Run] = field(default_factory=dict)
 
@@ -462,7 +462,9 @@ class Run(Shown, sheet="starts.run_sheet"):
         """The same start to the end of settling at least; this one where it fails beyond its own end."""
         if self.controller is None or not self.end_time < self.settling_end:
             return self
-        recorder = Recorder(self.recorded.rows.limited(max_events=MAX_EVENTS), int(self.controller.sensors))
+        recorder = StartRecorder(
+            self.recorded.rows.limited(max_events=MAX_EVENTS), int(self.controller.sensors)
+        )
         try:
             reason = run_one(self.controller, self.told or self.drive, recorder, self.settling_end)
         except SimulationError:

@@ -15,8 +15,8 @@ from softstart.drive.records import Records, is_machine
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
 from softstart.start.engine import check_limits, ended, run_one
-from softstart.start.recorded import Recorder
-from softstart.start.rows import MAX_EVENTS, Rows, rows_of
+from softstart.start.recorded import StartRecorder
+from softstart.start.rows import MAX_EVENTS, Rows, kernel_input
 from softstart.start.run import Run, worst_run
 
 if TYPE_CHECKING:
@@ -152,13 +152,13 @@ def simulate(
             "drive: give one Drive or Chain, records or a list of them, the path of a file, or a name."
         )
     positions = drive.positions
-    given = {name: rows_of(one, time_limit, max_events, excitation) for name, one in positions.items()}
+    given = {name: kernel_input(one, time_limit, max_events, excitation) for name, one in positions.items()}
     check_end(drive, made, until, next(iter(given.values())))
     ready, own = (None, None) if made is None else made.set_up((fitted_to or drive).design_drive)
     of = "no motor torque" if ready is None else ready.name or type(ready).__name__
     runs = {}
     for name, rows in given.items():
-        recorder = Recorder(rows, 0 if ready is None else int(ready.sensors))
+        recorder = StartRecorder(rows, 0 if ready is None else int(ready.sensors))
         reason = run_one(ready, own, recorder, until)
         status = ended(recorder.state, reason, until, max_events, f"{drive.name}, controller {of}")
         runs[name] = Run(positions[name], ready, base, status, recorder.finished(), own)

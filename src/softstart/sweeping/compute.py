@@ -14,7 +14,7 @@ from softstart.controller.base import CompiledController
 from softstart.controller.recipe import Recipe
 from softstart.start.batch import prepared
 from softstart.start.status import Status
-from softstart.sweeping.grid import PREFIX, Grid, sizes_of, values_of
+from softstart.sweeping.grid import PREFIX, Grid, axis_lengths, grid_values
 
 Block = dict[str, Any]  # figure -> one value a start
 CODES = {status.name: code for code, status in enumerate(Status)}
@@ -22,7 +22,7 @@ MOST_CORNERS = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class SweepSettings:
     """What is the same for all starts of a sweep. `until`, `fitted_to` as in `simulate`."""
 
     drive: Machine
@@ -34,10 +34,10 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A chunk: its place among the chunks, its number of starts, and what varies, see `values_of`."""
+    """A chunk: its place among the chunks, its number of starts, and what varies, see `grid_values`."""
 
     index: tuple[int, ...]
-    question: Question
+    question: SweepSettings
     starts: int
     values: dict[str, Any]
 
@@ -66,9 +66,9 @@ def _sorted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any], 
     return {name: one for name, one in values.items() if not name.startswith(PREFIX)}, own, name
 
 
-def check_corners(question: Question, grid: Grid) -> None:
+def check_corners(question: SweepSettings, grid: Grid) -> None:
     """Raise the InputError of the first corner of the grid whose drive or controller is impossible."""
-    for corner in islice(product(*(_ends(grid, dim) for dim in sizes_of(grid))), MOST_CORNERS):
+    for corner in islice(product(*(_ends(grid, dim) for dim in axis_lengths(grid))), MOST_CORNERS):
         drive, parameters, name = _sorted({name: one for end in corner for name, one in end.items()})
         if any(isinstance(value, np.ndarray) for value in drive.values()):
             varied(question.drive, drive)
@@ -86,7 +86,7 @@ def _ends(grid: Grid, dim: str) -> list[dict[str, Any]]:
     return [{dim: end} for end in dict.fromkeys(values if names else [min(values), max(values)])]
 
 
-def first_start(question: Question, grid: Grid) -> bool:
+def first_start(question: SweepSettings, grid: Grid) -> bool:
     """Make the first start of the grid: compiles what is to be compiled, and finds controllers that fail.
 
     Returns whether all controllers are compiled, so that threads serve as well as processes.
@@ -94,7 +94,7 @@ def first_start(question: Question, grid: Grid) -> bool:
     compiled = True
     first = {name: one[:1] for name, one in grid.items()}
     for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:
-        compute(Task((), question, 1, values_of(first) | ({PREFIX: name} if name else {})))
+        compute(Task((), question, 1, grid_values(first) | ({PREFIX: name} if name else {})))
         design = (question.fitted_to or question.drive).design_drive
         compiled &= isinstance(question.recipe.make(name=name).set_up(design)[0], CompiledController)
     return compiled

@@ -22,10 +22,10 @@ from softstart.drive.records import is_machine
 from softstart.errors import InputError, Mistakes
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole, nearest, show
-from softstart.start.batch import has_margin, named
+from softstart.start.batch import figure_columns, has_margin
 from softstart.start.engine import check_limits
-from softstart.sweeping.compute import Question, Task, check_corners, compute, first_start
-from softstart.sweeping.grid import Grid, Plan, read_grid, sizes_of, values_of
+from softstart.sweeping.compute import SweepSettings, Task, check_corners, compute, first_start
+from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths, grid_values, read_grid
 from softstart.sweeping.store import STATUS, Store
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def sweep(
     chunk: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[Progress], object] | None = None,
+    progress: Callable[[SweepProgress], object] | None = None,
     allow_code: bool = False,
 ) -> xarray.Dataset:
     """Simulate every start of a grid; each figure is the same to the bit as that of `simulate`.
@@ -89,7 +89,7 @@ def sweep(
     scheduler : str, optional
         Address of a dask scheduler whose workers compute instead.
     progress : callable, optional
-        Called with a `Progress` at the beginning and after each chunk.
+        Called with a `SweepProgress` at the beginning and after each chunk.
     allow_code : bool
         Whether a file of tuned gains may name a Python file, which then runs.
 
@@ -121,25 +121,25 @@ def sweep(
     drive, recipe, axes, kept, wrong = one_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
     if fitted_to is not None and not is_machine(fitted_to):
         wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
-    with wrong.noted():
+    with wrong.collect():
         check_limits(until, None, 1, drive.KIND)
-    with wrong.noted():
+    with wrong.collect():
         if isinstance(controller, str | None):
             recipe = Recipe(with_whole_path(controller or ""), dict(parameters or {}), allow_code)
         else:
             recipe = Recipe(make_controller(controller, parameters))
         axes = read_grid(grid, recipe, drive)
-    with wrong.noted():
+    with wrong.collect():
         kept = _figures(drive, figures)
-    wrong.settle()
+    wrong.raise_if_any()
     if chunk is not None:
         check_whole(chunk, "chunk")
     checked_workers(workers, scheduler)
-    question = Question(drive, recipe, kept, until, fitted_to)
+    question = SweepSettings(drive, recipe, kept, until, fitted_to)
     check_corners(question, axes)
-    shape = tuple(sizes_of(axes).values())
-    texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in sizes_of(axes)]
-    plan = Plan.of(shape, texts, chunk)
+    shape = tuple(axis_lengths(axes).values())
+    texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in axis_lengths(axes)]
+    plan = ChunkGrid.of(shape, texts, chunk)
     threads = first_start(question, axes)
     count = sharing(recipe.given, "the controller", workers, scheduler, threads)
     with Store(None if to is None else Path(to), plan, axes, question) as store:
@@ -148,12 +148,12 @@ def sweep(
 
         def tell() -> None:
             if progress is not None:
-                progress(Progress(done, plan.starts, before, time.monotonic() - begin))
+                progress(SweepProgress(done, plan.starts, before, time.monotonic() - begin))
 
         def task(index: tuple[int, ...]) -> Task:
-            place = dict(zip(sizes_of(axes), plan.place(index), strict=True))
+            place = dict(zip(axis_lengths(axes), plan.place(index), strict=True))
             part = {name: one.isel({one.dims[0]: place[str(one.dims[0])]}) for name, one in axes.items()}
-            return Task(index, question, plan.size(index), values_of(part))
+            return Task(index, question, plan.size(index), grid_values(part))
 
         tell()
         left = plan.indices() if done < plan.starts else iter(())
@@ -175,7 +175,7 @@ def _described(task: Task) -> str:
 
 def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:
     """The figures asked for, or the usual ones; InputError for those that starts of this machine lack."""
-    limited, known = has_margin(drive.limits), list(named(drive.shaft_names))
+    limited, known = has_margin(drive.limits), list(figure_columns(drive.shaft_names))
     if figures is None:
         usual: tuple[str, ...] = FIGURES
         if (count := len(drive.shaft_names)) > 1:
@@ -197,10 +197,10 @@ def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Progress:
+class SweepProgress:
     """Starts finished of all, and of these by an earlier run; seconds of this run.
 
-    >>> print(Progress(1500, 4000, 500, 2.0))
+    >>> print(SweepProgress(1500, 4000, 500, 2.0))
     1,500 of 4,000 starts (37 %), 500 starts/s, 0:00:05 left
     """
 

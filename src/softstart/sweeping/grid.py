@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.chain.machines import Machine
-from softstart.controller.finding import quantity
+from softstart.controller.finding import parameter_value
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
@@ -32,14 +32,14 @@ Grid = dict[str, "Variable"]
 PREFIX = "controller"
 
 
-def sizes_of(grid: Grid) -> dict[str, int]:
+def axis_lengths(grid: Grid) -> dict[str, int]:
     """The axes in order, with their lengths."""
     return {str(one.dims[0]): one.size for one in grid.values()}
 
 
-def values_of(grid: Grid) -> dict[str, Any]:
+def grid_values(grid: Grid) -> dict[str, Any]:
     """Each coordinate with its value for every start of a grid; the one text of a coordinate of texts."""
-    sizes = sizes_of(grid)
+    sizes = axis_lengths(grid)
     spread = {name: one.set_dims(sizes) for name, one in grid.items()}  # type: ignore[no-untyped-call]
     return {
         name: one.values.ravel() if one.dtype.kind == "f" else str(one.values.flat[0])
@@ -68,11 +68,11 @@ class Subject:
         """The parameters that all controllers have, alike in unit and kind."""
         wrong, tables = Mistakes(), list[dict[str, Field[Any]]]()
         for name in self.controllers or ("",):
-            with wrong.noted():
+            with wrong.collect():
                 found = self.recipe.class_of(name) if name or self.recipe.given else Tuned
                 # the fields of tuned gains are what stands in their file
                 tables.append({} if issubclass(found, Tuned) else {f.name: f for f in fields(found)})
-        wrong.settle()
+        wrong.raise_if_any()
         return {
             name: one
             for name, one in tables[0].items()
@@ -83,12 +83,12 @@ class Subject:
         """The coordinate that a key of the grid names; InputError for an unknown one."""
         if key == PREFIX or key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
             return key.replace(".", "_", 1)
-        if (found := self.machine.knob(key)) is not None:
+        if (found := self.machine.parameter_value(key)) is not None:
             return found.name
         own = {name: f"{PREFIX}.{name}" for name in self.parameters}
-        words = {word: word for word in (*self.machine.knobs(), PREFIX, *own.values())} | own
+        words = {word: word for word in (*self.machine.parameter_keys(), PREFIX, *own.values())} | own
         like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
-        meant = [own[key]] if key in own else [p.name for p in like if self.machine.knob(p.name)]
+        meant = [own[key]] if key in own else [p.name for p in like if self.machine.parameter_value(p.name)]
         if not meant and (close := nearest(key, words)):
             meant = [words[close]]
         other = f"take a parameter of the {self.machine.KIND} or {PREFIX}.NAME."
@@ -132,11 +132,11 @@ class Subject:
             raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
         meaning = self.parameters[name].metadata.get("meaning") or name
         listed = list(values)
-        read = _texts(key, listed) if kind == "text" else np.float64(quantity(key, listed, unit))
+        read = _texts(key, listed) if kind == "text" else np.float64(parameter_value(key, listed, unit))
         return read, unit, meaning
 
     def _of_machine(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
-        found = self.machine.knob(name)
+        found = self.machine.parameter_value(name)
         assert found is not None
         parameter: Parameter = found.parameter
         if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
@@ -200,13 +200,13 @@ def read_grid(given: object, recipe: Recipe, machine: Machine) -> Grid:
     for key, values in given.items():
         paired, read = isinstance(values, Mapping), list[DataArray]()
         for name, own in values.items() if paired else [(key, values)]:
-            with wrong.noted():
+            with wrong.collect():
                 read.append(one := subject.coordinate(str(name), own))
                 if one.name in grid:
                     wrong.sentences.append(f"{name}: {one.name} is an axis already; name each once.")
                 grid[str(one.name)] = Variable(str(key) if paired else one.dims, one.values, one.attrs)
         wrong.sentences += _wrong_samples(str(key), read, len(values)) if paired else _repeated(read)
-    wrong.settle()
+    wrong.raise_if_any()
     return grid
 
 
@@ -239,10 +239,10 @@ PARTS = 64  # into which a small grid is cut, so that all processes have work
 
 
 @dataclass(frozen=True)
-class Plan:
+class ChunkGrid:
     """A grid of `shape` in chunks of shape `chunk`, the last index fastest; those at the edge are smaller.
 
-    >>> plan = Plan((3, 5), (1, 2))
+    >>> plan = ChunkGrid((3, 5), (1, 2))
     >>> plan.counts, plan.place((1, 2))
     ((3, 3), (slice(1, 2, None), slice(4, 5, None)))
     """
@@ -251,12 +251,12 @@ class Plan:
     chunk: tuple[int, ...]
 
     @classmethod
-    def of(cls, shape: Sequence[int], single: Sequence[bool], most: int | None = None) -> Plan:
+    def of(cls, shape: Sequence[int], single: Sequence[bool], most: int | None = None) -> ChunkGrid:
         """Chunks of at most `most` starts, of one value along the axes that are `single`.
 
         Without `most` a chunk has a 64th of the grid, within 1,024 and 16,384 starts.
 
-        >>> Plan.of((1000, 1000), (False, False)).chunk, Plan.of((2, 100), (True, False)).chunk
+        >>> ChunkGrid.of((1000, 1000), (False, False)).chunk, ChunkGrid.of((2, 100), (True, False)).chunk
         ((15, 1000), (1, 100))
         """
         room = min(max(math.prod(shape) // PARTS, LEAST), MOST) if most is None else most

@@ -1,7 +1,7 @@
 """Where a sweep keeps its figures, and how it knows what is left to compute.
 
 The figures are arrays in memory or, with a folder, a Zarr group that any tool opens, whose chunks are those
-of the plan. `Records` list the inputs and each finished chunk with checksums of its values. A chunk that is
+of the plan. `PartStore` list the inputs and each finished chunk with checksums of its values. A chunk that is
 not in the list, or of which one value is not as it was written, is left to compute. zarr writes a file beside
 its place and renames it, so that a process may be killed at any instant.
 """
@@ -24,12 +24,12 @@ import numpy as np
 from softstart import __version__
 from softstart.controller.recipe import about_name
 from softstart.errors import InputError
-from softstart.start.batch import named
+from softstart.start.batch import figure_columns
 from softstart.start.status import Status
 from softstart.stopping import at_stop
-from softstart.store import Records, Target, fresh_folder, warn_of_damage
-from softstart.sweeping.compute import Block, Question
-from softstart.sweeping.grid import Grid, Plan, sizes_of
+from softstart.store import PartStore, Target, fresh_folder, warn_of_damage
+from softstart.sweeping.compute import Block, SweepSettings
+from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths
 
 if TYPE_CHECKING:
     import xarray
@@ -40,11 +40,11 @@ LIST = f"{STATUS}/softstart.sqlite"  # beside the chunks of `status`, where Zarr
 MOST_IN_MEMORY = 10_000_000  # starts
 
 
-def empty_results(plan: Plan, grid: Grid, question: Question) -> xarray.Dataset:
+def empty_results(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> xarray.Dataset:
     """The results before anything is computed; their figures take no memory, however large the grid."""
     import xarray
 
-    sizes, known, machine = sizes_of(grid), named(question.drive.shaft_names), question.drive
+    sizes, known, machine = axis_lengths(grid), figure_columns(question.drive.shaft_names), question.drive
     data: dict[str, Any] = {
         name: (list(sizes), np.broadcast_to(np.nan, plan.shape), {"units": unit, "long_name": meaning})
         for name, (_, unit, meaning) in ((name, known[name]) for name in question.figures)
@@ -68,12 +68,12 @@ def empty_results(plan: Plan, grid: Grid, question: Question) -> xarray.Dataset:
     return xarray.Dataset(data, {**numbers, **grid}, attributes)
 
 
-def inputs_of(plan: Plan, grid: Grid, question: Question) -> dict[str, Any]:
+def inputs_of(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
     found: dict[str, Any] = {
         "drive": question.drive.to_toml(),
         "controller": question.recipe.about(),
-        "order of the axes": list(sizes_of(grid)),
+        "order of the axes": list(axis_lengths(grid)),
         "figures": list(question.figures),
         "until": question.until,
         "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
@@ -95,11 +95,11 @@ class Store:
     `finished` holds the chunks that are finished and as they were written.
     """
 
-    def __init__(self, path: Path | None, plan: Plan, grid: Grid, question: Question) -> None:
+    def __init__(self, path: Path | None, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
         self.path, self.plan, self.finished = path, plan, set[tuple[int, ...]]()
         self._empty = empty_results(plan, grid, question)
         self._target = None if path is None else Target("to", path, "sweep", LIST)
-        self._list = Records(self._target, inputs_of(plan, grid, question), ["part"])
+        self._list = PartStore(self._target, inputs_of(plan, grid, question), ["part"])
         self._arrays: dict[str, Any] = {}
         self._exit = ExitStack()
 
@@ -241,7 +241,7 @@ def _same(file: Path, other: Path) -> bool:
     return file.is_file() and filecmp.cmp(file, other, shallow=False)
 
 
-def _describe(folder: Path, empty: xarray.Dataset, plan: Plan) -> None:
+def _describe(folder: Path, empty: xarray.Dataset, plan: ChunkGrid) -> None:
     """A Zarr group with the coordinates, and with the arrays of the figures without their values."""
     import zarr
     from zarr import codecs, errors

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.start.status import Status
-from softstart.sweeping.grid import Plan
+from softstart.sweeping.grid import ChunkGrid
 
 if TYPE_CHECKING:
     import xarray
@@ -79,7 +79,9 @@ def summarise(results: xarray.Dataset) -> Summary:
 def pieces(results: xarray.Dataset, name: str) -> Iterator[tuple[tuple[slice, ...], Any]]:
     """A figure in pieces that fit into memory: places on the grid, and the values there."""
     shape = results[name].shape
-    plan = Plan(shape, results[name].encoding.get("chunks") or Plan.of(shape, [False] * len(shape)).chunk)
+    plan = ChunkGrid(
+        shape, results[name].encoding.get("chunks") or ChunkGrid.of(shape, [False] * len(shape)).chunk
+    )
     plan = replace(plan, chunk=shape) if plan.starts <= READ_AT_ONCE else plan
     return ((place, results[name][place].values) for place in map(plan.place, plan.indices()))
 

@@ -14,7 +14,7 @@ import numpy as np
 from softstart.arrays import Indices, Vector
 from softstart.errors import InputError
 from softstart.parallel import Pool
-from softstart.store import Records
+from softstart.store import PartStore
 from softstart.tuning.search import CONVERGED, Costs, Populations, evolve, populations
 from softstart.tuning.trials import TIE, Judged, Trials, in_time, shared_costs
 
@@ -28,7 +28,7 @@ KEPT_EACH = 1.0  # s, after which an unfinished search is written down again
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class GainSearch:
     """Gains by name, one value a job; what they reach; their costs, and those of each restart."""
 
     values: dict[str, Vector]
@@ -40,10 +40,10 @@ class Found:
 Progress = Callable[[str], object]
 
 
-class Log:
+class StartCounter:
     """Counts starts, and tells whoever wants to know how far it is.
 
-    >>> Log(print).tell("schedule", 1, 40)
+    >>> StartCounter(print).tell("schedule", 1, 40)
     schedule, generation 1 of 40, 0 starts
     """
 
@@ -63,7 +63,9 @@ class Log:
             self.progress(f"{title}{parts}, {self.starts:,} starts{rate}")
 
 
-def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Found | None = None) -> Found:
+def best_gains(
+    trials: Trials, pool: Pool, kept: PartStore, log: StartCounter, schedule: GainSearch | None = None
+) -> GainSearch:
     """The best gains of every job; those of some cells of a `schedule` begin the first search of one set."""
     question, costs = trials.question, partial(shared_costs, trials, pool)
     if not np.any(np.isfinite(trials.default.metric)):
@@ -81,7 +83,9 @@ def best_gains(trials: Trials, pool: Pool, kept: Records, log: Log, schedule: Fo
     return _rounded(trials, _settled(trials, places, restart_costs))
 
 
-def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: Found | None) -> Populations:
+def _searched(
+    trials: Trials, costs: Costs, kept: PartStore, log: StartCounter, schedule: GainSearch | None
+) -> Populations:
     """All searches to their end: the restarts of each job in a row. What is kept is gone on from."""
     question = trials.question
     title = "robust set" if trials.robust else "schedule"
@@ -118,7 +122,7 @@ def _searched(trials: Trials, costs: Costs, kept: Records, log: Log, schedule: F
     return now
 
 
-def _seeds(trials: Trials, schedule: Found | None, searches: Any, most: int) -> Vector:
+def _seeds(trials: Trials, schedule: GainSearch | None, searches: Any, most: int) -> Vector:
     """The first places of each search: the defaults; of the first one of a set the gains of cells too.
 
     The other searches begin alone, so that agreeing means something.
@@ -157,7 +161,7 @@ def _smooth(trials: Trials, costs: Costs, places: Vector, found: Vector) -> Vect
     return places
 
 
-def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
+def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> GainSearch:
     """The gains with what they reach; the defaults where these are better, and allowed."""
     jobs = np.arange(len(places))
     values, defaults = trials.values(jobs, places), trials.defaults
@@ -168,10 +172,10 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> Found:
     back = (before < ours) & np.all(allowed, axis=0)
     values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
     judged = Judged(*(np.where(back[:, None], *both) for both in zip(default, tuned, strict=True)))
-    return Found(values, judged, np.where(back, before, ours), restart_costs)
+    return GainSearch(values, judged, np.where(back, before, ours), restart_costs)
 
 
-def _rounded(trials: Trials, found: Found) -> Found:
+def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
     """Gains with few digits, of one set all its parameters, the derived ones too: as their file has them.
 
     What each job reaches is what its rounded values reach: in time as before, never worse than the defaults,
@@ -202,4 +206,4 @@ def _rounded(trials: Trials, found: Found) -> Found:
         left = left[~good]
         if not left.size:
             break
-    return Found(values, judged, costs, found.restart_costs)
+    return GainSearch(values, judged, costs, found.restart_costs)

@@ -27,7 +27,7 @@ from softstart.controller.tuned import (
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.notebook import OneLine, Shown
-from softstart.tuning.question import Question, given_to
+from softstart.tuning.question import TuningProblem, given_to
 
 if TYPE_CHECKING:
     import xarray
@@ -109,7 +109,7 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
     docs/tuning.md; the search: see `tune`.
     """
 
-    question: Question
+    question: TuningProblem
     schedule: xarray.Dataset | None
     robust: RobustSet | None
     price: xarray.Dataset | None
@@ -138,13 +138,13 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
         return scheduled(self._schedule_file(), "schedule", self.question.recipe.make())
 
     @property
-    def doubts(self) -> list[str]:
+    def plausibility_warnings(self) -> list[str]:
         """Sentences on what can hardly be meant: a drive that is not within the gaps and inertias tuned over.
 
         >>> from softstart import tune
         >>> options = {"free": ["torque"], "certified": False, "generations": 1, "restarts": 1}
         >>> tuned = tune("crane-4amtkf", "reduced-first-stage", [0.01], ["1x"], **options)
-        >>> tuned.doubts[0][:75]
+        >>> tuned.plausibility_warnings[0][:75]
         'the gap of the drive, 0.5 rad, lies outside those tuned over, 0.01 rad: wha'
         """
         q, (gap, inertia) = self.question, self.drive.gap_and_inertia
@@ -163,7 +163,7 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
         tables = {name: getattr(self, name) for name in ("schedule", "price", "between")}
         return {
             **self._asked(),
-            "doubts": self.doubts,
+            "plausibility_warnings": self.plausibility_warnings,
             "controller": self.controller,
             "given": given_to(self.question.recipe.make()),
             "free": {one.name: one.text() for one in self.question.ranges},
@@ -238,7 +238,7 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
         )
 
 
-def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Gain]:
+def gains_on_grid(question: TuningProblem, values: Mapping[str, Any]) -> dict[str, Gain]:
     """The gains of all cells as tables; a gain searched in the logarithm is interpolated in it too."""
     found = {}
     for one in question.ranges:

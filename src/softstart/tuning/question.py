@@ -18,7 +18,7 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
-from softstart.input.parameters import Knob
+from softstart.input.parameters import ParameterValue
 from softstart.optimal.problem import StartTime
 from softstart.quantities import multiplied, nearest, to_si
 from softstart.tuning.ranges import Range
@@ -28,7 +28,7 @@ MARGIN = "margin"  # a metric that is made large
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class TuningProblem:
     """Everything that the answer depends on. Cells go through the gaps, load inertias fastest."""
 
     drive: Machine
@@ -75,12 +75,14 @@ class Question:
 
     def drive_of(self, cell: int) -> Machine:
         """The drive or chain of a cell, as it is."""
-        return self.drive.moved(*self.cells[cell])
+        return self.drive.with_gap_and_inertia(*self.cells[cell])
 
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""
-        rows = [self.drive.moved(gap, self.load_inertias[0]).design_drive for gap in self.gaps]
-        columns = [self.drive.moved(self.gaps[0], one).design_drive for one in self.load_inertias]
+        rows = [self.drive.with_gap_and_inertia(gap, self.load_inertias[0]).design_drive for gap in self.gaps]
+        columns = [
+            self.drive.with_gap_and_inertia(self.gaps[0], one).design_drive for one in self.load_inertias
+        ]
         return tuple(float(one.gap) for one in rows), tuple(float(one.load_inertia) for one in columns)
 
     def neighbours(self, cell: int) -> tuple[int, ...]:
@@ -145,7 +147,7 @@ def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[floa
                 f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
             )
         given = [f"{factor}x" for factor in GAP_MULTIPLES]
-    return _axis(drive, "gap", given, name, {"x": own}, lambda gap: drive.moved(gap, inertia))
+    return _axis(drive, "gap", given, name, {"x": own}, lambda gap: drive.with_gap_and_inertia(gap, inertia))
 
 
 def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tuple[float, ...]:
@@ -156,8 +158,10 @@ def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tu
     """
     gap, own = drive.gap_and_inertia
     given = [f"{factor}x" for factor in INERTIA_MULTIPLES] if given is None else given
-    units = {"x": own, "J1": drive.motor_at_load}
-    return _axis(drive, "load_inertia", given, name, units, lambda inertia: drive.moved(gap, inertia))
+    units = {"x": own, "J1": drive.motor_inertia_at_load}
+    return _axis(
+        drive, "load_inertia", given, name, units, lambda inertia: drive.with_gap_and_inertia(gap, inertia)
+    )
 
 
 def _axis(
@@ -169,11 +173,11 @@ def _axis(
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
     found, wrong = set[float](), Mistakes()
     for one in listed:
-        with wrong.noted():
+        with wrong.collect():
             found.add(value := quantity_of(drive, key, multiplied(one, name, units), name))
-            with wrong.noted(f"{name}: "):
+            with wrong.collect(f"{name}: "):
                 check(value)
-    wrong.settle()
+    wrong.raise_if_any()
     return tuple(sorted(found))
 
 
@@ -194,7 +198,7 @@ class Level(NamedTuple):
 Scenario = dict[str, Level]
 
 
-def scenarios_of(
+def tuning_scenarios(
     drive: Machine, tolerances: Mapping[str, Any] | None, seed: int = 0, most: int = MOST
 ) -> tuple[Scenario, ...]:
     """The drive as it is, and its parameters off by their tolerances in all combinations.
@@ -205,19 +209,19 @@ def scenarios_of(
     mass or shaft may be named, as "shaft[2].gap". Raises InputError.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> scenarios_of(crane, {"stiffness": "10 %"})
+    >>> tuning_scenarios(crane, {"stiffness": "10 %"})
     ({}, {'stiffness': Level(factor=0.9, offset=0.0)}, {'stiffness': Level(factor=1.1, offset=0.0)})
-    >>> len(scenarios_of(crane, {"stiffness": "10 %", "load_torque": "20 %", "torque_lag": [0, "2 ms"]}))
+    >>> len(tuning_scenarios(crane, {"stiffness": "10 %", "load_torque": "20 %", "torque_lag": [0, "2 ms"]}))
     9
     """
     levels, wrong = dict[str, list[Level]](), Mistakes()
     for name, given in (tolerances or {}).items():
-        with wrong.noted("tolerances: "):
+        with wrong.collect("tolerances: "):
             knob = _knob(drive, name)
             levels[knob.name] = _levels(drive, knob, given)
             for level in levels[knob.name]:
                 drive.with_values({knob.name: level.of(knob.value)})
-    wrong.settle()
+    wrong.raise_if_any()
     if not levels:
         return ({},)
     if math.prod(map(len, levels.values())) <= most:
@@ -255,18 +259,22 @@ def scenarios_drawn(
     return tuple(found)
 
 
-def _knob(drive: Machine, name: str) -> Knob:
+def _knob(drive: Machine, name: str) -> ParameterValue:
     """The quantity of a drive or chain that has a tolerance."""
-    found = drive.knob(name)
+    found = drive.parameter_value(name)
     if found is not None and found.parameter.unit:
         return found
-    known = {path: one for path in drive.knobs() if (one := drive.knob(path)) and one.parameter.unit}
+    known = {
+        path: one
+        for path in drive.parameter_keys()
+        if (one := drive.parameter_value(path)) and one.parameter.unit
+    }
     near = nearest(name, [*known, *(one.name for one in known.values())])
     hint = f"did you mean {near}?" if near else f"name one of its file, as {next(iter(known))}."
     raise InputError(f"{name} is not a quantity of a {drive.KIND}; {hint}")
 
 
-def _levels(drive: Machine, knob: Knob, given: Any) -> list[Level]:
+def _levels(drive: Machine, knob: ParameterValue, given: Any) -> list[Level]:
     name = knob.name
     if isinstance(given, list | tuple | np.ndarray):
         each = listed_of(given, name)

@@ -11,7 +11,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
 from softstart.errors import InputError, Mistakes
-from softstart.quantities import multiple, nearest, number_in
+from softstart.quantities import nearest, number_in, read_multiple
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 
@@ -80,11 +80,11 @@ class Range:
 Free = Iterable[str] | Mapping[str, Any] | None
 
 
-def tunable(controller: Controller) -> tuple[str, ...]:
+def tunable_parameters(controller: Controller) -> tuple[str, ...]:
     """Names of the parameters that a controller says may be tuned.
 
     >>> from softstart.controller import make_controller
-    >>> "time" in tunable(make_controller("ramp")), tunable(make_controller("direct"))
+    >>> "time" in tunable_parameters(make_controller("ramp")), tunable_parameters(make_controller("direct"))
     (True, ())
     """
     return tuple(f.name for f in fields(controller) if _declared(f) is not None)
@@ -103,7 +103,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     """
     known, what = {f.name: f for f in fields(controller)}, f"the controller {label_of(controller)}"
     if free is None:
-        free = [name for name in tunable(controller) if getattr(controller, name) is None]
+        free = [name for name in tunable_parameters(controller) if getattr(controller, name) is None]
     asked = (
         {free: None} if isinstance(free, str) else free if isinstance(free, Mapping) else dict.fromkeys(free)
     )
@@ -115,7 +115,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
         )
     found, wrong = list[Range](), Mistakes()
     for name, ends in asked.items():
-        with wrong.noted("free: "):
+        with wrong.collect("free: "):
             if name not in known:
                 near = nearest(name, known)
                 hint = f"did you mean {near}?" if near else f"it has {', '.join(known) or 'none'}."
@@ -129,7 +129,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
                     "with two values."
                 )
             found.append(own)
-    wrong.settle()
+    wrong.raise_if_any()
     return tuple(found)
 
 
@@ -150,7 +150,7 @@ def _named(field: Field[Any], ends: Any) -> Range:
     """The user's own range."""
     name, unit = field.name, field.metadata.get("unit", "")
     both = [] if isinstance(ends, str) or not isinstance(ends, Iterable) else list(ends)
-    multiples = [found[0] for end in both if (found := multiple(end, name))]
+    multiples = [found[0] for end in both if (found := read_multiple(end, name))]
     values = multiples or [number_in(unit or "1", end, name) for end in both]
     if len(both) != 2 or len(values) != 2 or not values[0] < values[1] or (multiples and values[0] <= 0.0):
         raise InputError(

@@ -17,23 +17,23 @@ from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole
 from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain, as_far_as_known
-from softstart.store import Records, Target
-from softstart.tuning.gains import Found, Log, Progress, best_gains
+from softstart.store import PartStore, Target
+from softstart.tuning.gains import GainSearch, Progress, StartCounter, best_gains
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.question import (
     MARGIN,
-    Question,
+    TuningProblem,
     gaps_of,
     inertias_of,
     recipe_of,
     scenarios_drawn,
-    scenarios_of,
+    tuning_scenarios,
 )
 from softstart.tuning.ranges import Free, ranges_of
 from softstart.tuning.tables import (
-    Asked,
+    CellOptimum,
     between_table,
-    optima,
+    cell_optima,
     price_table,
     robust_outcome,
     schedule_table,
@@ -108,7 +108,7 @@ def tune(
         default each start is to be no slower than with the controller's own defaults; for the margin to a
         permissible start time there is no other bound.
     tolerances : mapping, optional
-        What drives may be off by, unknown to the controller, see `scenarios_of`: a parameter -> "10 %", a
+        What drives may be off by, unknown to the controller, see `tuning_scenarios`: a parameter -> "10 %", a
         quantity, or a list of values; of a chain also one mass or shaft ("shaft[2].gap").
     quantile : float
         Share of the starts that metric and bound are judged by; 1 is the worst case.
@@ -163,20 +163,20 @@ def tune(
     whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}
     whole |= {} if population is None else {"population": (population, 5)}
     for name, (number, least) in whole.items():
-        with wrong.noted():
+        with wrong.collect():
             check_whole(number, name, least)
-    with wrong.noted():
-        scenarios = scenarios_of(drive, tolerances, 0 if wrong.sentences else seed)
+    with wrong.collect():
+        scenarios = tuning_scenarios(drive, tolerances, 0 if wrong.sentences else seed)
         if others := drawn or soft:
             scenarios = scenarios_drawn(known, others, scenarios)
-    with wrong.noted():
+    with wrong.collect():
         recipe = recipe_of(controller, parameters)
         ranges = ranges_of(recipe.make(), free)
-    with wrong.noted():
+    with wrong.collect():
         rows = gaps_of(drive, gaps)
-    with wrong.noted():
+    with wrong.collect():
         columns = inertias_of(drive, inertias)
-    with wrong.noted():
+    with wrong.collect():
         bound = None if start_time is None else StartTime.of(start_time)
     share: Any = quantile
     if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
@@ -185,20 +185,20 @@ def tune(
         wrong.sentences.append(f"metric = {metric!r}: name a figure of a start, as k_dyn.")
     if metric == MARGIN and not has_margin(drive.limits):
         wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
-    wrong.settle()
-    question = Question(
+    wrong.raise_if_any()
+    question = TuningProblem(
         drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), seed, restarts,
         population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations, soft,
     )  # fmt: skip
-    log = Log(progress)
+    log = StartCounter(progress)
     log.tell("starts with the defaults")
     sides = {
         name: Trials(question, robust=name == "robust")
         for name, wanted in (("schedule", schedule), ("robust", robust)) if wanted
     }  # fmt: skip
-    found: dict[str, tuple[Trials, Found]] = {}
+    found: dict[str, tuple[Trials, GainSearch]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
-    with Records(target, question.inputs(), ["part"]) as kept:
+    with PartStore(target, question.inputs(), ["part"]) as kept:
         threads = next(iter(sides.values())).compiled
         count = sharing(question, "the controller", workers, scheduler, threads)
         with Pool(count, threads=threads, scheduler=scheduler, describe=_described) as pool:
@@ -208,7 +208,7 @@ def tune(
         best = {}
         if certified and metric == "k_dyn":
             with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
-                best = optima(pool, sides.values(), kept, log)
+                best = cell_optima(pool, sides.values(), kept, log)
     scheduled = found.get("schedule")
     return Tuning(
         question,
@@ -221,7 +221,7 @@ def tune(
     )
 
 
-def _described(task: Part | Asked) -> str:
-    if isinstance(task, Asked):
+def _described(task: Part | CellOptimum) -> str:
+    if isinstance(task, CellOptimum):
         return f"the optimum of cell {task.cell + 1}"
     return f"candidates from number {task.first + 1} on"

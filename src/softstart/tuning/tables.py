@@ -16,10 +16,10 @@ from softstart.errors import InputError
 from softstart.optimal.optimize import optimize
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.parallel import Pool
-from softstart.store import Records
-from softstart.tuning.gains import Found, Log
+from softstart.store import PartStore
+from softstart.tuning.gains import GainSearch, StartCounter
 from softstart.tuning.outcome import RobustSet, gains_on_grid
-from softstart.tuning.question import Question
+from softstart.tuning.question import TuningProblem
 from softstart.tuning.search import agreement
 from softstart.tuning.trials import Judged, Trials, excess, upper
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Columns = dict[str, tuple[Any, str, str]]  # name -> values of the cells, unit, meaning
 
 
-def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
+def schedule_table(trials: Trials, found: GainSearch) -> xarray.Dataset:
     """The schedule with what it reaches."""
     columns: Columns = {
         one.name: (found.values[one.name], one.unit, f"tuned, within {one.text()}")
@@ -43,7 +43,7 @@ def schedule_table(trials: Trials, found: Found) -> xarray.Dataset:
     return _dataset(trials.question, columns)
 
 
-def robust_outcome(trials: Trials, found: Found) -> RobustSet:
+def robust_outcome(trials: Trials, found: GainSearch) -> RobustSet:
     """The robust set with what it reaches."""
     quantile = trials.question.quantile
     values = {name: float(value[0]) for name, value in found.values.items()}
@@ -72,7 +72,7 @@ def robust_outcome(trials: Trials, found: Found) -> RobustSet:
     )
 
 
-def between_table(trials: Trials, found: Found) -> xarray.Dataset | None:
+def between_table(trials: Trials, found: GainSearch) -> xarray.Dataset | None:
     """The schedule half way between the cells, where its gains are interpolated; None for a single cell."""
     question = trials.question
     if len(question.cells) == 1:
@@ -95,7 +95,7 @@ def _halves(axis: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(0.5 * (a + b) for a, b in pairwise(axis)) or axis
 
 
-def price_table(sides: dict[str, tuple[Trials, Found]], best: Optima) -> xarray.Dataset | None:
+def price_table(sides: dict[str, tuple[Trials, GainSearch]], best: Optima) -> xarray.Dataset | None:
     """Schedule, robust set and optimum within the same time, side by side."""
     both = len(sides) == 2
     if not (both or best):
@@ -155,7 +155,7 @@ def _over_scenarios(values: Any, share: float) -> Any:
     return np.where(np.isinf(found), np.nan, found)
 
 
-def _dataset(question: Question, columns: Columns) -> xarray.Dataset:
+def _dataset(question: TuningProblem, columns: Columns) -> xarray.Dataset:
     import xarray
 
     shape, dims = (len(question.gaps), len(question.load_inertias)), ("gap", "load_inertia")
@@ -176,7 +176,7 @@ def _dataset(question: Question, columns: Columns) -> xarray.Dataset:
 Optima = dict[tuple[int, float], tuple[float | None, float | None]]
 
 
-class Asked(NamedTuple):
+class CellOptimum(NamedTuple):
     """An optimum: its cell, the bound on the start time in s, and the drive, to which K_dyn refers."""
 
     cell: int
@@ -184,16 +184,16 @@ class Asked(NamedTuple):
     drive: Machine
 
 
-def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Optima:
+def cell_optima(pool: Pool, sides: Iterable[Trials], saved: PartStore, log: StartCounter) -> Optima:
     """The least K_dyn of each cell within its bounds on the start time, each with its lower bound."""
     found: Optima = {}
-    missing: dict[tuple[int, float], Asked] = {}
+    missing: dict[tuple[int, float], CellOptimum] = {}
     for trials in sides:
         for cell, bound in enumerate(_by_cell(trials, trials.bound)[:, 0].tolist()):
             if record := saved.find(("optimum", cell, bound)):
                 found[cell, bound] = record["k_dyn"], record["lower_bound"]
             elif math.isfinite(bound):
-                missing[cell, bound] = Asked(cell, bound, trials.question.drive_of(cell))
+                missing[cell, bound] = CellOptimum(cell, bound, trials.question.drive_of(cell))
     for done, (one, best) in enumerate(pool.results(optimum_of, missing.values())):
         log.tell("optima", done, len(missing), "cell")
         found[one.cell, one.bound] = best
@@ -203,7 +203,7 @@ def optima(pool: Pool, sides: Iterable[Trials], saved: Records, log: Log) -> Opt
     return found
 
 
-def optimum_of(asked: Asked) -> tuple[float | None, float | None]:
+def optimum_of(asked: CellOptimum) -> tuple[float | None, float | None]:
     """The optimum of a drive or chain, its motor without torque lag and rate limit: the harder yardstick.
 
     Where the start position is unknown, that of the hardest one as if it were known: no gains beat it.

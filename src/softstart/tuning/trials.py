@@ -22,7 +22,7 @@ from softstart.errors import InputError
 from softstart.parallel import Pool
 from softstart.quantities import nearest
 from softstart.start.batch import Batch, prepared
-from softstart.tuning.question import MARGIN, Question
+from softstart.tuning.question import MARGIN, TuningProblem
 
 Values = Mapping[str, Vector]  # parameter -> one value a candidate
 
@@ -45,7 +45,9 @@ class Trials:
     reach and `bound` the bound on the start time of each start in s (axes: job, start).
     """
 
-    def __init__(self, question: Question, robust: bool, known: tuple[Judged, Vector] | None = None) -> None:
+    def __init__(
+        self, question: TuningProblem, robust: bool, known: tuple[Judged, Vector] | None = None
+    ) -> None:
         self.question, self.robust = question, robust
         self.controller = question.recipe.make()
         count, scenarios = len(question.cells), len(question.scenarios)
@@ -144,20 +146,22 @@ class Trials:
         return Judged(1.0 - found if metric == MARGIN else found.astype(np.float64), time)
 
 
-def _starts_of_cells(question: Question) -> Batch:
+def _starts_of_cells(question: TuningProblem) -> Batch:
     """The machines that start: of each cell, one after another, those of all scenarios."""
     own: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(question.cells).T, strict=True))
     drives: list[Any] = [question.drive_of(cell) for cell in range(len(question.cells))]
     found = {}
     for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
         # of a chain each gap goes with all others
-        value = own[name] if name in own else np.array([float(one.knob(name).value) for one in drives])
+        value = (
+            own[name] if name in own else np.array([float(one.parameter_value(name).value) for one in drives])
+        )
         columns = [one[name].of(value) if name in one else value for one in question.scenarios]
         found[name] = np.stack(columns, axis=1).ravel()
     return prepared(varied(question.drive, found))
 
 
-def _defaults(question: Question, name: str, set_up: list[Any]) -> Vector:
+def _defaults(question: TuningProblem, name: str, set_up: list[Any]) -> Vector:
     """A tuned parameter as the controller derives it for each job."""
     values = [one.parameters[name] for one in set_up]
     if None in values:

@@ -22,7 +22,7 @@ from softstart.views.drawing import (
     line_of,
     new_figure,
 )
-from softstart.views.numbers import RPM, Table, column_of, number, printable, short
+from softstart.views.numbers import RPM, TextTable, column_of, number, printable, short
 from softstart.views.sheet import Sheet, columns_file, records_file
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def _lines(found: Balance) -> list[str]:
     ]
 
 
-def _orders(found: Balance) -> Table:
+def _orders(found: Balance) -> TextTable:
     """The orders at the tuning speed."""
     rows, gas = found.orders(), ("cosine", "sine") if found.engine.gas else ()
     cells = {
@@ -115,10 +115,10 @@ def _orders(found: Balance) -> Table:
         "couple\nN m": column_of([row["couple"] for row in rows]),
     }
     title = f"Orders at {_rpm(found)}: torque on the crank; force without balancer shafts"
-    return Table.of(title, cells)
+    return TextTable.of(title, cells)
 
 
-def _designs(found: Balance) -> Table:
+def _designs(found: Balance) -> TextTable:
     """What each design needs and leaves."""
     i, all_of = found.tuning_index, found.residuals
     at_tuning = {
@@ -135,10 +135,10 @@ def _designs(found: Balance) -> Table:
         values = [float(getattr(one, key)[i] if key else one.first_order_moment.max()) for one in all_of]
         if "couple" not in key or any(one.couple[i] > 0.0 for one in all_of):
             cells[heading] = column_of(values)
-    return Table.of(f"Left on the housing at {_rpm(found)}, first and all orders", cells, ("balancer",))
+    return TextTable.of(f"Left on the housing at {_rpm(found)}, first and all orders", cells, ("balancer",))
 
 
-def _speeds(found: Balance) -> list[Table]:
+def _speeds(found: Balance) -> list[TextTable]:
     """What is left of first order over the speeds asked for: moment, and couple if any."""
     tables, where = [], found.shown_indices
     for what in ("moment", "couple"):
@@ -149,7 +149,7 @@ def _speeds(found: Balance) -> list[Table]:
             cells |= {
                 name: [number(float(v[i]), 1) for i in where] for name, v in left.items() if v is not None
             }
-            tables.append(Table.of(f"First-order {what} left on the housing, N m", cells))
+            tables.append(TextTable.of(f"First-order {what} left on the housing, N m", cells))
     return tables
 
 

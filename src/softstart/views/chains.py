@@ -14,7 +14,7 @@ import numpy as np
 from softstart.errors import listed
 from softstart.views.drawing import COLOURS, drawing, entitle, head, legend_above, new_figure
 from softstart.views.drives import drive_lines
-from softstart.views.numbers import Table, column_of, number, short
+from softstart.views.numbers import TextTable, column_of, number, short
 from softstart.views.sheet import Sheet, records_file, rows_file
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def summary(found: Reduction, off: TwoMassError | None) -> dict[str, Any]:
 # tables ----------------------------------------------------------------------------------------------------
 
 
-def frequencies_table(vibration: Vibration) -> Table:
+def frequencies_table(vibration: Vibration) -> TextTable:
     """The lowest natural frequencies with their nodes."""
     shown = vibration.modes[:MOST_MODES]
     nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) or "-" for m in shown]
@@ -163,10 +163,10 @@ def frequencies_table(vibration: Vibration) -> Table:
         "Hz": column_of(vibration.frequency[shown].tolist(), 5),
     }
     title = f"Natural frequencies, gaps closed{f' (and {more} above)' if more else ''}"
-    return Table.of(title, cells, texts=[of_nodes])
+    return TextTable.of(title, cells, texts=[of_nodes])
 
 
-def two_masses_table(found: Reduction) -> Table:
+def two_masses_table(found: Reduction) -> TextTable:
     """The chain beside the two masses, and how far these are off."""
     names = {
         "first elastic frequency, rad/s": "Omega",
@@ -188,7 +188,7 @@ def two_masses_table(found: Reduction) -> Table:
         f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}{', fails' * found.forced}"
     )
     title = f"Two masses instead of {len(found.chain.masses)} ({condition})"
-    return Table.of(title, cells, texts=["at the motor shaft"])
+    return TextTable.of(title, cells, texts=["at the motor shaft"])
 
 
 def _signed(percent: float) -> str:
@@ -200,7 +200,7 @@ def _signed(percent: float) -> str:
     return "-" if math.isnan(percent) else f"{percent:+.1f}" if abs(percent) > 1e-6 else "0"
 
 
-def verified_table(done: Sequence[Verification]) -> Table:
+def verified_table(done: Sequence[Verification]) -> TextTable:
     """The starts on the drive and on the chain."""
     cells = {
         "strategy": [one.name for one in done],
@@ -211,7 +211,9 @@ def verified_table(done: Sequence[Verification]) -> Table:
         "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
         "start time\nchain s": column_of([one.chain.start_time for one in done], 4),
     }
-    return Table.of("Designed on the two masses, verified on the chain", cells, ["strategy", "largest in"])
+    return TextTable.of(
+        "Designed on the two masses, verified on the chain", cells, ["strategy", "largest in"]
+    )
 
 
 # figure ----------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from softstart.views.drawing import (
     line_of,
     new_figure,
 )
-from softstart.views.numbers import NOTHING, Table, column_of, printable, short, with_unit
+from softstart.views.numbers import NOTHING, TextTable, column_of, printable, short, with_unit
 from softstart.views.sheet import Sheet, columns_file, rows_file
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def engagement_sheet(run: Engagement) -> Sheet:
         title=f"{run.clutch.name}: {run.law.label}",
         lines=clutch_lines(run.clutch),
         facts=[(name, text) for name, text in facts if text != NOTHING or name != "heat of the linings"],
-        tables=[Table.of("Events", cells, ("event",), most=MOST_EVENTS)],
+        tables=[TextTable.of("Events", cells, ("event",), most=MOST_EVENTS)],
         found=[STATUS[run.status] + slips],
         figures={"engagement": run.plot},
         files={

@@ -29,7 +29,7 @@ LIMITS_OF_MOTOR = (
 
 def drive_lines(machine: Any) -> list[str]:
     """The machine in a few lines: its name, the parameters that matter, and under which laws it starts."""
-    two, masses, motor = machine.lumped, machine.mass_names, machine.motor
+    two, masses, motor = machine.lever_rule_model, machine.mass_names, machine.motor
     J1, J2, c, gap, Mc = (short(float(one)) for one in (two.J1, two.J2, two.c, two.gap, two.Mc))
     named = f"  motor on {masses[machine.motor_index]}, load {masses[machine.load_index]}"
     if len(masses) == 2:
@@ -67,7 +67,10 @@ def drive_lines(machine: Any) -> list[str]:
 def _there(machine: Any) -> Iterator[str]:
     """The same at the output of a gear."""
     if (gear := machine.gear) is not None:
-        two, places = machine.lumped, (("c", "N*m/rad"), ("gap", "rad"), ("J2", "kg*m^2"), ("Mc", "N*m"))
+        two, places = (
+            machine.lever_rule_model,
+            (("c", "N*m/rad"), ("gap", "rad"), ("J2", "kg*m^2"), ("Mc", "N*m")),
+        )
         c, gap, J2, Mc = (float(gear.to_output(getattr(two, name), si)) for name, si in places)
         yield (
             f"  output c = {short(c)} N m/rad, gap = {short(Units('arcmin').shown(gap, 'rad'))} arcmin, "
@@ -119,7 +122,7 @@ def controllers_set_up(machine: Any, fitted_to: Any) -> str:
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
     'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
-    here, there = {} if machine is None else machine.by_path(), fitted_to.by_path()
+    here, there = {} if machine is None else machine.parameters_by_path(), fitted_to.parameters_by_path()
     found = [
         f"{path} {_set(there[path][1])} there, {_set(value)} here"
         for path, (parameter, value) in here.items()

@@ -12,7 +12,7 @@ from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
 from softstart.views.markdown import file_stem
-from softstart.views.numbers import Table, column_of, number, short
+from softstart.views.numbers import TextTable, column_of, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
 from softstart.views.starts import machine_lines
 
@@ -40,7 +40,7 @@ def counted(value: float) -> str:
     return f"{value:.3g}" if 1e6 <= value < math.inf else factor(value)
 
 
-def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> list[Table]:
+def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> list[TextTable]:
     """The strategies with all figures of a single shaft, or with a table a figure of several shafts."""
     shafts, worn, limits = found.drive.shaft_names, not math.isnan(found.worn_gap), found.drive.limits
     starts, years = bool(found.curve.points), limits.starts_per_hour is not None
@@ -67,7 +67,7 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
         figures.insert(1, (True, "", torque, lambda row: number(row.equivalent_torque, 1)))
         names = {"strategy": [row.run.controller_name for row in rows[:: len(shafts)]]}
         return [
-            Table.of(
+            TextTable.of(
                 heading,
                 names | {name: list(map(cell, rows[k :: len(shafts)])) for k, name in enumerate(shafts)},
                 ("strategy",),
@@ -83,10 +83,10 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
         "impacts": [str(row.impacts) for row in rows],
         "their\nenergy J": column_of([row.impact_energy for row in rows], 3),
     }
-    return [Table.of(title, cells, ("strategy",))]
+    return [TextTable.of(title, cells, ("strategy",))]
 
 
-def conclusion(found: Fatigue) -> str:
+def fatigue_conclusion(found: Fatigue) -> str:
     """Under which strategy the shaft that gains least lasts longest."""
     worn = not math.isnan(found.worn_gap)
 
@@ -105,7 +105,7 @@ def conclusion(found: Fatigue) -> str:
     return f"{text}." if math.isnan(years) else f"{text}, {counted(years)} years."
 
 
-def notes(found: Fatigue) -> list[str]:
+def fatigue_notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     drive, limits, curve = found.drive, found.drive.limits, found.curve
     worn, several = not math.isnan(found.worn_gap), len(drive.shaft_names) > 1
@@ -202,8 +202,8 @@ def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Any = No
         f"{found.drive.name}: life of the shaft line",
         machine_lines(found.drive, fitted_to),
         tables=fatigue_tables(found, rows or found.rows),
-        found=[conclusion(found)],
-        notes=notes(found),
+        found=[fatigue_conclusion(found)],
+        notes=fatigue_notes(found),
         figures={"fatigue": found.plot},
         files={"fatigue.csv": records_file(records), **files},
         machine=found.drive,

@@ -15,11 +15,11 @@ from softstart.identification.model import FILTER
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, Table, number, short
+from softstart.views.numbers import NOTHING, TextTable, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
-    from softstart.identification.planning import Experiment, Plan
+    from softstart.identification.planning import Experiment, ExperimentPlan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
 
@@ -28,7 +28,7 @@ FIGURES = {"peak shaft torque, N m": "peak", "load moves, rad": "travel", "lasts
 SIMULATED = "simulated, not measured: the torque demand, and the motor as its encoder would count it"
 
 
-def table_file(table: Table) -> Writer:
+def table_file(table: TextTable) -> Writer:
     """A table as a CSV file."""
     return rows_file([column.heading.replace("\n", " ") for column in table.columns], table.rows)
 
@@ -49,7 +49,7 @@ def _lines(found: Identification) -> list[str]:
     ]
 
 
-def estimates_table(found: Identification) -> Table:
+def estimates_table(found: Identification) -> TextTable:
     """A row for each parameter: guess, value, interval."""
 
     def row(one: Estimate) -> list[str]:
@@ -69,7 +69,7 @@ def estimates_table(found: Identification) -> Table:
 
     title = "Found, with intervals of 95 %" if found.stated else "Best fit, no intervals"
     numbers = ("guess", "found", "+- %", "from", "to")
-    return Table.of_rows(title, ("parameter", "unit"), numbers, list(map(row, found.estimates)))
+    return TextTable.of_rows(title, ("parameter", "unit"), numbers, list(map(row, found.estimates)))
 
 
 def _digits(value: float, one: Estimate) -> str:
@@ -97,7 +97,10 @@ def identification_sheet(
     return Sheet(
         f"{found.drive.name}: identified from its logs",
         _lines(found),
-        tables=[estimates_table(found), Table.of_rows(title, ("strategy",), ("K_dyn", "from", "to"), rows)],
+        tables=[
+            estimates_table(found),
+            TextTable.of_rows(title, ("strategy",), ("K_dyn", "from", "to"), rows),
+        ],
         notes=found.notes,
         figures={"logs": found.plot} if found.logs else {},
         files=files,
@@ -105,7 +108,7 @@ def identification_sheet(
     )
 
 
-def figure(found: Identification) -> Any:
+def identification_figure(found: Identification) -> Any:
     """Each log beside the start of the drive found, and below what is left."""
     count = len(found.logs)
     with drawing():
@@ -127,7 +130,7 @@ def figure(found: Identification) -> Any:
     return made
 
 
-def plan_table(plan: Plan) -> Table:
+def plan_table(plan: ExperimentPlan) -> TextTable:
     """Half an interval of 95 % of each parameter, in %, under each experiment."""
     shown = plan.experiments
     rows = [
@@ -136,10 +139,10 @@ def plan_table(plan: Plan) -> Table:
     ]
     rows += [[heading, *(f"{getattr(one, name):.3g}" for one in shown)] for heading, name in FIGURES.items()]
     names = [one.name.replace(", ", ",\n") for one in shown]
-    return Table.of_rows("Half intervals of 95 %, in % of the value", ("parameter",), names, rows)
+    return TextTable.of_rows("Half intervals of 95 %, in % of the value", ("parameter",), names, rows)
 
 
-def plan_sheet(plan: Plan) -> Sheet:
+def plan_sheet(plan: ExperimentPlan) -> Sheet:
     """What is shown of a plan of experiments."""
     lines = float(plan.drive.encoder_lines)
     encoder = f"{lines:g} encoder lines" if lines else "an ideal encoder"
@@ -166,7 +169,7 @@ def plan_sheet(plan: Plan) -> Sheet:
     )
 
 
-def _write_log(plan: Plan, one: Experiment, path: Path) -> None:
+def _write_log(plan: ExperimentPlan, one: Experiment, path: Path) -> None:
     """A simulated log of an experiment."""
     from softstart.identification.planning import made_up_log
 
@@ -174,7 +177,7 @@ def _write_log(plan: Plan, one: Experiment, path: Path) -> None:
     log.to_csv(path, SIMULATED)
 
 
-def plan_figure(plan: Plan) -> Any:
+def plan_figure(plan: ExperimentPlan) -> Any:
     """The torque of each experiment."""
     count = len(plan.experiments)
     with drawing():
@@ -214,7 +217,7 @@ def wear_sheet(wear: Wear) -> Sheet:
         [str(day), name, *(_digits(value, one) for value in (one.value, one.lower, one.upper))]
         for day, name, one in zip(wear.dates, wear.names, wear.gaps, strict=True)
     ]
-    table = Table.of_rows(
+    table = TextTable.of_rows(
         "Gap, with intervals of 95 %", ("date", "identification"), ("gap rad", "from", "to"), gaps
     )
     return Sheet(

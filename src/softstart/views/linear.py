@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.linear.limit_cycles import SHARES, oscillating
-from softstart.linear.plant import sizes_of
+from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, Table, column_of, number
+from softstart.views.numbers import NOTHING, TextTable, column_of, number
 from softstart.views.sheet import Sheet, rows_file
 from softstart.views.starts import machine_lines
 
@@ -30,7 +30,7 @@ DEEPEST, HIGHEST = 1e-3, 1e3  # of |L|
 MARKED = 100.0  # gain margins up to which a crossing is marked
 
 
-def conclusion(view: LinearView) -> str:
+def linear_conclusion(view: LinearView) -> str:
     """One sentence: the margins and the elastic mode, or why there are none."""
     if view.loop is None:
         return view.notes[0]
@@ -72,7 +72,7 @@ def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-def tables(view: LinearView, loop: Loop) -> list[Table]:
+def tables(view: LinearView, loop: Loop) -> list[TextTable]:
     """Modes of the closed loop, where a pair counts once, other drives, and limit cycles."""
     modes = [mode for mode in loop.modes if mode.imag >= 0.0][:SHOWN_MODES]
     found, others = view.cycles, view.variations
@@ -108,13 +108,13 @@ def tables(view: LinearView, loop: Loop) -> list[Table]:
     }
     cycles = "Limit cycles predicted by the describing function of the gap"
     return [
-        Table.of("Modes of the closed loop", of_modes, ("pole z",)),
-        Table.of("The same controller on other drives", of_drives, ("drive", "stable")),
-        Table.of(cycles, of_cycles, ("predicted",)),
+        TextTable.of("Modes of the closed loop", of_modes, ("pole z",)),
+        TextTable.of("The same controller on other drives", of_drives, ("drive", "stable")),
+        TextTable.of(cycles, of_cycles, ("predicted",)),
     ]
 
 
-def notes(view: LinearView) -> list[str]:
+def linear_notes(view: LinearView) -> list[str]:
     """The mean torque of the limit cycles, then the notes of the view."""
     found = "No limit cycle through the gap is predicted by the describing function."
     if len(view.drive.shaft_names) > 1:
@@ -143,7 +143,7 @@ def linear_sheet(view: LinearView) -> Sheet:
         lines,
         facts=margin_rows(view, loop),
         tables=tables(view, loop),
-        notes=notes(view),
+        notes=linear_notes(view),
         figures={"linear": view.plot},
         files={"response.csv": rows_file(*response(loop))},
         machine=view.drive,
@@ -162,7 +162,7 @@ def response(loop: Loop) -> tuple[tuple[str, ...], list[list[float]]]:
 
 def linear_figure(view: LinearView) -> Any:
     """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
-    loop, Omega = view.loop, sizes_of(view.drive).Omega
+    loop, Omega = view.loop, plant_scales(view.drive).Omega
     assert loop is not None
     w = frequencies(loop.period, loop.broken)
     w = w[w >= Omega * 10.0**-DECADES]

@@ -39,7 +39,7 @@ class Column(NamedTuple):
         return max(len(line) for text in (self.heading, *cells) for line in text.split("\n"))
 
 
-class Table(NamedTuple):
+class TextTable(NamedTuple):
     """A titled table of text cells; rows numbered in `bold` stand out, a terminal shows the first `most`.
 
     The first `keys` columns name a row; if it is not said, those that hold text.
@@ -55,7 +55,7 @@ class Table(NamedTuple):
     @classmethod
     def of(
         cls, title: str, cells: Mapping[str, Sequence[str]], texts: Sequence[str] = (), **options: Any
-    ) -> Table:
+    ) -> TextTable:
         """From the cells below each heading; columns named in `texts` hold text, the others numbers."""
         columns = [Column(heading, heading not in texts) for heading in cells]
         return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)], **options)
@@ -63,12 +63,12 @@ class Table(NamedTuple):
     @classmethod
     def of_rows(
         cls, title: str, texts: Sequence[str], numbers: Sequence[str], rows: Sequence[Sequence[str]]
-    ) -> Table:
+    ) -> TextTable:
         """From rows; the headings of the first columns, which hold text, and of the others, numbers."""
         return cls(title, [*(Column(one, False) for one in texts), *map(Column, numbers)], rows)
 
     @classmethod
-    def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
         """Rows of text, without a title."""
         return cls("", [Column(heading, False) for heading in headings], rows)
 
@@ -204,7 +204,7 @@ def units_of(machine: Any, named: str | None = None) -> Units:
     (Units(angle='deg', speed='rpm', diameter=0.0), ...)
     """
     speeds = () if machine.target_speed is None else (float(machine.target_speed),)
-    return _read(machine.units if named is None else named, machine.own_gaps, speeds)
+    return _read(machine.units if named is None else named, machine.local_gaps, speeds)
 
 
 _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame
@@ -262,18 +262,18 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
-def plain(value: Any) -> Any:
+def json_ready(value: Any) -> Any:
     """Results as JSON has them: NaN and infinity become null, numpy's numbers and arrays plain ones.
 
-    >>> plain({"k_dyn": float("nan"), "stages": (1, 2)})
+    >>> json_ready({"k_dyn": float("nan"), "stages": (1, 2)})
     {'k_dyn': None, 'stages': [1, 2]}
     """
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): json_ready(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [json_ready(one) for one in value]
     if hasattr(value, "tolist"):
-        return plain(value.tolist())
+        return json_ready(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, str | int | bool):

@@ -14,7 +14,7 @@ from softstart.optimal.result import Kept, Optimum
 from softstart.start.recommendation import margins_of
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, mark_points, new_figure, plain_ticks
-from softstart.views.numbers import NOTHING, Table, column_of, number, short, with_unit
+from softstart.views.numbers import NOTHING, TextTable, column_of, number, short, with_unit
 from softstart.views.sheet import Sheet, records_file
 from softstart.views.starts import machine_lines, over_time, shaft_torques, speeds, twists
 
@@ -42,7 +42,10 @@ def _facts(best: Optimum) -> list[list[str]]:
     """The figures of the optimum, as words and numbers."""
     run, bound, problem, kept = best.run, best.bound, best.problem, best.kept
     bounded, shafts = bound.kind != "none", run.drive.shaft_names
-    gap = ["gap between them", f"{best.gap_percent:.3g} %" if bounded or kept is not None else NOTHING]
+    gap = [
+        "gap between them",
+        f"{best.optimality_gap_percent:.3g} %" if bounded or kept is not None else NOTHING,
+    ]
 
     def allowed(most: float | None, unit: str = "") -> str:
         return "" if most is None else f", {short(most)}{unit} allowed"
@@ -73,7 +76,7 @@ def _facts(best: Optimum) -> list[list[str]]:
     return [*facts, ["answers of the searches", tried]] if len(best.tried) > 1 else facts
 
 
-def question(best: Optimum) -> str:
+def optimum_question(best: Optimum) -> str:
     """What was asked for."""
     problem, kept = best.problem, best.kept
     aim = _aim(best)
@@ -166,19 +169,19 @@ def _known(best: Optimum) -> list[str]:
     return [*found, REACTS] if len(problem.drive.positions) > 1 else found
 
 
-def scenario_table(best: Optimum) -> Table:
+def scenario_table(best: Optimum) -> TextTable:
     """What is different in each machine that the profile serves, and its start."""
     machines = (best.problem.drive, *best.problem.scenarios)
-    lumped = [one.lumped for one in machines]
+    lever_rule_model = [one.lever_rule_model for one in machines]
     columns = {
         "scenario": [str(index) for index in range(1, len(machines) + 1)],
-        "gap\nrad": column_of([one.gap for one in lumped]),
-        "J2\nkg m2": column_of([one.J2 for one in lumped]),
-        "Mc\nN m": column_of([one.Mc for one in lumped]),
+        "gap\nrad": column_of([one.gap for one in lever_rule_model]),
+        "J2\nkg m2": column_of([one.J2 for one in lever_rule_model]),
+        "Mc\nN m": column_of([one.Mc for one in lever_rule_model]),
         "K_dyn": [number(k, 4) for k in best.k_dyn_each],
         "start\ntime s": column_of(list(best.start_times), 5),
     }
-    return Table.of("", columns, bold=[best.worst])
+    return TextTable.of("", columns, bold=[best.worst])
 
 
 def bound_sentence(best: Optimum) -> str:
@@ -255,11 +258,11 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
     about = {"drive": drive.name, "k_dyn": best.k_dyn}
     return Sheet(
         f"{drive.name}: {'one profile for all' if several else best_start(drive)}",
-        [*machine_lines(drive), f"  asked  {question(best)}", f"  method {best.method}: {best.why}"],
+        [*machine_lines(drive), f"  asked  {optimum_question(best)}", f"  method {best.method}: {best.why}"],
         facts=_facts(best),
         tables=[
             *([scenario_table(best)] if several else []),
-            Table.of("The strategies on this drive", beside, ("strategy",)),
+            TextTable.of("The strategies on this drive", beside, ("strategy",)),
         ],
         found=[comparison(best, others)],
         notes=[*_known(best), bound_sentence(best)],
@@ -279,7 +282,7 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
 # a front ----------------------------------------------------------------------------------------------------
 
 
-def _front_tables(front: Front) -> list[Table]:
+def _front_tables(front: Front) -> list[TextTable]:
     """The curve, and the controllers, the gentlest first."""
     points, blind = front.points, len(front.drive.positions) > 1
     order = sorted(front.controllers, key=lambda one: one.k_dyn)
@@ -287,7 +290,7 @@ def _front_tables(front: Front) -> list[Table]:
         "start time\nallowed s": column_of([p.start_time_bound for p in points], 5),
         "K_dyn": [number(p.k_dyn, 4) for p in points],
         "lower\nbound": [number(p.k_dyn_lower_bound, 4) for p in points],
-        "gap\n%": [number(p.gap_percent, 3) for p in points],
+        "gap\n%": [number(p.optimality_gap_percent, 3) for p in points],
         "bound": [p.bound_kind if p.found else NOTHING for p in points],
         "heat\ns": column_of([p.heat for p in points]),
         "contacts": [NOTHING if p.contacts is None else str(p.contacts) for p in points],
@@ -303,7 +306,7 @@ def _front_tables(front: Front) -> list[Table]:
     }
     title = f"{_capital(best_k_dyn(front.drive))}, terminal {front.terminal}"
     beside = f"Controllers against the {best_start(front.drive)} at their own start time"
-    return [Table.of(title, curve, ("bound", "method")), Table.of(beside, controllers, ("strategy",))]
+    return [TextTable.of(title, curve, ("bound", "method")), TextTable.of(beside, controllers, ("strategy",))]
 
 
 def _front_conclusion(front: Front) -> str:

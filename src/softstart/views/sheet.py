@@ -16,7 +16,7 @@ from softstart import __version__
 from softstart.views.drawing import drawing, save_figure
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
-from softstart.views.numbers import Column, Table
+from softstart.views.numbers import Column, TextTable
 from softstart.views.terminal import blocks_of, console, print_lines, print_table, sentence
 
 FITTED_TO = "fitted-to.toml"
@@ -63,7 +63,7 @@ class Sheet:
     lines: Sequence[str] = ()
     status: str = ""
     facts: Sequence[Sequence[str]] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[TextTable] = ()
     found: Sequence[str] = ()
     notes: Sequence[str] = ()
     figures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
@@ -78,7 +78,7 @@ class Sheet:
 # terminal --------------------------------------------------------------------------------------------------
 
 
-def show(sheet: Sheet) -> None:
+def print_sheet(sheet: Sheet) -> None:
     """Print a sheet."""
     to = console()
     print_lines(to, sheet.lines)
@@ -87,7 +87,7 @@ def show(sheet: Sheet) -> None:
     if sheet.status:
         sentence(to, sheet.status, "bold")
     if sheet.facts:
-        print_table(to, Table.of_texts(("", ""), sheet.facts), headings=False)
+        print_table(to, TextTable.of_texts(("", ""), sheet.facts), headings=False)
     for table in (one for one in sheet.tables if one.rows):
         to.print()
         print_table(to, table)
@@ -143,7 +143,7 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
         markdown(sheet.status),
         *map(markdown, sheet.found),
         *(
-            table_parts(Table("", [Column("figure", False), Column("value")], sheet.facts))
+            table_parts(TextTable("", [Column("figure", False), Column("value")], sheet.facts))
             if sheet.facts
             else ()
         ),
@@ -161,7 +161,7 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
     write_text(folder / "report.md", "\n\n".join(part for part in parts if part) + "\n")
 
 
-def table_parts(table: Table) -> list[str]:
+def table_parts(table: TextTable) -> list[str]:
     """A table and its title in Markdown; numbers are set to the right."""
     headings = [column.in_a_line for column in table.columns]
     rule = ["---:" if column.number else "---" for column in table.columns]
@@ -188,16 +188,16 @@ def _machine(sheet: Sheet, folder: Path) -> tuple[str, list[str]]:
     return about, [f"## The {what}", *table_parts(_parameters(machine))]
 
 
-def _parameters(machine: Any) -> Table:
+def _parameters(machine: Any) -> TextTable:
     """All parameters of a machine that are set."""
     rows = []
-    for path, (parameter, value) in machine.by_path().items():
+    for path, (parameter, value) in machine.parameters_by_path().items():
         if value is not None and value != "" and path != "name":
             values = value if isinstance(value, tuple) else (value,)
             shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
             unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
             rows.append([path, parameter.symbol, shown, unit, parameter.meaning])
-    return Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows)
+    return TextTable.of_texts(("key", "symbol", "value", "unit", "meaning"), rows)
 
 
 # notebook --------------------------------------------------------------------------------------------------
@@ -209,7 +209,7 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     `first`: figures before the tables, where the picture is what was asked for. `width`: pixels for a table;
     what has no room beside its first columns goes on below.
     """
-    facts = [Table("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
+    facts = [TextTable("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
     parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found) if text]
     tables = [
@@ -227,7 +227,7 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     return "\n".join(parts)
 
 
-def _pixels(table: Table) -> list[float]:
+def _pixels(table: TextTable) -> list[float]:
     """What each column of a table needs at least: its longest word, as a browser breaks lines."""
     found = []
     for i, (heading, is_number) in enumerate(table.columns):
@@ -237,7 +237,7 @@ def _pixels(table: Table) -> list[float]:
     return found
 
 
-def _html(table: Table) -> str:
+def _html(table: TextTable) -> str:
     """A table; numbers are set to the right, line breaks in headings kept."""
 
     def row(cells: Sequence[str], tag: str) -> str:

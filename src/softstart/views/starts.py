@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
 from softstart.drive.data_sheet import BAND
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.start.comparison import SOFT_END, Comparison
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Recommendation, Row, checked_limits, margins_of
@@ -31,7 +31,7 @@ from softstart.views.drawing import (
 )
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import Table, column_of, label, number, short, units_of, with_unit
+from softstart.views.numbers import TextTable, column_of, label, number, short, units_of, with_unit
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def machine_lines(machine: Any, fitted_to: Drive | None = None) -> list[str]:
     """The machine in a few lines, what is doubted of it, and for which drive the controllers are set up."""
     return [
         *drive_lines(machine),
-        *(f"  doubt  {one}" for one in doubts(machine)),
+        *(f"  doubt  {one}" for one in plausibility_warnings(machine)),
         *([f"  {controllers_set_up(machine, fitted_to)}"] if fitted_to else []),
     ]
 
@@ -148,7 +148,7 @@ def event_rows(run: Run) -> list[list[Any]]:
     ]
 
 
-def _start_tables(run: Run) -> list[Table]:
+def _start_tables(run: Run) -> list[TextTable]:
     """The shafts of a chain, the stages, and the events: time, what happened, and where."""
     several, rows = len(run.drive.shaft_names) > 1, event_rows(run)
     stages: dict[str, Any] = dict(zip(STAGE_COLUMNS, zip(*stage_rows(run), strict=True), strict=False))
@@ -159,12 +159,12 @@ def _start_tables(run: Run) -> list[Table]:
     events |= {"at": [row[2] for row in rows]} if several else {}
     return [
         *([] if isinstance(run.drive, Drive) else [shaft_table(run)]),
-        Table.of("Stages", stages, ("gap",), most=SHOWN),
-        Table.of("Events", events, ("event", "at"), most=SHOWN),
+        TextTable.of("Stages", stages, ("gap",), most=SHOWN),
+        TextTable.of("Events", events, ("event", "at"), most=SHOWN),
     ]
 
 
-def shaft_table(run: Run) -> Table:
+def shaft_table(run: Run) -> TextTable:
     """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
     own = run.peak_torques / run.drive.at_motor_shaft().torque_ratio
     cells = {
@@ -177,7 +177,7 @@ def shaft_table(run: Run) -> Table:
     }
     if run.drive.limits:
         cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
-    return Table.of("Shafts", cells, ("shaft",))
+    return TextTable.of("Shafts", cells, ("shaft",))
 
 
 # figures of starts over time
@@ -339,7 +339,7 @@ def share_lost(row: Row) -> float:
     return 100.0 * row.settled_lost / direct if direct > 0.0 else math.nan
 
 
-GENTLE = (
+PEAK_COLUMNS = (
     Figure("K_dyn", lambda row: row.run.k_dyn, 3),
     Figure("K\nworn", lambda row: row.k_dyn_worn_gap, 3),
     Figure("K\nlight", lambda row: row.k_dyn_light_load, 3),
@@ -351,7 +351,7 @@ INTERVALS = (
     Figure("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
     Figure("start\ntime to s", lambda row: row.intervals["start_time"][1]),
 )
-QUICK = (Figure("settled\ns", lambda row: row.run.settled_time), Figure("later\n%", share_lost, 1))
+TIME_COLUMNS = (Figure("settled\ns", lambda row: row.run.settled_time), Figure("later\n%", share_lost, 1))
 TIMES = (
     Figure("start\ntime s", lambda row: row.run.start_time),
     Figure("start\nlater s", lambda row: row.time_lost, digits=3),
@@ -384,10 +384,16 @@ def at_details(machine: Any) -> tuple[Figure, ...]:
 
 def comparison_table(
     rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "", bold: Sequence[int] = ()
-) -> Table:
+) -> TextTable:
     """The strategies and these figures, by default all; beside K_dyn also flags and limits, where needed."""
-    figures = figures or (*GENTLE, *QUICK, *of_the_unknown(rows), *TIMES, *at_details(rows[0].run.drive))
-    judged = GENTLE[0] in figures
+    figures = figures or (
+        *PEAK_COLUMNS,
+        *TIME_COLUMNS,
+        *of_the_unknown(rows),
+        *TIMES,
+        *at_details(rows[0].run.drive),
+    )
+    judged = PEAK_COLUMNS[0] in figures
     cells = {"strategy": [row.marked if judged else row.name for row in rows]}
     for heading, of, decimals, digits in figures:
         values = list(map(of, rows))
@@ -396,7 +402,7 @@ def comparison_table(
         )
     if judged and any(row.against_limits for row in rows):
         cells["limits"] = [row.against_limits for row in rows]
-    return Table.of(title, cells, ("strategy", "limits"), bold=bold)
+    return TextTable.of(title, cells, ("strategy", "limits"), bold=bold)
 
 
 def at_soft_end(rows: Sequence[Row]) -> tuple[Figure, ...]:
@@ -531,7 +537,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     """What is shown of a comparison; `rows` are its rows in another order."""
     machine, rows = comparison.drive, rows or comparison.rows
     bold = [rows.index(row) for row in comparison.recommendation.shown]
-    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*GENTLE, *at_soft_end(rows), *QUICK))]
+    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*PEAK_COLUMNS, *at_soft_end(rows), *TIME_COLUMNS))]
     if rows[0].intervals:
         parts.append(("Intervals of 95 %", INTERVALS))
     if details:

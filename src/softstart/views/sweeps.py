@@ -14,7 +14,7 @@ from softstart.start.status import Status
 from softstart.sweeping.summary import SHARES, pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import NOTHING, Column, Table, column_of, label, number, plural
+from softstart.views.numbers import NOTHING, Column, TextTable, column_of, label, number, plural
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from softstart.chain.machines import Machine
-    from softstart.sweeping.entry import Progress
+    from softstart.sweeping.entry import SweepProgress
     from softstart.sweeping.summary import Summary
 
 MOST_PANELS, MOST_LINES = 6, 8
@@ -157,7 +157,7 @@ def _write_cells(results: xarray.Dataset, path: Path) -> None:
     columns_file({f"{n} [{units[n]}]" if units[n] not in ("", "1") else n: c for n, c in columns})(path)
 
 
-def cell_table(results: xarray.Dataset) -> Table:
+def start_table(results: xarray.Dataset) -> TextTable:
     """Each start, with its status where not every one reached its target speed."""
     columns = cells(results).to_dict("list")
     ended, axes = columns.pop(STATUS), len(results.coords)
@@ -168,7 +168,7 @@ def cell_table(results: xarray.Dataset) -> Table:
     if set(ended) != {Status.REACHED.name}:
         shown.insert(axes + 1, (STATUS, [name.lower().replace("_", " ") for name in ended]))
     words = [heading for heading, column in shown if any(one[:1].isalpha() for one in column)]
-    return Table.of("Each start", dict(shown), words)
+    return TextTable.of("Each start", dict(shown), words)
 
 
 def _figures(values: list[float]) -> list[str]:
@@ -189,7 +189,7 @@ def axis_summary(results: xarray.Dataset) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _tables(results: xarray.Dataset, summary: Summary) -> list[Table]:
+def _tables(results: xarray.Dataset, summary: Summary) -> list[TextTable]:
     """The grid, the figures over all starts, and the starts where they are few."""
     axes = [
         [name, f"{one['count']:,}", *(f"{one[end]:.6g}" if end in one else NOTHING for end in ("from", "to")),
@@ -204,13 +204,13 @@ def _tables(results: xarray.Dataset, summary: Summary) -> list[Table]:
     numbers = [Column(heading) for heading in ("values", "from", "to")]
     ends = ("least", "5 %", "median", "95 %", "most")
     return [
-        Table("The grid", [Column("axis", False), *numbers, Column("unit", False)], axes),
-        Table.of_rows("Over all starts", ("figure", "unit"), ends, spreads),
-        *([cell_table(results)] if summary.starts <= MOST_SHOWN else []),
+        TextTable("The grid", [Column("axis", False), *numbers, Column("unit", False)], axes),
+        TextTable.of_rows("Over all starts", ("figure", "unit"), ends, spreads),
+        *([start_table(results)] if summary.starts <= MOST_SHOWN else []),
     ]
 
 
-def conclusion(results: xarray.Dataset, summary: Summary) -> str:
+def sweep_conclusion(results: xarray.Dataset, summary: Summary) -> str:
     """Where the worst case sits, and which shares came to their speed and keep the limits."""
 
     def of_the_starts(share: float) -> str:
@@ -230,7 +230,7 @@ def conclusion(results: xarray.Dataset, summary: Summary) -> str:
     return " ".join(found)
 
 
-def pace(last: Progress) -> str:
+def pace(last: SweepProgress) -> str:
     """How many starts were made, and how fast."""
     made, before = last.done - last.before, f", of which {last.before:,} were finished before"
     speed = f"; {made / last.seconds:,.0f} starts/s in {last.seconds:.1f} s" if made and last.seconds else ""
@@ -253,7 +253,7 @@ def sweep_sheet(
         f"{drive.name}: {plural(summary.starts, 'start')}",
         [*machine_lines(drive), *([f"  {controllers_set_up(None, fitted_to)}"] if fitted_to else [])],
         tables=_tables(results, summary),
-        found=[conclusion(results, summary)],
+        found=[sweep_conclusion(results, summary)],
         notes=[
             f"{plural(count, 'start')}: {Status[name].value}"
             for name, count in summary.statuses.items()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from softstart.views.numbers import Column, Table, plain, printable
+from softstart.views.numbers import Column, TextTable, json_ready, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,10 +35,10 @@ def console() -> Console:
 
 def print_json(data: Any) -> None:
     """One JSON object on standard output."""
-    print(json.dumps(plain(data), indent=2, allow_nan=False))
+    print(json.dumps(json_ready(data), indent=2, allow_nan=False))
 
 
-def print_table(to: Console, shown: Table, *, headings: bool = True) -> None:
+def print_table(to: Console, shown: TextTable, *, headings: bool = True) -> None:
     """A table; bold rows stand out on a terminal. Text is wrapped, numbers are never cut.
 
     Of a table that is too wide its keys are printed again before the columns that have no room beside them.
@@ -53,11 +53,11 @@ def print_table(to: Console, shown: Table, *, headings: bool = True) -> None:
         _print_block(to, block if index else block._replace(title=block.title + cut), headings)
 
 
-def blocks_of(table: Table, needed: Sequence[float], width: float) -> list[Table]:
+def blocks_of(table: TextTable, needed: Sequence[float], width: float) -> list[TextTable]:
     """The table in blocks of columns that fit beside each other; its keys stand in each of them.
 
     `needed` is what each column needs of the `width`. Keys are the first columns that hold text, or
-    `Table.keys`.
+    `TextTable.keys`.
     """
     columns, rows = table.columns, table.rows
     keys = table.keys or next((i for i, column in enumerate(columns) if column.number), len(columns)) or 1
@@ -78,7 +78,7 @@ def blocks_of(table: Table, needed: Sequence[float], width: float) -> list[Table
     ]
 
 
-def _least(table: Table) -> list[int]:
+def _least(table: TextTable) -> list[int]:
     """Characters that each column needs at least: numbers all, text may be wrapped."""
 
     def least(index: int, column: Column) -> int:
@@ -88,7 +88,7 @@ def _least(table: Table) -> list[int]:
     return [least(*one) for one in enumerate(table.columns)]
 
 
-def _print_block(to: Console, shown: Table, headings: bool) -> None:
+def _print_block(to: Console, shown: TextTable, headings: bool) -> None:
     from rich import box
     from rich.table import Table as RichTable
 

@@ -13,7 +13,16 @@ from softstart.drive.data_sheet import BAND
 from softstart.errors import InputError
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
-from softstart.views.numbers import Column, Table, at_output, column_of, gear_in_words, label, plural, short
+from softstart.views.numbers import (
+    Column,
+    TextTable,
+    at_output,
+    column_of,
+    gear_in_words,
+    label,
+    plural,
+    short,
+)
 from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
 
@@ -87,7 +96,7 @@ def any_in_time(tuning: Tuning) -> bool:
     return scheduled or (tuning.robust is not None and tuning.robust.feasible)
 
 
-def question(tuning: Tuning) -> str:
+def tuning_question(tuning: Tuning) -> str:
     """What was asked, in a sentence."""
     q = tuning.question
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
@@ -105,7 +114,7 @@ def _columns(table: Dataset) -> dict[str, list[Any]]:
     return {str(name): values for name, values in frame.to_dict("list").items()}
 
 
-def cell_table(tuning: Tuning, table: Dataset) -> Table:
+def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     """The schedule, one row per cell."""
     of, metric = _columns(table), _metric(tuning)
     numbers = {
@@ -121,13 +130,13 @@ def cell_table(tuning: Tuning, table: Dataset) -> Table:
         "in\ntime": ["yes" if good else "no" for good in of["in_time"]],
         "searches\nagree": [f"{n} of {tuning.question.restarts}" for n in of["agreement"]],
     }
-    return Table.of("Gains for each cell", columns, most=SHOWN, keys=2)
+    return TextTable.of("Gains for each cell", columns, most=SHOWN, keys=2)
 
 
-def _tables(tuning: Tuning) -> Iterator[Table]:
+def _tables(tuning: Tuning) -> Iterator[TextTable]:
     """The schedule, the robust set and its metric over the grid, and what it costs."""
     if tuning.schedule is not None:
-        yield cell_table(tuning, tuning.schedule)
+        yield schedule_cells(tuning, tuning.schedule)
     if tuning.robust is not None:
         found, units = tuning.robust, {one.name: one.unit for one in tuning.question.ranges}
         there = [at_output(tuning.drive, value, units[name]) for name, value in found.gains.items()]
@@ -138,19 +147,19 @@ def _tables(tuning: Tuning) -> Iterator[Table]:
             "unit": [label("", units[name], "") for name in found.gains],
         }
         columns |= {"robust, at\nthe output": there} if any(there) else {}
-        yield Table.of("One set for all", columns, ("parameter", "unit"))
+        yield TextTable.of("One set for all", columns, ("parameter", "unit"))
         yield _grid(tuning, f"{_metric(tuning)} with this set", found.cells[tuning.metric])
     if tuning.price is not None and "robust_over_schedule" in tuning.price:
         title = "Price of robustness: one set over gains for each cell"
         yield _grid(tuning, title, tuning.price["robust_over_schedule"])
 
 
-def _grid(tuning: Tuning, title: str, values: Any) -> Table:
+def _grid(tuning: Tuning, title: str, values: Any) -> TextTable:
     """A figure over the grid, one row per gap."""
     q = tuning.question
     cells = [short(gap) for gap in q.gaps], *(column_of(column) for column in values.to_numpy().T.tolist())
     headings = ["gap rad", *(f"J2 {inertia:.4g}" for inertia in q.load_inertias)]
-    return Table(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
+    return TextTable(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
 
 
 def _between(values: Any) -> str:
@@ -165,7 +174,7 @@ def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
     name, metric, table, price = tuning.metric, _metric(tuning), tuning.schedule, tuning.price
     one, found = tuning.robust, list[str]()
-    found += [f"Doubt: {one}" for one in tuning.doubts]
+    found += [f"Doubt: {one}" for one in tuning.plausibility_warnings]
     shares = list[tuple[str, Any, Any]]()
     if table is not None:
         late, before = int((~table["in_time"]).sum()), _between(table[f"{name}_default"])
@@ -208,7 +217,7 @@ def conclusions(tuning: Tuning) -> list[str]:
     return [*found, f"Ratios of {metric}: {'; '.join(ratios)}."] if ratios else found
 
 
-def notes(tuning: Tuning) -> list[str]:
+def tuning_notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how sure the search is."""
     found, drive, q = [], tuning.drive, tuning.question
     if len(drive.mass_names) > 2:
@@ -275,10 +284,10 @@ def tuning_sheet(tuning: Tuning) -> Sheet:
     return Sheet(
         f"{tuning.drive.name}: {tuning.controller} tuned",
         machine_lines(tuning.drive),
-        question(tuning),
+        tuning_question(tuning),
         tables=list(_tables(tuning)),
         found=conclusions(tuning),
-        notes=notes(tuning),
+        notes=tuning_notes(tuning),
         figures={one: partial(figure_of, tuning, one) for one in figures},
         files=files,
         machine=tuning.drive,

@@ -55,7 +55,7 @@ class Answer(NamedTuple):
 
 def closed_form(start_time: float) -> Answer:
     """softstart: pulse, coast, hold."""
-    profile, end, claimed = pulse_coast_hold.solve(Problem(DRIVE, start_time))
+    profile, end, claimed = pulse_coast_hold.solve_pulse_coast_hold(Problem(DRIVE, start_time))
     return Answer(claimed, profile, end)
 
 
@@ -72,7 +72,7 @@ def descent(start_time: float) -> Answer:
 def collocation(start_time: float) -> Answer:
     """softstart: the CasADi statement with one contact, IPOPT."""
     run = simulate(DRIVE, "pulse-coast-hold", start_time + float(DRIVE.elastic_period))
-    claim = statement.solve(Problem(DRIVE, start_time), run, straight=True)
+    claim = statement.solve_collocation(Problem(DRIVE, start_time), run, straight=True)
     return Answer(claim.value, claim.profile, claim.end_time)
 
 

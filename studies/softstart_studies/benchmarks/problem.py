@@ -94,7 +94,7 @@ class Problem:
         widths = 0.9 + 0.2 * (np.arange(count) + 0.5) / max(count, 1)
         inertias = 0.9 + 0.2 * ((0.5 + np.arange(count) * 0.618034) % 1.0)
         pairs = zip(widths.tolist(), inertias.tolist(), strict=True)
-        return [one.changed(gaps=gap, load_inertia=inertia) for gap, inertia in pairs] if count else [one]
+        return [one.scaled(gaps=gap, load_inertia=inertia) for gap, inertia in pairs] if count else [one]
 
     def set_up(self) -> SetUp:
         """The controller for the machine; method 2 raises its torque where [G](15) says."""

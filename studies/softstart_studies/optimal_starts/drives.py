@@ -85,6 +85,6 @@ def of_points(points: Sequence[FrontPoint]) -> dict[str, list[Any]]:
         "K_dyn": [p.k_dyn for p in points],
         "at least": [p.k_dyn_lower_bound for p in points],
         "bound": [p.bound_kind if p.found else p.status.lower() for p in points],
-        "above it, %": [p.gap_percent for p in points],
+        "above it, %": [p.optimality_gap_percent for p in points],
         "method": [p.method or None for p in points],
     }

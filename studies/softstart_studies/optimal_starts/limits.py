@@ -10,7 +10,7 @@ from softstart.optimal.descent import Descent
 from softstart.optimal.front import ControllerPoint, Front
 from softstart.optimal.optimize import optimize
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import PulseCoastHold
+from softstart.optimal.pulse_coast_hold import PulseCoastHoldStarts
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.crane import percent
@@ -55,7 +55,7 @@ def limit(gap: float) -> Limit:
     (0.2593, 0.304)
     """
     drive = crane(gap)
-    starts = PulseCoastHold.of(Problem(drive, 1.0))
+    starts = PulseCoastHoldStarts.of(Problem(drive, 1.0))
     P = drive.mean_torque
     course = starts.course(P)
     at_peak = starts.load_speed(course, course.t_peak, P)

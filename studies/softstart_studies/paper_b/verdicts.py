@@ -6,7 +6,7 @@ import numpy as np
 
 from softstart.balancing import Balance, Counterweights
 from softstart.balancing.design import free_force
-from softstart.balancing.engine import ORDERS, largest, shaking_of_crank
+from softstart.balancing.engine import ORDERS, largest_of_orders, shaking_of_crank
 from softstart.study import Claim, Verdict
 from softstart_studies.paper_b.orders import series_difference
 from softstart_studies.paper_b.tables import curves
@@ -62,7 +62,7 @@ def forces_vanish(found: Balance) -> Claim:
     i = found.tuning_index
     none, fixed = found.residual("none"), found.residual("fixed-h")
     whole = shaking_of_crank(VAZ.cylinders, VAZ.masses, Counterweights(0.0, 0.0))[0]
-    bare = largest(whole)[1] * found.tuning_speed**2
+    bare = largest_of_orders(whole)[1] * found.tuning_speed**2
     return Claim(
         "Two shafts against the crank and counterweights for half of the reciprocating masses balance the "
         "centrifugal forces and the first-order inertia force completely.",

@@ -19,7 +19,7 @@ from softstart.quantities import nearest, show
 from softstart.study import Table
 from softstart.views.clutches import clutch_lines
 from softstart.views.drawing import COLOURS, DASHES, GREY, MARKERS, drawing, entitle, head, new_figure
-from softstart.views.numbers import Table as ShownTable
+from softstart.views.numbers import TextTable as ShownTable
 from softstart.views.numbers import column_of, number
 from softstart.views.sheet import Sheet, columns_file, records_file
 from softstart_studies.paper_c.least_work import STEPS, OptimalLaw, Search
@@ -42,7 +42,7 @@ class EngagementFront:
     does no less work than the optimal law of that peak (None: it does less).
 
     >>> front = optimize_engagement(Clutch.load("paper-c"), 1, laws=False, steps=60)
-    >>> front.law_class, len(front.points), front.points[0].gap_percent < 0.1
+    >>> front.law_class, len(front.points), front.points[0].optimality_gap_percent < 0.1
     ('any', 1, True)
     """
 
@@ -253,7 +253,7 @@ def tables(found: tuple[EngagementFront, ...]) -> tuple[Table, ...]:
     """The fronts, the laws of [C] against them, and simple laws."""
     points = [
         (one.law_class, point.peak_torque / KGF, point.slip_work / KGF, point.work_bound / KGF,
-         point.gap_percent, point.run.slip_time, point.run.locked_peak_torque / KGF)
+         point.optimality_gap_percent, point.run.slip_time, point.run.locked_peak_torque / KGF)
         for one in found
         for point in one.points
     ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.chain import Chain, Vibration
-from softstart.vibration import closed, vibration_at
+from softstart.vibration import vibration_at, with_gaps_closed
 
 __all__ = ["frequencies", "natural_vibration"]
 
@@ -21,7 +21,7 @@ TINY = float(np.finfo(np.float64).tiny)
 
 def natural_vibration(chain: Chain) -> Vibration:
     """As `softstart.natural_vibration`, with frequencies between two neighbouring numbers."""
-    bodies = closed(chain.at_motor_shaft())
+    bodies = with_gaps_closed(chain.at_motor_shaft())
     return vibration_at(chain, frequencies(bodies.J, bodies.c))
 
 

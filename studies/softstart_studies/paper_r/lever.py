@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softstart.chain import Chain
 from softstart.study import Table
-from softstart.vibration import closed, elastic_frequencies, reduce_chain
+from softstart.vibration import elastic_frequencies, reduce_chain, with_gaps_closed
 
 __all__ = ["Lever", "chains_table", "error_bound", "lever"]
 
@@ -80,7 +80,7 @@ def chains_table() -> Table:
     for name in ("crane-4-mass", "tractor-like"):
         modal = reduce_chain(Chain.load(name))
         arrays = modal.chain.at_motor_shaft()
-        bodies = closed(arrays)
+        bodies = with_gaps_closed(arrays)
         motor, load = int(bodies.body[arrays.motor]), int(bodies.body[arrays.load])
         two = lever(bodies.J, bodies.c, ends=(motor, load))
         w, after = modal.whole.Omega, float(elastic_frequencies(two.J, two.c)[0])

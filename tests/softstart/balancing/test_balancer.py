@@ -11,7 +11,7 @@ from tests.softstart.balancing.engines import RPM, engine
 
 from softstart.balancing import BalancerShaft, Counterweights, Engine, balance
 from softstart.balancing.design import arm, free_force, two_shafts
-from softstart.balancing.engine import ORDERS, TURNS, force_at, largest, shaking_of_shafts
+from softstart.balancing.engine import ORDERS, TURNS, force_at, largest_of_orders, shaking_of_shafts
 from softstart.balancing.slider_crank import inertia_torque_harmonics
 from softstart.errors import InputError
 
@@ -61,7 +61,7 @@ def test_the_complete_design_leaves_nothing_of_first_order(count, rod, stroke, l
     pair = two_shafts(made, arm(made, w, load))
     of_shafts, _, moment = shaking_of_shafts(pair)
     unit = count * made.masses.reciprocating * made.cylinders.crank.r
-    assert largest(made.crank_shaking[0] + of_shafts)[1] < 1e-14 * unit * 10
+    assert largest_of_orders(made.crank_shaking[0] + of_shafts)[1] < 1e-14 * unit * 10
     left = -made.torque_harmonics(w, load)[2] + w**2 * moment[2]
     assert abs(left) < 1e-11 * abs(made.torque_harmonics(w, load)[2])
 

@@ -10,7 +10,7 @@ from tests.softstart.balancing.engines import ORDERS, RPM, engine
 
 from softstart.balancing import Counterweights
 from softstart.balancing.engine import ORDERS as HALVES
-from softstart.balancing.engine import TURNS, force_at, largest
+from softstart.balancing.engine import TURNS, force_at, largest_of_orders
 from softstart.balancing.slider_crank import acceleration_harmonics
 
 PHI = np.linspace(0.0, 4.0 * np.pi, 361)
@@ -113,7 +113,9 @@ def test_gas_orders_agree_with_an_fft_that_is_refined(order):
 def first_and_second(made):
     force, couple = made.crank_shaking
     unit = made.masses.reciprocating * made.cylinders.crank.r
-    return largest(force)[1:3] / unit, largest(couple)[1:3] / (unit * made.cylinders.spacing)
+    return largest_of_orders(force)[1:3] / unit, largest_of_orders(couple)[1:3] / (
+        unit * made.cylinders.spacing
+    )
 
 
 A2 = acceleration_harmonics(0.042 / 0.14, 2)[2]

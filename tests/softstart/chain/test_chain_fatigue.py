@@ -7,7 +7,7 @@ import pytest
 from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, fatigue, simulate
-from softstart.start.fatigue import rainflow_cycles, turning_points
+from softstart.start.fatigue import rainflow_cycles, torque_turning_points
 
 DAMPED = {f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)}
 
@@ -22,7 +22,7 @@ def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
     t = np.linspace(0.0, run.end_time, 100_000)
     sampled = run.at(t)["T"]
     for k in range(3):
-        points = turning_points(run, k)
+        points = torque_turning_points(run, k)
         located, dense = (rainflow_cycles(one, repeated=True) for one in (points[:, 1], sampled[:, k]))
         scale = located[0, 0]
         large = [one[one[:, 0] > 1e-2 * scale] for one in (located, dense)]

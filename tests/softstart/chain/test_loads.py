@@ -102,7 +102,7 @@ def test_a_chain_with_all_of_them():
     assert there.energy.gears == pytest.approx(run.energy.gears, rel=1e-10)
     assert run.energy.gears > 0.0
     assert quiet.peak_torque != pytest.approx(run.peak_torque, rel=1e-6)
-    batch = simulate([chain, chain.changed(gaps=2.0), chain], "direct", fitted_to=CRANE)
+    batch = simulate([chain, chain.scaled(gaps=2.0), chain], "direct", fitted_to=CRANE)
     assert batch.peak_torques[[0, 2]].values.tolist() == [quiet.peak_torques.tolist()] * 2
     assert momentum_bound(Problem(chain, 1.0)).k_dyn == 0.0
     notes = " ".join(reduce_chain(chain, force=True).notes)

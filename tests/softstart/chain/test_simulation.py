@@ -10,7 +10,7 @@ from tests.twin import chain_of
 from softstart import Command, Drive, InputError, PlainController, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import Sensor
-from softstart.start.rows import rows_of
+from softstart.start.rows import kernel_input
 from softstart.views.starts import shaft_table
 
 CRANE = Drive.load("crane-4amtkf")
@@ -38,7 +38,7 @@ def test_the_table_of_shafts_has_the_torque_at_each_own_shaft_by_hand():
 def test_a_drive_is_a_chain_of_two_masses(changes):
     """To the kernel it is the same: all that it is given of both agrees to rounding."""
     drive = CRANE.replace(**changes)
-    ours, theirs = rows_of(drive), rows_of(chain_of(drive))
+    ours, theirs = kernel_input(drive), kernel_input(chain_of(drive))
     shafts = (theirs.shafts[..., :-1], ours.shafts[..., :-1])  # but for the place of the gear: none
     for other, one in ((theirs.machines, ours.machines), (theirs.masses, ours.masses), shafts):
         np.testing.assert_allclose(other, one, rtol=1e-14)

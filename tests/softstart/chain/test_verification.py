@@ -42,11 +42,11 @@ def test_the_error_is_the_largest_of_all_starts(monkeypatch):
     """Of no torque that was tried is it more; those are computed here for themselves."""
     tried = []
 
-    def noted(chain, drive, profile):
+    def collect(chain, drive, profile):
         tried.append((chain, drive, profile))
         return error_under(chain, drive, profile)
 
-    monkeypatch.setattr("softstart.chain.two_masses.error_under", noted)
+    monkeypatch.setattr("softstart.chain.two_masses.error_under", collect)
     found = two_mass_error("crane-4-mass", controllers=["direct", "pulse-coast-hold"])
     errors = []
     for chain, drive, profile in tried:

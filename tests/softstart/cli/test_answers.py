@@ -25,7 +25,7 @@ from softstart import (
     tune,
 )
 from softstart.chain import Mass, Shaft
-from softstart.cli.options import controller_names, drive_names, read_values
+from softstart.cli.options import controller_names, drive_names, read_value_list
 from softstart.clutch import Clutch, engage
 from softstart.identification.planning import made_up_log
 from softstart.optimal.front import pareto
@@ -315,6 +315,6 @@ def test_a_log_becomes_a_drive_file(run, tmp_path):
 
 def test_a_range_is_even_or_with_log_in_equal_ratios() -> None:
     for text, wanted in (("0.25:4:3", [0.25, 2.125, 4.0]), ("0.25 rad:4 rad:3:log", [0.25, 1.0, 4.0])):
-        assert read_values(text, "--gaps", lambda part: (to_si(part, "rad"), "")) == [
+        assert read_value_list(text, "--gaps", lambda part: (to_si(part, "rad"), "")) == [
             (pytest.approx(value, rel=1e-12), "") for value in wanted
         ]

@@ -10,7 +10,7 @@ from tests.twin import chain_of
 from softstart import Chain, Drive, simulate
 from softstart.chain.elements import LIBRARY, Mass, Motor, Shaft
 from softstart.drive import library
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 
 CRANE = Drive.load("crane-4amtkf")
 J = 0.035 * 0.175 / 0.21  # of the elastic mode
@@ -19,7 +19,7 @@ TURN = 2.0 * math.pi
 
 @pytest.mark.parametrize("machine", [*library.names(), *LIBRARY.names()])
 def test_no_shipped_machine_is_doubted(machine: str) -> None:
-    assert doubts((Drive if machine in library.names() else Chain).load(machine)) == []
+    assert plausibility_warnings((Drive if machine in library.names() else Chain).load(machine)) == []
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_each_limit_on_both_sides(
     inward = 1.0 + 1e-3 * math.copysign(1.0, 1.0 - beyond)
     within, without = (CRANE.replace(**{name: share * value}, **others) for share in (inward, beyond))
     for of in (lambda drive: drive, chain_of):
-        assert not any(about in one for one in doubts(of(within)))
-        (found,) = (one for one in doubts(of(without)) if about in one)
+        assert not any(about in one for one in plausibility_warnings(of(within)))
+        (found,) = (one for one in plausibility_warnings(of(without)) if about in one)
         assert found.endswith(("?", ".")), "the likeliest mistake comes last"
 
 
@@ -58,7 +58,7 @@ def test_a_ratio_below_one_is_doubted_before_the_larger_inertia(
     chain = Chain([Mass(0.4), Mass(inertia)], [Shaft(4000, gap=0.1, ratio=ratio)], Motor(62, rated_speed=90))
     drive = CRANE.replace(motor_inertia=0.4, load_inertia=inertia / ratio**2, gear_ratio=ratio)
     for machine in (chain, drive):
-        assert [one[:16] for one in doubts(machine)] == ["gear ratio 0.99 "] * doubted
+        assert [one[:16] for one in plausibility_warnings(machine)] == ["gear ratio 0.99 "] * doubted
 
 
 @pytest.mark.parametrize("position", ["mid-gap", "opposite-flank", "hanging"])
@@ -67,7 +67,7 @@ def test_k_dyn_that_is_doubted_is_that_of_the_start(position: str) -> None:
     for stiffness, doubted in ((368.465, False), (3684.65, True)):
         drive = CRANE.replace(start_position=position, gap=3.0, stiffness=stiffness)
         k = simulate(drive, "direct").k_dyn_first_contact
-        found = [one for one in doubts(drive) if one.startswith("K_dyn of direct")]
+        found = [one for one in plausibility_warnings(drive) if one.startswith("K_dyn of direct")]
         assert bool(found) == (k > 8.0) == (doubted and position != "hanging")
         assert not found or f"about {k:.4g} " in found[0]
 
@@ -75,7 +75,7 @@ def test_k_dyn_that_is_doubted_is_that_of_the_start(position: str) -> None:
 @pytest.mark.parametrize("ratio", [0.01, 0.05, 0.1])
 def test_of_a_damped_drive_it_is_so_to_2_percent(ratio: float) -> None:
     stiff = CRANE.replace(gap=3.0, stiffness=3684.65, damping=2.0 * ratio * math.sqrt(3684.65 * J))
-    (found,) = (one for one in doubts(stiff) if one.startswith("K_dyn of direct"))
+    (found,) = (one for one in plausibility_warnings(stiff) if one.startswith("K_dyn of direct"))
     said = float(found.partition("about ")[2].split()[0])
     assert said == pytest.approx(simulate(stiff, "direct").k_dyn_first_contact, rel=0.02)
 
@@ -83,8 +83,8 @@ def test_of_a_damped_drive_it_is_so_to_2_percent(ratio: float) -> None:
 def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run, as_json) -> None:
     """Of 9 arcmin written as 9 rad, behind 25:1, come 225 rad at the motor."""
     gap = ("--set", "gap=225 rad", "--controllers", "direct")
-    found = as_json("compare", *gap)["doubts"]
+    found = as_json("compare", *gap)["plausibility_warnings"]
     assert [one.split(" at ")[0] for one in found][:1] == ["gap 225 rad"]
     out = run("compare", *gap).out
     assert out.count("  doubt  ") == len(found)
-    assert found == doubts(CRANE.replace(gap=225))
+    assert found == plausibility_warnings(CRANE.replace(gap=225))

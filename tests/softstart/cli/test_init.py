@@ -220,7 +220,7 @@ USUAL = {"motor.rated_power": "kW", "motor.rated_speed": "rpm", "gear.backlash":
 def test_a_machine_is_the_same_by_every_way_in(run, monkeypatch, place, typed, by_hand):
     """Prompt, --set, data sheet given to a command, form, and Python."""
     asks = []
-    question = asking.question
+    question = asking.prompt_text
     monkeypatch.setattr(asking, "question", lambda p, *rest: asks.append(p) or question(p, *rest))
     dialog = types.SimpleNamespace(isatty=lambda: True, readline=lambda: f"{typed.get(asks[-1].path, '')}\n")
     monkeypatch.setattr(sys, "stdin", dialog)
@@ -265,7 +265,7 @@ def test_the_form_speaks_of_the_unit_that_it_reads():
     from nicegui import Client
     from nicegui.page import page
 
-    from softstart.page.data_sheet_panel import made
+    from softstart.page.data_sheet_panel import data_sheet_field
 
     with Client(page("/never-opened")) as client:
         for name, unit in (
@@ -274,7 +274,7 @@ def test_the_form_speaks_of_the_unit_that_it_reads():
             ("diameter", "mm"),
             ("mass", "kg"),
         ):
-            field = made(DataSheet.PARAMETERS[name])
+            field = data_sheet_field(DataSheet.PARAMETERS[name])
             field.value = "fast"
             notes = [one.text for one in field.parent_slot.parent.descendants() if hasattr(one, "text")]
             assert any(f"or as a bare number in {unit}" in str(note) for note in notes), name

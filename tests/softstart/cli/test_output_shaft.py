@@ -11,7 +11,7 @@ from tests.oracle import integrate
 
 from softstart import DataSheet, Drive, compare
 from softstart.cli.sweep import read_axes
-from softstart.cli.tune import read_grid
+from softstart.cli.tune import read_axis
 from softstart.controller.recipe import Recipe
 from softstart.tuning.question import gaps_of
 
@@ -116,9 +116,9 @@ def test_the_recommendation_to_a_newcomer_is_safe_at_the_output():
 
 def test_grids_and_axes_are_taken_at_the_output():
     drive = DataSheet.from_settings(SHEET).drive
-    gaps = read_grid("4.5 arcmin at output, 1x, 18 arcmin at the output shaft", "--gaps", "rad")
+    gaps = read_axis("4.5 arcmin at output, 1x, 18 arcmin at the output shaft", "--gaps", "rad")
     assert gaps_of(drive, gaps) == pytest.approx([drive.gap * one for one in (0.5, 1, 2)], rel=1e-11)
-    gaps = read_grid("4.5 arcmin at output:18 arcmin at output:4", "--gaps", "rad")
+    gaps = read_axis("4.5 arcmin at output:18 arcmin at output:4", "--gaps", "rad")
     assert gaps_of(drive, gaps) == pytest.approx([drive.gap * one for one in (0.5, 1, 1.5, 2)], rel=1e-11)
     for text in ("4.5 arcmin at output, 1x", "4.5 arcmin at output:9 arcmin at output:2"):
         axis = read_axes([f"shaft.gap={text}"], Recipe("direct"), drive)["gap"]

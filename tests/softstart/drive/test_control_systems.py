@@ -6,7 +6,7 @@ import pytest
 from tests.oracle import integrate
 
 from softstart.drive import Drive
-from softstart.drive.control_systems import initial_state, shaft_torque
+from softstart.drive.control_systems import contact_torque, initial_state
 
 CRANE = Drive.load("crane-4amtkf")
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "max_step": 1e-3}
@@ -97,5 +97,5 @@ def test_contact_laws_on_both_flanks():
     """By hand: 0.5 rad beyond the gap, c z = 20 N m, d z' = +-50 N m."""
     for law, approaching, parting in (("no-pull", 70, 0), ("dead-zone", 70, -30), ("modelica", 40, 0)):
         for rate, torque in ((50.0, approaching), (-50.0, parting)):
-            assert shaft_torque(1.0, rate, 40.0, 1.0, 1.0, law=law) == torque
-            assert shaft_torque(-1.0, -rate, 40.0, 1.0, 1.0, law=law) == -torque
+            assert contact_torque(1.0, rate, 40.0, 1.0, 1.0, law=law) == torque
+            assert contact_torque(-1.0, -rate, 40.0, 1.0, 1.0, law=law) == -torque

@@ -213,7 +213,7 @@ def test_wheels_that_slip_are_doubted(share):
     torque = drive.Mc + (level.J1 + level.J2) * alpha
     sheet = DataSheet.from_settings(MOTOR | TROLLEY | slope | {"motor.starting_torque": torque})
     assert sheet.acceleration == pytest.approx(needed, rel=1e-12)
-    assert [one[:4] for one in sheet.doubts_of_motion] == ["mean"] * (share > 1.0)
+    assert [one[:4] for one in sheet.motion_warnings] == ["mean"] * (share > 1.0)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_unusual_speeds_are_doubted(base, low, high):
     now = 60.0 * DataSheet.from_settings(base).speed
     for limit, share in itertools.product((low, high), (0.99, 1.01)):
         ratio = base["gear.ratio"] * now / (limit * share)
-        found = DataSheet.from_settings(base | {"gear.ratio": ratio}).doubts_of_motion
+        found = DataSheet.from_settings(base | {"gear.ratio": ratio}).motion_warnings
         assert any(one.startswith("speed of the load") for one in found) == (
             limit * share < low or limit * share > high
         )

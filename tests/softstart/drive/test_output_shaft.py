@@ -14,13 +14,13 @@ from softstart import Chain, DataSheet, Drive, InputError, compare, optimize, re
 from softstart.chain import Mass, Motor, Shaft
 from softstart.controller.recipe import Recipe
 from softstart.drive import PARAMETERS
-from softstart.drive.doubts import doubts
 from softstart.drive.model import BY_PATH
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.reporting.document import data_of
 from softstart.reporting.project import Project
 from softstart.start.recommendation import Row
 from softstart.sweeping.grid import Subject
-from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
+from softstart.tuning.question import gaps_of, inertias_of, tuning_scenarios
 from softstart.views.tuning import conclusions
 
 CRANE = Drive.load("crane-4amtkf")
@@ -217,9 +217,9 @@ def test_everything_that_takes_a_gap_takes_it_at_the_output() -> None:
     (least, own) = gaps_of(drive, ["4.5 arcmin at output", "1x"])
     assert (least, own) == pytest.approx((gap / 2, gap), rel=1e-14)
     assert inertias_of(drive, "290 kg*m^2 at output") == pytest.approx((290 / 38.1**2 / 0.95,), rel=1e-14)
-    (_, low, high) = scenarios_of(drive, {"gap": ["4.5 arcmin at output", "18 arcmin at output"]})
+    (_, low, high) = tuning_scenarios(drive, {"gap": ["4.5 arcmin at output", "18 arcmin at output"]})
     assert (low["gap"].offset, high["gap"].offset) == pytest.approx((gap / 2, 2 * gap), rel=1e-14)
-    (_, low, high) = scenarios_of(drive, {"gap": "1 arcmin at output"})
+    (_, low, high) = tuning_scenarios(drive, {"gap": "1 arcmin at output"})
     assert high["gap"].offset == pytest.approx(gap / 9, rel=1e-14) == -low["gap"].offset
     both = records(drive, gap=["9 arcmin at output", "18 arcmin at output"])
     assert both.fields["gap"] == pytest.approx([gap, 2 * gap])
@@ -273,7 +273,7 @@ def test_a_permissible_torque_that_no_start_comes_near_is_doubted() -> None:
             CRANE.replace(gear_ratio=20, gear_efficiency=0.5, permissible_output_torque=20 * most),
             chain,
         ):
-            said = [one for one in doubts(machine) if one.startswith("permissible torque of ")]
+            said = [one for one in plausibility_warnings(machine) if one.startswith("permissible torque of ")]
             assert len(said) == doubted
             assert all("10.02 times the starting torque, where" in one for one in said)
 
@@ -289,15 +289,15 @@ def test_a_tuning_that_leaves_the_drive_out_is_doubted() -> None:
     drive = geared(38.1, 0.95).replace(gap="9 arcmin at output", load_inertia="200 kg*m^2 at output")
     name = "reduced-first-stage"
     beside = tune(drive, name, ["4.5 arcmin", "9 arcmin"], ["100 kg*m^2 at output"], **quick)
-    gap, inertia = beside.doubts
+    gap, inertia = beside.plausibility_warnings
     assert gap.startswith(
         "the gap of the drive, 0.099746 rad, lies outside those tuned over, 0.001309 to 0.002618 rad:"
     )
     assert inertia.startswith("the load inertia of the drive, ")
     assert [one[:14] for one in conclusions(beside)][:2] == ["Doubt: the gap", "Doubt: the loa"]
-    assert beside.summary()["doubts"] == beside.doubts
+    assert beside.summary()["plausibility_warnings"] == beside.plausibility_warnings
     within = tune(drive, name, ["4.5 arcmin at output", "9 arcmin at output"], ["1x"], **quick)
-    assert within.doubts == []
+    assert within.plausibility_warnings == []
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from tests.twin import chain_of
 from softstart import Drive, InputError, linear_view
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.linear.law import SampledStart, operating_points, run_until_steady
-from softstart.linear.plant import in_contact
+from softstart.linear.plant import contact_plant
 
 CRANE = Drive.load("crane-4amtkf").replace(damping=0.5, torque_lag="2 ms")
 CHAIN = Chain.from_toml(
@@ -78,9 +78,9 @@ def test_small_motions_of_the_whole_chain_are_those_of_the_loop(seed):
 
 
 def test_with_all_gaps_open_the_motor_turns_alone_or_with_what_is_joined_to_it():
-    assert in_contact(CHAIN, gaps_open=True).A.shape == (2, 2)
+    assert contact_plant(CHAIN, gaps_open=True).A.shape == (2, 2)
     joined = Chain(CHAIN.masses, [CHAIN.shafts[0].replace(gap=0.0), *CHAIN.shafts[1:]], CHAIN.motor)
-    assert in_contact(joined, gaps_open=True).A.shape == (4, 4)
+    assert contact_plant(joined, gaps_open=True).A.shape == (4, 4)
     view = linear_view(CHAIN, "take-up")
     assert view.loop.stable
     assert view.loop.point.mismatch < 1e-6

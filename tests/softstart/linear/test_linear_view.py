@@ -9,15 +9,15 @@ import pytest
 from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI
 
 from softstart import Command, InputError, PlainController, Sensor, SimulationError, linear_view, simulate
-from softstart.linear.law import Sample, SampledStart, closed, derivative, run_until_steady
-from softstart.linear.plant import in_contact, sampled
+from softstart.linear.law import Sample, SampledStart, closed_loop, derivative, run_until_steady
+from softstart.linear.plant import contact_plant, sampled
 
 
 def responses(view, drive, angle, count):
     """Torques at the samples from the operating point on, over the angle by which the motor was turned."""
     start, sample, ends = SampledStart.of(drive, view.controller), view.loop.point.sample, []
     for side in (angle, -angle):
-        turned = sample.displaced(in_contact(drive), side * np.repeat([1.0, 0.0], [2, 3]))
+        turned = sample.displaced(contact_plant(drive), side * np.repeat([1.0, 0.0], [2, 3]))
         rows = start.samples(sample.time + (count - 0.5) * view.loop.period, begin=turned)
         ends.append(np.array([one.shaft_torque for one in rows]))
     assert ends[0].size == count
@@ -69,9 +69,9 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
     response = responses(view, drive, 1e-4 * view.loop.point.sample.plant["theta"][0], count)
     # the modes with their delays span all responses: the exact one must lie among them
     plant = sampled(
-        in_contact(drive), h, float(drive.computing_delay), (1, 2, 3), float(drive.encoder_lines) > 0.0
+        contact_plant(drive), h, float(drive.computing_delay), (1, 2, 3), float(drive.encoder_lines) > 0.0
     )
-    whole, _, (read, _) = closed(plant, view.loop.point.law)
+    whole, _, (read, _) = closed_loop(plant, view.loop.point.law)
     first = np.zeros(read.size)
     first[:2] = 1.0  # motor angle and twist
     predicted = np.array([read @ np.linalg.matrix_power(whole, k) @ first for k in range(count)])

@@ -89,7 +89,9 @@ def test_no_gentle_torque_gets_below() -> None:
     for _ in range(150):
         shape = {"damping": rng.choice([0.0, 0.3]), "torque_lag": rng.choice([0.0, 1e-3])}
         drive = CRANE.replace(gap=10 ** rng.uniform(-2, 0.3), **shape)
-        best, _, _ = pulse_coast_hold.solve(Problem(drive.replace(damping=0.0, torque_lag=0.0), 0.4))
+        best, _, _ = pulse_coast_hold.solve_pulse_coast_hold(
+            Problem(drive.replace(damping=0.0, torque_lag=0.0), 0.4)
+        )
         times = best.time * (1 + 0.02 * rng.standard_normal(best.time.size) * (best.time > 0.0))
         levels = np.clip(best.torque * (1 + 0.01 * rng.standard_normal(best.time.size)), 0.0, drive.Ms)
         run = played(drive, TorqueProfile(np.sort(times), levels))
@@ -120,7 +122,7 @@ def test_no_torque_of_a_chain_gets_below(name: str) -> None:
     for _ in range(60 if name == "crane" else 20):
         if name == "crane":
             gaps, inertia = float(10.0 ** rng.uniform(-2, 0.3)), float(rng.uniform(0.1, 2))
-            chain = damped_crane(float(rng.choice([0.0, 0.05]))).changed(gaps=gaps, load_inertia=inertia)
+            chain = damped_crane(float(rng.choice([0.0, 0.05]))).scaled(gaps=gaps, load_inertia=inertia)
         time = np.sort(np.append(0.0, rng.uniform(0.0, 0.4, 5)))
         profile = {"profile": TorqueProfile(time, high * rng.uniform(0.1, 1.0, 6))}
         run = simulate(chain, "profile", 1.0, parameters=profile, fitted_to=CRANE)
@@ -159,7 +161,7 @@ def test_several_machines_have_the_largest_bound() -> None:
 @pytest.mark.parametrize("where", ["mid-gap", "driving-flank", "opposite-flank", "hanging"])
 def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(where: str, start_time: float) -> None:
     problem = Problem(CRANE.replace(start_position=where), start_time, "reached")
-    _, _, k_dyn = pulse_coast_hold.solve(problem)
+    _, _, k_dyn = pulse_coast_hold.solve_pulse_coast_hold(problem)
     assert k_dyn * (1.0 - 1e-8) < momentum_bound(problem).k_dyn < k_dyn
 
 

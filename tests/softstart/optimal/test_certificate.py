@@ -20,7 +20,7 @@ from softstart.arrays import Vector
 from softstart.optimal import certificate
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.certificate import _Dual, _Multipliers, _Search, not_certified
-from softstart.optimal.contact_motion import Contact, entries
+from softstart.optimal.contact_motion import Contact, cells_before
 from softstart.optimal.problem import Problem, Terminal
 
 
@@ -120,7 +120,7 @@ def test_any_numbers_at_all_make_a_bound(
     """
     rng = np.random.default_rng(31)
     problem = Problem(CRANE.replace(**given), 0.3, terminal)
-    Ms, cells = problem.highest_torque, entries(problem, 0.3)
+    Ms, cells = problem.highest_torque, cells_before(problem, 0.3)
     for _ in range(4):
         by = random_multipliers(rng, problem)
         low, high = np.sort(rng.uniform(0.2, 1.0, 2)) * float(cells.fastest.max())
@@ -185,7 +185,7 @@ def the_sum(start: Start, by: _Multipliers) -> float:
 def test_the_curvature_over_tau_is_enclosed(given: dict[str, Any]) -> None:
     """Each multiplier alone: second differences at fixed v and u(s/tau) stay below M, and get near it."""
     problem, ends, sharp = Problem(CRANE.replace(**given), 0.3), 24 + certificate.TAIL, list[float]()
-    cells, step = entries(problem, 0.3), 1e-3 / float(problem.drive.Omega)
+    cells, step = cells_before(problem, 0.3), 1e-3 / float(problem.drive.Omega)
     speed = float(cells.fastest[0])
     for unit in np.eye(ends + 3)[[2, 11, 14, 23, ends - 1, ends, ends + 1, ends + 2]]:
         T, z, tail, numbers = np.split(unit, [12, 24, ends])

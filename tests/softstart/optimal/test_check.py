@@ -14,13 +14,13 @@ from tests.softstart.optimal.drives import CRANE, CURVE, LONG, damped_crane, pla
 from softstart import TorqueProfile
 from softstart.optimal.check import check, replayed, torque_allowed
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import solve
+from softstart.optimal.pulse_coast_hold import solve_pulse_coast_hold
 from softstart.optimal.result import LowerBound, OptimumError, heat_of
-from softstart.optimal.starts import carried
-from softstart.start.rows import rows_of
+from softstart.optimal.starts import steady_shaft_torques
+from softstart.start.rows import kernel_input
 
 PROBLEM = Problem(CRANE, LONG)
-GOOD, END, CLAIMED = solve(PROBLEM)
+GOOD, END, CLAIMED = solve_pulse_coast_hold(PROBLEM)
 PROVED = LowerBound(0.909, "certificate", "one contact")
 
 
@@ -104,7 +104,7 @@ def test_the_torque_speed_curve() -> None:
     np.testing.assert_allclose(torque_allowed(curved, [0.0, 30.0, 55.0, 80.0]), [62.0, 60.0, 40.0, 20.0])
 
 
-LATE, LATE_END, LATE_K_DYN = solve(Problem(CRANE, 1.01 * LONG))
+LATE, LATE_END, LATE_K_DYN = solve_pulse_coast_hold(Problem(CRANE, 1.01 * LONG))
 REACHED = replace(PROBLEM, terminal="reached")
 WARM = replace(PROBLEM, minimise="heat", k_dyn=0.92)
 SOONEST = Problem(CRANE, None, minimise="start_time", k_dyn=0.91)
@@ -121,7 +121,7 @@ def test_good_ones_pass() -> None:
     assert judged(GOOD, claimed=1.0005 * CLAIMED) == ""
     assert judged(GOOD, claimed=HEAT, problem=WARM, bound=LOW) == ""
     assert judged(GOOD, claimed=END, problem=SOONEST, bound=LOW) == ""
-    quick = solve(REACHED)
+    quick = solve_pulse_coast_hold(REACHED)
     assert judged(quick[0], quick[1], quick[2], REACHED) == ""
 
 
@@ -151,9 +151,13 @@ def test_a_good_start_with_another_claim_or_question(given: dict[str, Any], said
             r"takes 0\.29118724\d* s, longer than",
         ),
         (OVERSPED, {}, r"speeds at 0\.288304 s are off their target"),
-        (solve(Problem(CRANE.replace(target_speed=59.4), LONG))[0], {}, r"60 rad/s by a share of 0\.01"),
         (
-            solve(Problem(CRANE.replace(target_speed=59.9), LONG, "reached"))[0],
+            solve_pulse_coast_hold(Problem(CRANE.replace(target_speed=59.4), LONG))[0],
+            {},
+            r"60 rad/s by a share of 0\.01",
+        ),
+        (
+            solve_pulse_coast_hold(Problem(CRANE.replace(target_speed=59.9), LONG, "reached"))[0],
             {"problem": REACHED},
             r"reaches its target speed after 0\.28\d+ s, not within 0\.28830\d+ s",
         ),
@@ -176,7 +180,7 @@ def test_the_heat_is_that_of_the_realised_torque() -> None:
 def test_every_scenario_is_judged() -> None:
     """A heavy load comes late, a wide gap is hit harder than claimed."""
     reached = replace(PROBLEM, terminal="reached")
-    profile, end, claimed = solve(reached)
+    profile, end, claimed = solve_pulse_coast_hold(reached)
     heavy = replace(reached, scenarios=(CRANE.replace(load_inertia=0.2),))
     rejected(profile, "not within", problem=heavy, end=end, claimed=claimed)
     both = replace(reached, scenarios=(CRANE.replace(gap=0.8),))
@@ -211,7 +215,7 @@ def test_shaken_profiles_do_not_slip_through() -> None:
 def test_a_steady_shaft_carries_the_friction_of_its_load_too() -> None:
     """The exact plant: wound up by this torque and at speed under the same torque, it stays so."""
     drive = CRANE.replace(load_viscous_friction=0.05)
-    (T,) = carried(rows_of(drive)).tolist()
+    (T,) = steady_shaft_torques(kernel_input(drive)).tolist()
     assert math.isclose(T, 7.16 + 0.05 * 60.0)
     moving = {"initial_motor_speed": 60.0, "initial_load_speed": 60.0, "target_speed": 90.0}
     run = played(drive.replace(start_position=0.25 + T / drive.c, **moving), TorqueProfile([0.0], [T]), 0.5)

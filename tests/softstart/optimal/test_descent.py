@@ -10,9 +10,9 @@ from tests.softstart.optimal.drives import CRANE, CURVE, HELD, played, three_mas
 
 from softstart import TorqueProfile
 from softstart.optimal import pulse_coast_hold, seeds
-from softstart.optimal.descent import Descent, Found, Model
+from softstart.optimal.descent import Candidate, Descent, Model
 from softstart.optimal.problem import Problem
-from softstart.optimal.starts import carried
+from softstart.optimal.starts import steady_shaft_torques
 
 CASES: dict[str, Problem] = {
     "reached, lag": Problem(CRANE.replace(torque_lag=0.005), 0.29, "reached"),
@@ -27,7 +27,7 @@ CASES: dict[str, Problem] = {
 }
 
 
-def begun(problem: Problem) -> tuple[Descent, Found]:
+def begun(problem: Problem) -> tuple[Descent, Candidate]:
     """A search some steps down: no optimum yet, and near no corner."""
     search = Descent(problem)
     firsts = seeds.pulse_coast_level(search)
@@ -73,7 +73,7 @@ def test_finished_meets_the_end_by_the_smallest_changes(terminal: Any) -> None:
     else:
         np.testing.assert_allclose(state["w"][0], 60.0, rtol=1e-9)
     if terminal == "steady":
-        np.testing.assert_allclose(state["T"][0], carried(run.recorded.rows), rtol=1e-6)
+        np.testing.assert_allclose(state["T"][0], steady_shaft_torques(run.recorded.rows), rtol=1e-6)
 
 
 @pytest.mark.parametrize("where", [0.0, -0.25])
@@ -85,7 +85,7 @@ def test_the_closed_form_comes_out_of_pulses(where: float) -> None:
     assert found is not None
     done = search.finished(search.refined(found))
     assert done is not None
-    _, _, truth = pulse_coast_hold.solve(problem)
+    _, _, truth = pulse_coast_hold.solve_pulse_coast_hold(problem)
     assert truth * (1.0 - 1e-6) <= done.peak / search.base <= truth * (1.0 + 1e-3)
 
 

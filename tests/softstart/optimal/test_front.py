@@ -43,7 +43,9 @@ def test_each_point_is_the_optimum_of_its_start_time(front: Front) -> None:
         assert point.k_dyn_lower_bound is not None
         assert point.start_time <= point.start_time_bound
         assert point.k_dyn_lower_bound <= point.k_dyn * (1 + 1e-9)
-        assert point.gap_percent == pytest.approx(100 * (point.k_dyn / point.k_dyn_lower_bound - 1))
+        assert point.optimality_gap_percent == pytest.approx(
+            100 * (point.k_dyn / point.k_dyn_lower_bound - 1)
+        )
         assert point.contacts == 1
         alone = optimize(CRANE, point.start_time_bound, terminal="reached")
         assert point.k_dyn == pytest.approx(alone.k_dyn, rel=1e-6)

@@ -12,12 +12,17 @@ from tests.softstart.optimal.drives import CRANE, played
 
 from softstart import Drive
 from softstart.optimal.problem import Problem
-from softstart.optimal.pulse_coast_hold import NotApplicable, PulseCoastHold, applies, solve
+from softstart.optimal.pulse_coast_hold import (
+    NotApplicable,
+    PulseCoastHoldStarts,
+    applies,
+    solve_pulse_coast_hold,
+)
 
 
 def checked(problem: Problem) -> float:
     """K_dyn, after everything that the form promises has been found true on the exact plant."""
-    profile, end_time, claimed = solve(problem)
+    profile, end_time, claimed = solve_pulse_coast_hold(problem)
     drive = problem.drive
     run = played(drive, profile, end_time + drive.elastic_period)
     state = run.at(end_time)
@@ -35,9 +40,9 @@ def checked(problem: Problem) -> float:
 
 def test_a_load_that_comes_back_by_itself_sets_the_least_peak() -> None:
     drive = CRANE.replace(gap=4.0)
-    starts = PulseCoastHold.of(Problem(drive, 100.0))
+    starts = PulseCoastHoldStarts.of(Problem(drive, 100.0))
     assert starts.least_peak > drive.Mc
-    profile, end_time, claimed = solve(Problem(drive, 100.0))
+    profile, end_time, claimed = solve_pulse_coast_hold(Problem(drive, 100.0))
     assert end_time < 10.0
     assert claimed == pytest.approx(starts.least_peak / Problem(drive, 1.0).base_torque, rel=1e-12)
     assert checked(Problem(drive, 100.0)) == claimed
@@ -50,24 +55,24 @@ def test_a_load_that_comes_back_by_itself_sets_the_least_peak() -> None:
 
 def test_reached_before_the_peak_of_the_shaft_torque() -> None:
     drive = CRANE.replace(target_speed=2.0)
-    starts = PulseCoastHold.of(Problem(drive, 1.0))
+    starts = PulseCoastHoldStarts.of(Problem(drive, 1.0))
     course = starts.course(1.5 * starts.most_held)
     within = 0.6 * course.t_peak + 0.4 * course.t_contact
     drive = drive.replace(target_speed=starts.load_speed(course, within, 1.5 * starts.most_held))
-    profile, _, claimed = solve(Problem(drive, within, "reached"))
+    profile, _, claimed = solve_pulse_coast_hold(Problem(drive, within, "reached"))
     assert claimed == pytest.approx(1.5, rel=1e-6)
     run = played(drive, profile, course.t_peak + 0.2 * drive.elastic_period)
     assert run.k_dyn == pytest.approx(claimed, rel=1e-12)
     assert run.start_time == pytest.approx(within, rel=1e-9)
     with pytest.raises(NotApplicable, match="before the shaft torque is at its peak"):
-        solve(Problem(drive, within))
+        solve_pulse_coast_hold(Problem(drive, within))
 
 
 def test_no_hold_beyond_the_motor() -> None:
     with pytest.raises(NotApplicable, match=r"would need 63.618. N m, and the motor has 62 N m"):
-        solve(Problem(CRANE, 0.2522662))
+        solve_pulse_coast_hold(Problem(CRANE, 0.2522662))
     with pytest.raises(NotApplicable, match="even full torque"):
-        solve(Problem(CRANE, 0.02))
+        solve_pulse_coast_hold(Problem(CRANE, 0.02))
 
 
 @pytest.mark.parametrize(
@@ -119,7 +124,7 @@ def test_any_drive_keeps_the_promises(
         initial_load_speed=falls * target, target_speed=target,
         load_kind="active" if load else "reactive",
     )  # fmt: skip
-    starts = PulseCoastHold.of(Problem(drive, 1.0))
+    starts = PulseCoastHoldStarts.of(Problem(drive, 1.0))
     least = max(starts.least_peak, drive.Mc)
     P = least + share * (starts.most_held - least)
     course = starts.course(P)

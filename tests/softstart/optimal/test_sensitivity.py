@@ -10,7 +10,7 @@ from tests.softstart.optimal.drives import CRANE, HELD, random_chain
 
 from softstart import Drive
 from softstart.kernel import records as at
-from softstart.optimal.starts import Played, Player
+from softstart.optimal.starts import DemandRun, DemandSimulator
 from softstart.profile import TorqueProfile
 
 STEP = 2e-5  # N m
@@ -22,7 +22,7 @@ def moved(profile: TorqueProfile, direction: Any, size: float) -> TorqueProfile:
 
 
 def slopes(
-    player: Player, profile: TorqueProfile, direction: Any, until: float, instants: Any
+    player: DemandSimulator, profile: TorqueProfile, direction: Any, until: float, instants: Any
 ) -> dict[str, Any]:
     """Differences of all parts of the state along a direction, extrapolated from two steps."""
     found = []
@@ -35,7 +35,9 @@ def slopes(
     return {name: (4.0 * found[1][name] - found[0][name]) / 3.0 for name in NAMES}
 
 
-def off(player: Player, played: Played, direction: Any, until: float, rng: np.random.Generator) -> float:
+def off(
+    player: DemandSimulator, played: DemandRun, direction: Any, until: float, rng: np.random.Generator
+) -> float:
     """The largest difference of sensitivities from differences, as a share of the largest of their kind."""
     profile, recorded = played.profile, played.recorded
     instants = np.sort(rng.uniform(0.2 * until, until, 12))
@@ -62,7 +64,7 @@ def test_the_answers_of_chains_are_differences(chains: int, curved: bool) -> Non
     rng = np.random.default_rng(20)
     contacts, friction, worst = 0, 0, 0.0
     for _ in range(chains):
-        player, until = Player(random_chain(rng, curved)), 0.06
+        player, until = DemandSimulator(random_chain(rng, curved)), 0.06
         edges = np.sort(rng.uniform(0.0, until, 4))
         time = np.array([0.0, edges[0], edges[0], *edges[1:]])  # one step among straight lines
         profile = TorqueProfile(time, rng.uniform(5.0, 55.0, time.size))
@@ -91,7 +93,7 @@ DRIVES: dict[str, Drive] = {
 @pytest.mark.parametrize("name", DRIVES)
 def test_the_answers_of_drives_are_differences(name: str) -> None:
     drive, rng = DRIVES[name], np.random.default_rng(21)
-    player, until, high = Player(drive), 0.1, float(drive.Ms)
+    player, until, high = DemandSimulator(drive), 0.1, float(drive.Ms)
     worst, released = 0.0, 0
     for _ in range(8):
         edges = np.sort(rng.uniform(0.1 * until, until, 4))
@@ -114,7 +116,7 @@ def test_instants_move_with_the_contacts() -> None:
         *(DRIVES[name] for name in ("lag", "reactive", "release, lag")),
     ]
     for machine in machines:
-        player, until = Player(machine), 0.06
+        player, until = DemandSimulator(machine), 0.06
         time = np.linspace(0.0, until, 5)
         high = 0.9 * float(machine.motor.starting_torque)
         profile = TorqueProfile(time, rng.uniform(0.3 * high, high, time.size))
@@ -137,6 +139,6 @@ def test_instants_move_with_the_contacts() -> None:
     assert compared > 60
 
 
-def contacts(played: Played) -> Any:
+def contacts(played: DemandRun) -> Any:
     events = played.recorded.events
     return events[(events["kind"] == at.CLOSED) & (events["time"] > 0.0)]

@@ -13,7 +13,7 @@ from softstart import Drive, InputError, TorqueProfile, optimize, simulate
 from softstart.optimal.check import BEYOND, torque_allowed
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged, heat_of
-from softstart.optimal.statement import as_casadi, phases_of, solve
+from softstart.optimal.statement import as_casadi, phases_of, solve_collocation
 
 WITHIN = 2e-3  # what a demand of straight lines, halved beside its jumps, may cost
 EXACT = 1e-3  # the collocation against the exact plant: the peak between its points
@@ -28,7 +28,7 @@ def guess(hold: float, start_time: float, drive: Any = CRANE):
 
 def checked(problem, run, straight=False, between=EXACT):
     """The claim, and its exact run, with what every start must keep."""
-    claim = solve(problem, run, straight)
+    claim = solve_collocation(problem, run, straight)
     exact = played(problem.drive, claim.profile, claim.end_time + run.elastic_period)
     end = exact.recorded.at([claim.end_time])
     w = end["w"][0] / problem.target
@@ -193,7 +193,7 @@ def test_the_program_is_one_for_any_solver():
 
 def test_a_start_time_that_is_too_short_is_no_result():
     with pytest.raises(NotConverged) as caught:
-        solve(Problem(CRANE, 0.2), guess(62.0, 0.2))
+        solve_collocation(Problem(CRANE, 0.2), guess(62.0, 0.2))
     assert caught.value.violation > 1e-3
 
 

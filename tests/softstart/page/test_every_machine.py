@@ -41,14 +41,14 @@ def test_what_a_field_shows_can_be_typed_into_it(name: str, lists: bool) -> None
         screen = Screen(session)
         shown = machine_fields(session, screen.entries, session.units)
         for path, one in shown.items():
-            value = machine.by_path()[path][1]
+            value = machine.parameters_by_path()[path][1]
             if path == "units" or not one["text"] or value is None:
                 continue
             try:
                 session.set(path, session.units.typed(one["text"], screen.entries[path].unit))
             except InputError as error:
                 raise AssertionError((what, path, one["text"])) from error
-            assert alike(session.machine.by_path()[path][1], value), (what, path, one["text"])
+            assert alike(session.machine.parameters_by_path()[path][1], value), (what, path, one["text"])
         assert links.bench_of(links.link_of(session), session.bench).drive == session.machine, what
         assert command_text(machine, {"direct": session.controllers["direct"]}), what
         assert map_words(machine), what

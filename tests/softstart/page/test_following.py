@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from softstart import InputError, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
-from softstart.page.machines import STEPS, axes_about, entries
+from softstart.page.machines import STEPS, axes_about, parameter_fields
 from softstart.page.panels import grid_of
 from softstart.page.session import Session
 from softstart.quantities import parse
@@ -198,19 +198,19 @@ def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
 def test_a_slider_sets_exactly_the_value_that_its_field_shows_and_no_other(machine):
     session = Session(machine, controllers=["direct"])
     controls, screen = controls_of(session)
-    scales = {path: one.scale for path, one in entries(session.machine).items() if one.scale}
+    scales = {path: one.scale for path, one in parameter_fields(session.machine).items() if one.scale}
     for path, scale in scales.items():
-        before = session.machine.by_path()
+        before = session.machine.parameters_by_path()
         for position in (0, 77, 300, STEPS):
             controls.take({"what": "slide", "path": path, "position": position})
             assert not screen.mistakes, path
             shown, si = screen.first()["fields"][path], screen.entries[path].unit
-            text, value = shown["text"], session.machine.by_path()[path][1]
+            text, value = shown["text"], session.machine.parameters_by_path()[path][1]
             assert parse(screen.units.typed(text, si), si) == value
             assert value == pytest.approx(scale.value(position), rel=1e-3)
             assert scale.low <= scale.value(position) <= scale.high
             assert shown["position"] == pytest.approx(position, abs=1)
-        now = session.machine.by_path()
+        now = session.machine.parameters_by_path()
         assert {key for key in before if before[key] != now[key]} <= {path}
         session.take(session.origin)
 
@@ -228,14 +228,14 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     frame = screen.first()
     rows = {row["path"]: row for group in frame["groups"] for row in group["rows"]}
     assert (rows[gap]["unit"], rows["start.target_speed"]["unit"]) == ("deg", "rad/s")
-    first = loaded.by_path()[gap][1]
+    first = loaded.parameters_by_path()[gap][1]
     assert float(frame["fields"][gap]["text"]) == pytest.approx(math.degrees(first), rel=1e-5)
-    assert session.machine.by_path()[gap][1] == first  # only what is typed changes
+    assert session.machine.parameters_by_path()[gap][1] == first  # only what is typed changes
     assert frame["traces"]["direct"]["units"]["angle"] == "deg"
     assert (frame["here"][0], frame["angle"][0]) == (loaded.gap_and_inertia[0], "deg")
 
     controls.take({"what": "edit", "path": gap, "text": "4"})
-    assert session.machine.by_path()[gap][1] == parse("4 deg", "rad")
+    assert session.machine.parameters_by_path()[gap][1] == parse("4 deg", "rad")
     controls.take({"what": "slide", "path": gap, "position": 77})
     text = screen.first()["fields"][gap]["text"]
     assert len(text) <= 5
@@ -246,7 +246,7 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     assert screen.first()["here"][0] == pytest.approx(math.radians(30.0), rel=1e-6)
     controls.take({"what": "edit", "path": "units", "text": "mm on 80 mm"})
     controls.take({"what": "edit", "path": gap, "text": "0.3"})
-    assert session.machine.by_path()[gap][1] == 0.0075
+    assert session.machine.parameters_by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
     assert 'write for example "deg, rpm"' in screen.mistakes["units"]
 
@@ -331,7 +331,7 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
             reader.do("edit", path=gap, text=f"{value}{unit}")
             assert reader.labels == units  # nothing else changes its unit
             typed = reader.si(str(value), unit.strip() or units[gap])
-            assert session.machine.by_path()[gap][1] == pytest.approx(typed, rel=1e-8)
+            assert session.machine.parameters_by_path()[gap][1] == pytest.approx(typed, rel=1e-8)
         elif act == "speed":
             units = dict(reader.labels)
             reader.do("edit", path="start.target_speed", text=f"{value}{unit}")
@@ -348,7 +348,7 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
         else:
             reader.do(act, **({"path": gap, "position": value} if act == "slide" else {}))
         for path in (gap, "start.target_speed"):
-            assert reader.read(path) == pytest.approx(session.machine.by_path()[path][1], rel=1e-5)
+            assert reader.read(path) == pytest.approx(session.machine.parameters_by_path()[path][1], rel=1e-5)
         seen, drive = reader.seen, session.machine
         assert seen["here"] == drive.gap_and_inertia
         assert seen["angle"][0] == reader.labels[gap]
@@ -430,9 +430,9 @@ def test_what_is_assumed_or_can_hardly_be_is_told_at_rest():
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 rad"})
     figure = screen.first()["figure"]
     assert figure["output_torque"] == pytest.approx(31.5 * figure["peak_torque"], rel=1e-12)
-    (remarks,) = [frame for frame in screen.at_rest() if frame and "doubts" in frame]
+    (remarks,) = [frame for frame in screen.at_rest() if frame and "plausibility_warnings" in frame]
     assert remarks["assumed"] == session.machine.assumed.split("; ")
-    assert remarks["doubts"] == doubts(session.machine) != []
+    assert remarks["plausibility_warnings"] == plausibility_warnings(session.machine) != []
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from softstart import InputError
-from softstart.page.jobs import MISTAKE, NICENESS, OUT_OF_MEMORY, Job, Jobs, State
+from softstart.page.jobs import MISTAKE, NICENESS, OUT_OF_MEMORY, Job, Jobs, JobState
 
 HERE = Path(__file__).parent
 
@@ -68,12 +68,12 @@ def test_one_after_another_in_processes_of_low_priority(jobs: Jobs, works: Any, 
     begun = [
         jobs.begin(user, line, works.noted, log, line) for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
     ]
-    until(lambda: begun[0].state is not State.WAITING)
+    until(lambda: begun[0].state is not JobState.WAITING)
     assert [job.ahead for job in begun] == [0, 0, 1]
     assert over(*begun)
     assert Path(log).read_text().split() == ["1", "2", "3"]
     for job in begun:
-        assert (job.state, job.share, job.message) == (State.DONE, 1.0, "half of it")
+        assert (job.state, job.share, job.message) == (JobState.DONE, 1.0, "half of it")
         assert job.error == ""
         pid, niceness, threads = job.result
         assert (pid, niceness, threads) == (job.pid, min(os.nice(0) + NICENESS, 19), "1")
@@ -89,15 +89,15 @@ def test_two_at_once_and_an_end_with_the_last_tab_and_the_server(works: Any, tmp
         other = jobs.begin("B", "2", works.endless, str(tmp_path / "2"))
         waits = jobs.begin("A", "3", works.endless, str(tmp_path / "3"))
         until(lambda: (tmp_path / "1").exists() and (tmp_path / "2").exists())
-        assert waits.state is State.WAITING
+        assert waits.state is JobState.WAITING
         waits.cancel()
-        assert (waits.state, waits.pid, waits.seconds) == (State.CANCELLED, None, 0.0)
+        assert (waits.state, waits.pid, waits.seconds) == (JobState.CANCELLED, None, 0.0)
         jobs.leave("A", "tab")
         until(lambda: first.state.over)
-        assert (first.state, other.state) == (State.CANCELLED, State.RUNNING)
+        assert (first.state, other.state) == (JobState.CANCELLED, JobState.RUNNING)
     finally:
         jobs.end()
-    assert other.state is State.CANCELLED
+    assert other.state is JobState.CANCELLED
     assert not any(alive(job.pid) for job in (first, other) if job.pid)
     with pytest.raises(InputError, match="ending"):
         jobs.begin("A", "late", works.noted, str(tmp_path / "log"), "late")
@@ -107,20 +107,20 @@ def test_cancel_ends_even_a_deaf_process(jobs: Jobs, works: Any, tmp_path: Path)
     endless = jobs.begin("A", "endless", works.endless, str(tmp_path / "started"))
     started = tmp_path / "started"
     until(lambda: started.exists() and len(started.read_text().split()) == 2 and endless.message != "")
-    assert (endless.state, endless.share, endless.message) == (State.RUNNING, None, "without an end")
+    assert (endless.state, endless.share, endless.message) == (JobState.RUNNING, None, "without an end")
     own, other = map(int, started.read_text().split())
     assert endless.pid == own
     assert alive(other)
     os.kill(endless.pid, signal.SIGINT)  # Ctrl-C goes to all processes of a terminal
     time.sleep(0.2)
-    assert endless.state is State.RUNNING
+    assert endless.state is JobState.RUNNING
     endless.cancel()
     until(lambda: endless.state.over)
-    assert endless.state is State.CANCELLED
+    assert endless.state is JobState.CANCELLED
     assert not alive(own)
     until(lambda: not alive(other))  # killed too
     endless.cancel()
-    assert endless.state is State.CANCELLED
+    assert endless.state is JobState.CANCELLED
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_failures_are_sentences(
     with caplog.at_level(logging.ERROR, "softstart.page"):
         job = jobs.begin("A", how, works.failing, how)
         assert over(job)
-    assert job.state is State.FAILED
+    assert job.state is JobState.FAILED
     assert job.result is None
     if sentences is None:
         assert "signal 9" in job.error
@@ -159,7 +159,7 @@ def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
         until(lambda: not alive(dead))
         job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
         assert over(job)
-        assert job.state is State.DONE
+        assert job.state is JobState.DONE
         last = spare(jobs)
     finally:
         jobs.end()

@@ -13,7 +13,7 @@ import pytest
 
 from softstart import DataSheet, Drive, InputError
 from softstart.controller import make_controller
-from softstart.page.jobs import Jobs, State
+from softstart.page.jobs import Jobs, JobState
 from softstart.page.session import Session
 
 pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
@@ -35,7 +35,7 @@ class Hasty:
     """A job that ends in its thread when somebody has looked so often at how often it has changed."""
 
     def __init__(self) -> None:
-        self.state, self.result, self.sentences = State.RUNNING, None, ()
+        self.state, self.result, self.sentences = JobState.RUNNING, None, ()
         self.share, self.message, self.ahead, self.stopping = None, "", 0, False
         self.count, self.looks, self.clock = 1, -1, itertools.count()
 
@@ -48,7 +48,7 @@ class Hasty:
         seen = self.count
         self.looks -= 1
         if self.looks == 0:
-            self.state, self.result = State.DONE, "the result"
+            self.state, self.result = JobState.DONE, "the result"
             self.count += 1
         return seen
 
@@ -91,7 +91,7 @@ def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
     assert other.job is None
     second.begin("another", print)  # one at a time at one place
     assert second.job is job
-    job.state, job.result, job.count = State.DONE, "the result", 2
+    job.state, job.result, job.count = JobState.DONE, "the result", 2
     late = tab("late")  # the page was loaded anew
     for view in (first, second, late, other) * 2:
         view._refresh()
@@ -172,7 +172,7 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     crane = Drive.load("crane-4amtkf")
     session = Session(crane, controllers=["direct"])
     panel = OptimumPanel(session, "A", Jobs())
-    panel._found = tasks.Answer("", controllers={"optimum": make_controller("ramp")})
+    panel._found = tasks.TaskResult("", controllers={"optimum": make_controller("ramp")})
     session.take(Drive.load("hoist-15kw"))
     panel._stale.show_for(crane)
     with pytest.raises(InputError, match="another drive is loaded now: it is not added"):

@@ -34,8 +34,8 @@ from softstart.identification.planning import made_up_log
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
-from softstart.page.panels import grid_of, tunable
-from softstart.page.sentences import changed_since, plain
+from softstart.page.panels import grid_of, tunable_controllers
+from softstart.page.sentences import changed_since, page_sentence
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -54,7 +54,7 @@ class Heard:
         self.parts.append(value)
 
 
-def done(task: Any, *args: Any, **keywords: Any) -> tuple[tasks.Answer, str, list[float]]:
+def done(task: Any, *args: Any, **keywords: Any) -> tuple[tasks.TaskResult, str, list[float]]:
     """The answer of a task that came through a pipe, its text without tags, and the shares that it told."""
     heard = Heard()
     found = pickle.loads(pickle.dumps(task(*args, progress=heard, **keywords)))
@@ -66,7 +66,7 @@ def done(task: Any, *args: Any, **keywords: Any) -> tuple[tasks.Answer, str, lis
     return found, html.unescape(re.sub(r"<[^>]+>", " ", written)), shares
 
 
-def profile_of_file(found: tasks.Answer, suffix: str, folder: Path) -> Any:
+def profile_of_file(found: tasks.TaskResult, suffix: str, folder: Path) -> Any:
     (name,) = [name for name in found.files if name.endswith(suffix)]
     (folder / name).write_text(found.files[name], encoding="utf-8")
     return make_controller("profile", {"file": str(folder / name)})
@@ -120,7 +120,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     alone = identify(Log.load(tmp_path / "rig.csv", torque_is="demand"), drive)
     assert found.drive == alone.drive
     assert Drive.from_toml(found.files["identified-drive.toml"]).gap == found.drive.gap
-    assert all(plain(note) in text for note in alone.notes)
+    assert all(page_sentence(note) in text for note in alone.notes)
 
 
 def test_columns_of_a_log_are_named() -> None:
@@ -131,7 +131,7 @@ def test_columns_of_a_log_are_named() -> None:
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
-    found, text, _ = done(tasks.gentlest, CRANE, "1.2x", "reached")
+    found, text, _ = done(tasks.optimum_task, CRANE, "1.2x", "reached")
     best = optimize(CRANE, 1.2 * simulate(CRANE, "direct").start_time, terminal="reached")
     assert f"{best.k_dyn:.6f}" in text
     assert f"{best.bound.k_dyn:.6f}" in text
@@ -144,7 +144,7 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="no way"), tasks.no_solution_as_sentence():
         raise OptimumError("no way")
     with pytest.raises(InputError, match="start_time"):
-        done(tasks.gentlest, CRANE, "-1", "reached")
+        done(tasks.optimum_task, CRANE, "-1", "reached")
 
 
 def test_the_limit_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,7 +172,7 @@ def test_tuned_gains_come_as_files_and_as_controllers(tmp_path: Path) -> None:
         path = tmp_path / f"{name}-{what}.toml"
         path.write_text(found.files[path.name], encoding="utf-8")
         assert simulate(CRANE, make_controller(str(path))).k_dyn == expected
-    assert name in tunable()
+    assert name in tunable_controllers()
 
 
 @given(st.text(max_size=80), st.sampled_from([".csv", ".toml", ".c", ".html"]))

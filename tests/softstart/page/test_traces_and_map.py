@@ -14,14 +14,14 @@ from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.frames import Screen, channels_at, drawn, landmarks, traces_of
-from softstart.page.machines import STEPS, Scale, axes_about, changed, k_dyn_row
+from softstart.page.machines import STEPS, Scale, axes_about, k_dyn_row, with_typed_changes
 from softstart.page.session import Session
 from softstart.quantities import Units
 
 CRANE = Drive.load("crane-4amtkf")
 CHANNELS = {"u": "u", "T[0]": "T", "theta[0]": "theta", "w[0]": "w1", "w[1]": "w2"}
 CHAIN = Chain.load("crane-4-mass")
-DAMPED = changed(CHAIN, {f"shaft[{i}].damping_ratio": "0.04" for i in (1, 2, 3)})
+DAMPED = with_typed_changes(CHAIN, {f"shaft[{i}].damping_ratio": "0.04" for i in (1, 2, 3)})
 
 
 @pytest.mark.parametrize("controller", ["direct", "state-feedback", "ramp"])
@@ -103,7 +103,7 @@ def test_the_map_is_made_of_simulated_starts(machine, controller, kept):
     for inertia in axes.inertias:
         row = k_dyn_row(machine, made, axes.gaps, inertia, base)
         for gap, k in zip(axes.gaps, row, strict=True):
-            there = machine.moved(gap, inertia)
+            there = machine.with_gap_and_inertia(gap, inertia)
             assert there.gap_and_inertia == (pytest.approx(gap), pytest.approx(inertia))
             assert k == simulate(there, made, fitted_to=base, base=base).k_dyn
 
@@ -132,7 +132,7 @@ def test_the_figures_of_a_chain_are_those_of_simulate():
         assert session.result(name).k_dyn == simulate(now, name).k_dyn
     rows = [row for frame in screen.at_rest() if frame for row in frame.get("rows", ())]
     worn = {row["name"]: row["worn"] for row in rows if "worn" in row}
-    wide = simulate(now.changed(gaps=4.0), "ramp", fitted_to=now, base=now).k_dyn
+    wide = simulate(now.scaled(gaps=4.0), "ramp", fitted_to=now, base=now).k_dyn
     assert worn["ramp"] == wide
     session.undo()
     session.undo()
@@ -187,7 +187,7 @@ def test_a_map_is_computed_again_for_another_stiffness_and_not_for_another_place
     assert not screen.first()["map_is_old"]
     session.set("shaft[1].stiffness", 5000.0)
     assert screen.first()["map_is_old"]
-    closed = changed(CHAIN, {f"shaft[{i}].gap": "0" for i in (1, 2, 3)})
+    closed = with_typed_changes(CHAIN, {f"shaft[{i}].gap": "0" for i in (1, 2, 3)})
     _, screen, _ = screen_of(closed, "direct")  # no gap, no map
     assert not screen.first()["mapped"]
     assert not [frame for frame in screen.at_rest() if frame and "map_row" in frame]

@@ -13,7 +13,7 @@ from typing import Any
 from softstart.errors import InputError, SimulationError
 
 
-def noted(file: str, line: str, *, progress: Any) -> tuple[int, int, str]:
+def collect(file: str, line: str, *, progress: Any) -> tuple[int, int, str]:
     """Write a line; say the process's number, its niceness, and its limit on threads."""
     progress(0.5, "half of it")
     with Path(file).open("a", encoding="utf-8") as stream:

@@ -14,8 +14,8 @@ from softstart.optimal.front import FrontPoint
 from softstart.optimal.problem import Problem
 from softstart.reporting import report
 from softstart.reporting.choice import robustness
-from softstart.reporting.document import answer, for_customer
-from softstart.reporting.limit import Limit, bound_at, limit
+from softstart.reporting.document import for_customer, text_answer
+from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.sheet import Setting
 
 from .conftest import Page
@@ -95,11 +95,11 @@ def test_an_optimum_within_1_percent_of_its_bound_is_proved(hostile, over, prove
     bound = bound_at(hostile.drive, time)
     near = FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=bound * (1.0 + 0.01 * over))
     far = replace(near, k_dyn=1.2 * bound, k_dyn_lower_bound=1.2 * bound / (1.0 + 0.01 * over))
-    every, single, loose = Limit(points=(near,)).proofs(hostile.drive)
+    every, single, loose = OptimumCurve(points=(near,)).proofs(hostile.drive)
     assert (every or loose) == pytest.approx([over], rel=1e-9)
     assert bool(every) == proved
     for kind, certain in (("certificate", proved), ("momentum", False)):
-        every, single, loose = Limit(points=(replace(far, bound_kind=kind),)).proofs(hostile.drive)
+        every, single, loose = OptimumCurve(points=(replace(far, bound_kind=kind),)).proofs(hostile.drive)
         assert (every, single) == ([], [(time, pytest.approx(over, rel=1e-9))] if certain else [])
         assert loose == ([] if certain else [pytest.approx(20.0)])
 
@@ -107,11 +107,11 @@ def test_an_optimum_within_1_percent_of_its_bound_is_proved(hostile, over, prove
 def test_the_lowest_known_takes_no_longer(hostile):
     time, rows = hostile.choice.chosen.run.start_time, hostile.comparison.rows
     quick, slow = (FrontPoint(share * time, "reached", "OPTIMAL", "", k_dyn=share) for share in (0.9, 1.1))
-    both = Limit(points=(slow, quick))
+    both = OptimumCurve(points=(slow, quick))
     assert [both.lowest_known(at * time, ()) for at in (0.8, 1.0, 1.2)] == [None, 0.9, 0.9]
     assert both.lowest_known(0.8 * time, rows) is None
     as_quick = [row.run.k_dyn for row in rows if row.run.start_time <= time]
-    assert Limit().lowest_known(time, rows) == min(as_quick)
+    assert OptimumCurve().lowest_known(time, rows) == min(as_quick)
 
 
 def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(hostile):
@@ -121,8 +121,8 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
 
     def said(words, *, known=1.0, **changes):
         point = FrontPoint(best.run.start_time, "reached", "OPTIMAL", "", k_dyn=known * best.run.k_dyn)
-        made = replace(hostile, limit=Limit(points=(point,)), sheets=(replace(sheet, **changes),))
-        return words in re.split(r" In the [\d.]+ s of ", answer(made))[0]  # what follows is of the ramp
+        made = replace(hostile, limit=OptimumCurve(points=(point,)), sheets=(replace(sheet, **changes),))
+        return words in re.split(r" In the [\d.]+ s of ", text_answer(made))[0]  # what follows is of the ramp
 
     calm = {"rounded": SimpleNamespace(k_dyn=k, start_time=time), "worst_k_dyn": k, "slowest": time}
     for share, told in ((1.049, False), (1.051, True)):

@@ -35,7 +35,7 @@ def test_every_value_stands_in_the_table_of_data(made: Report, name: str) -> Non
         heads, rows, absent = data_of(replace(made, drive=machine))
         cells: dict[str, list[str]] = {row[0]: row for row in rows}
         assert len(cells) == len(rows), what  # each is said of its own part
-        for path, (parameter, value) in machine.by_path().items():
+        for path, (parameter, value) in machine.parameters_by_path().items():
             if isinstance(value, tuple):
                 lists += 1
                 meaning = of_part(machine, path, parameter)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from softstart import Drive
-from softstart.drive.doubts import doubts
+from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import InputError
 from softstart.reporting import Project, document, report
 from softstart.reporting.document import css_string
@@ -82,8 +82,8 @@ def test_a_customer_reads_output_torques_years_and_doubts_and_nothing_that_is_fo
     assert there["inertia of the load at the motor shaft"] == "93.86 kg m²"  # 38² J2
     assert there["total angular gap"] == "0.105263 rad"  # 4 rad at the motor
     assert data["time of operation that the shaft line must last"]["value"] == "2.28"  # years of 8766 h
-    assert doubts(GEARED)
-    for sentence in (*doubts(GEARED), "efficiency 0.95", "damping ratio 0.02"):
+    assert plausibility_warnings(GEARED)
+    for sentence in (*plausibility_warnings(GEARED), "efficiency 0.95", "damping ratio 0.02"):
         assert sentence in text
     assert re.findall(r"--\w+|\[limits|[Gg]ive |softstart (?:compare|pareto|serve|optimize)", text) == []
     assert "times what is permitted" in text

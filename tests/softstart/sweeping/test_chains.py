@@ -5,7 +5,7 @@ import pytest
 
 from softstart import InputError, Status, simulate, sweep
 from softstart.chain import Chain
-from softstart.start.batch import named
+from softstart.start.batch import figure_columns
 
 CHAIN = Chain.from_toml(
     Chain.load("crane-4-mass").to_toml(),
@@ -50,7 +50,7 @@ def test_any_mass_shaft_gap_load_and_position():
 
 def test_samples_and_parameters_of_the_controller_set_up_for_another_chain():
     sample = {"shaft[1].gap": [0.05, 0.3, 0.1], "load.torque": [100.0, 143.2, 0.0]}
-    nominal = CHAIN.changed(gaps=1.5)
+    nominal = CHAIN.scaled(gaps=1.5)
     grid = {"sample": sample, "controller.time": ["50 ms", "0.2 s"]}
     results = sweep(CHAIN, "s-curve", grid, fitted_to=nominal, workers=1)
     assert results.shaft_1_gap.values.tolist() == sample["shaft[1].gap"]
@@ -58,7 +58,7 @@ def test_samples_and_parameters_of_the_controller_set_up_for_another_chain():
 
 
 def test_figures_of_a_chain_are_named():
-    known = named(CHAIN.shaft_names)
+    known = figure_columns(CHAIN.shaft_names)
     assert {"k_dyn_3", "peak_torque_1", "used_torque", "margin", "gap_events"} <= set(known)
     results = sweep(CHAIN, "direct", {"gap": ["1x"]}, figures=["peak_torque_2", "used_torque"], workers=1)
     run = simulate(CHAIN, "direct")

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart.sweeping.grid import Plan
+from softstart.sweeping.grid import ChunkGrid
 
 SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 
@@ -16,7 +16,7 @@ SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 @given(SHAPES, st.integers(1, 50), st.integers(0, 15))
 def test_chunks_part_the_grid(shape, most, singles):
     single = [bool(singles >> i & 1) for i in range(len(shape))]
-    plan = Plan.of(shape, single, most)
+    plan = ChunkGrid.of(shape, single, most)
     counted = np.zeros(plan.shape, dtype=int)
     for index in plan.indices():
         place = plan.place(index)
@@ -27,7 +27,7 @@ def test_chunks_part_the_grid(shape, most, singles):
 
 
 def test_chunks_of_a_grid_beyond_all_memory_are_found_at_once():
-    plan = Plan.of([10_000] * 4, [False] * 4)
+    plan = ChunkGrid.of([10_000] * 4, [False] * 4)
     assert plan.starts == 10**16
     assert math.prod(plan.chunk) <= 16_384
     last = plan.place([count - 1 for count in plan.counts])
@@ -37,6 +37,6 @@ def test_chunks_of_a_grid_beyond_all_memory_are_found_at_once():
 
 @given(st.integers(1, 10**12))
 def test_small_grids_have_work_for_many(size):
-    plan = Plan.of([size], [False])
+    plan = ChunkGrid.of([size], [False])
     assert plan.chunk[0] <= 16_384
     assert math.prod(plan.counts) >= min(64, size // 1024)

@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, Status, records, simulate, sweep
 from softstart.controller import make_controller, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
-from softstart.start.batch import named
+from softstart.start.batch import figure_columns
 from softstart.start.recommendation import Row
 from softstart.sweeping.summary import summarise
-from softstart.views.sweeps import conclusion, sweep_figure
+from softstart.views.sweeps import sweep_conclusion, sweep_figure
 
 CRANE = Drive.load("crane-4amtkf").replace(
     torque_lag="2 ms", damping=0.3, permissible_torque=130.0, permissible_start_time=0.5
 )
-FIGURES = tuple(named(("",)))
+FIGURES = tuple(figure_columns(("",)))
 POOL = {
     "gap": [0.03, 0.5, 3.1],
     "load.inertia": ["700 kg*cm^2", 0.2],
@@ -111,7 +111,9 @@ def test_only_limits_make_a_margin():
     assert margins[0] == 1.0 - peak / 80.0
     assert margins[2] == 1.0  # no limit, nothing used
     assert 0.0 < summarise(found).share_kept < 1.0
-    assert "the limits of shaft torque and start time, least margin -" in conclusion(found, summarise(found))
+    assert "the limits of shaft torque and start time, least margin -" in sweep_conclusion(
+        found, summarise(found)
+    )
     assert sweep_figure(found, "margin") is not None
     assert "margin" not in sweep(free, "direct", {"gap": [0.5]}, workers=1)
     with pytest.raises(InputError, match="figures = margin: the drive has no limits that it could refer to"):

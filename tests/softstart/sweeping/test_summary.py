@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import Drive, Status, simulate, sweep
-from softstart.sweeping.entry import Progress
+from softstart.sweeping.entry import SweepProgress
 from softstart.sweeping.summary import SHARES, spread, summarise
 from softstart.views.sweeps import pace, sweep_figure
 
@@ -95,5 +95,7 @@ def test_starts_without_a_figure_leave_a_hole():
 
 
 def test_one_start_is_no_starts():
-    assert pace(Progress(1, 1, 0, 0.01)) == "1 start; 100 starts/s in 0.0 s."
-    assert pace(Progress(4000, 4000, 500, 2.0)).startswith("4,000 starts, of which 500 were finished before")
+    assert pace(SweepProgress(1, 1, 0, 0.01)) == "1 start; 100 starts/s in 0.0 s."
+    assert pace(SweepProgress(4000, 4000, 500, 2.0)).startswith(
+        "4,000 starts, of which 500 were finished before"
+    )

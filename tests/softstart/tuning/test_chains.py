@@ -41,7 +41,9 @@ def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
     found.to_toml(schedule)
     found.to_toml(robust, "robust")
     for cell in np.ndindex(2, 2):
-        chain = DAMPED.moved(found.question.gaps[cell[0]], found.question.load_inertias[cell[1]])
+        chain = DAMPED.with_gap_and_inertia(
+            found.question.gaps[cell[0]], found.question.load_inertias[cell[1]]
+        )
         assert float(found.schedule.k_dyn[cell]) == simulate(chain, str(schedule)).k_dyn
         assert float(found.robust.cells.k_dyn[cell]) == simulate(chain, str(robust), base=chain).k_dyn
     assert found.price is not None
@@ -55,4 +57,4 @@ def test_gaps_and_inertias_of_a_chain():
     # 0.031 kg m2 at the shaft of the crane, which turns twenty times slower
     assert inertias_of(CHAIN, "5 J1") == (62.0,)
     with pytest.raises(InputError, match="no gap that could be widened"):
-        gaps_of(CHAIN.changed(gaps=0.0), ["0.5"])
+        gaps_of(CHAIN.scaled(gaps=0.0), ["0.5"])

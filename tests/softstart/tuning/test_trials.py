@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, simulate
 from softstart.chain import Chain
 from softstart.controller import make_controller
-from softstart.tuning.question import Question, recipe_of, scenarios_of
+from softstart.tuning.question import TuningProblem, recipe_of, tuning_scenarios
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
@@ -20,11 +20,11 @@ def trials(name, drive=CRANE, tolerances=None, robust=False, **change):
     recipe = recipe_of(name)
     asked = {
         "drive": drive, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
-        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(drive, tolerances),
+        "ranges": ranges_of(recipe.make(), None), "scenarios": tuning_scenarios(drive, tolerances),
         "metric": "k_dyn", "start_time": None, "quantile": 1.0, "seed": 0, "restarts": 1,
         "population": 8, "generations": 2,
     }  # fmt: skip
-    return Trials(Question(**(asked | change)), robust)
+    return Trials(TuningProblem(**(asked | change)), robust)
 
 
 UNKNOWN = CHAIN.with_values({"start_position": "unknown"})
@@ -51,7 +51,9 @@ def test_each_candidate_is_the_start_that_simulate_makes(name, machine, toleranc
         one = tried.question.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
         for s, scenario in enumerate(tried.question.scenarios):
-            off = one.with_values({key: level.of(one.knob(key).value) for key, level in scenario.items()})
+            off = one.with_values(
+                {key: level.of(one.parameter_value(key).value) for key, level in scenario.items()}
+            )
             run = simulate(off, controller, fitted_to=one, base=one)
             assert judged.metric[k, s] == run.k_dyn
             assert judged.start_time[k, s] == run.start_time or np.isnan(run.start_time)
@@ -114,18 +116,18 @@ def test_the_users_ranges():
 
 def test_all_combinations_or_a_sample_of_them():
     three = {"stiffness": "10 %", "load_torque": "1 N*m", "encoder_phase": [0.0, 0.25, 0.5]}
-    found = scenarios_of(CRANE, three)
+    found = tuning_scenarios(CRANE, three)
     assert found[0] == {}
     assert len(found) == 1 + 2 * 2 * 3
     phases = {one["encoder_phase"].of(0.7) for one in found[1:]}
     assert phases == {0.0, 0.25, 0.5}
     assert {round(one["load_torque"].of(7.16), 9) for one in found[1:]} == {6.16, 8.16}
-    more = scenarios_of(CRANE, three | {"motor_inertia": "5 %", "torque_lag": ["1 ms", "3 ms"]}, seed=1)
+    more = tuning_scenarios(CRANE, three | {"motor_inertia": "5 %", "torque_lag": ["1 ms", "3 ms"]}, seed=1)
     assert len(more) == 17
     shares = np.array([one["stiffness"].of(1.0) for one in more[1:]])
     assert np.all((shares >= 0.9) & (shares <= 1.1))
     assert np.array_equal(np.sort(np.floor((shares - 0.9) / 0.2 * 16)), np.arange(16))  # one in each stratum
     assert {one["torque_lag"].of(0.0) for one in more[1:]} == {0.001, 0.003}
-    assert more == scenarios_of(
+    assert more == tuning_scenarios(
         CRANE, three | {"motor_inertia": "5 %", "torque_lag": ["1 ms", "3 ms"]}, seed=1
     )

@@ -13,7 +13,7 @@ from softstart import Command, Drive, InputError, PlainController, optimize, sim
 from softstart.controller import controller_class, controller_names, make_controller, parameter
 from softstart.parallel import Pool
 from softstart.start.recommendation import Row
-from softstart.tuning.ranges import tunable
+from softstart.tuning.ranges import tunable_parameters
 from softstart.tuning.trials import Trials
 from softstart.views.tuning import conclusions
 
@@ -27,7 +27,9 @@ class StopError(Exception):
 
 
 TUNABLE = [
-    name for name in controller_names() if not controller_class(name).needs and tunable(make_controller(name))
+    name
+    for name in controller_names()
+    if not controller_class(name).needs and tunable_parameters(make_controller(name))
 ]
 
 
@@ -109,12 +111,12 @@ def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
     parts = []
     results = Pool.results
 
-    def noted(pool, *arguments):
+    def collect(pool, *arguments):
         for one, found in results(pool, *arguments):
             parts.append((pool.count, pool.threads))
             yield one, found
 
-    monkeypatch.setattr(Pool, "results", noted)
+    monkeypatch.setattr(Pool, "results", collect)
     if not threads:
         monkeypatch.setattr("softstart.tuning.solving.Pool", lambda *count, **asked: Pool(2))
     shared = tune(CRANE, "ramp", **GRID, **(SMALL | {"workers": 2}), **SURE)

@@ -58,7 +58,7 @@ export class Instrument {
   // numbers are shown at once; pictures wait for the next refresh of the screen, where only the newest counts
   take(number, frame) {
     const { state } = this;
-    const { order, rows = [], traces = {}, figure, fields, mistakes, recommendation, doubts, assumed, drive } = frame;
+    const { order, rows = [], traces = {}, figure, fields, mistakes, recommendation, plausibility_warnings, assumed, drive } = frame;
     for (const row of rows) state.rows.set(row.name, row);
     for (const [name, packed] of Object.entries(traces)) {
       if (packed) state.traces.set(name, packed);
@@ -88,8 +88,8 @@ export class Instrument {
       put(this.advice, recommendation);
       this.advice.classList.remove("old");
       this.table.rest();
-      const texts = [...doubts, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
-      this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < doubts.length ? "doubt" : "" }, text)));
+      const texts = [...plausibility_warnings, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
+      this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < plausibility_warnings.length ? "doubt" : "" }, text)));
     }
     if (frame.keep) this.keep(frame.keep);
     this.map.take(frame);

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from softstart.drive.checks import GRAVITY, elastic_frequency
 
-__all__ = ["TwoMasses", "doubts", "doubts_of_motion"]
+__all__ = ["TwoMasses", "motion_warnings", "plausibility_warnings"]
 
 # usual speeds of the load, m/min; lifts, which have a counterweight, are faster
 USUAL_SPEEDS = {"hoist": (0.5, 150.0), "travel": (1.0, 300.0), "belt": (1.0, 480.0)}
@@ -48,7 +48,7 @@ class TwoMasses(NamedTuple):
         return "active" if self.active else "reactive"
 
 
-def doubts(machine: Any) -> list[str]:
+def plausibility_warnings(machine: Any) -> list[str]:
     """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; its damping ratio at most 1; gap at most half a turn of the
@@ -59,18 +59,20 @@ def doubts(machine: Any) -> list[str]:
 
     >>> from softstart.drive import Drive
     >>> crane = Drive.load("crane-4amtkf")
-    >>> doubts(crane)
+    >>> plausibility_warnings(crane)
     []
-    >>> doubts(crane.replace(target_speed=1460))[0][:25]
+    >>> plausibility_warnings(crane.replace(target_speed=1460))[0][:25]
     'speed 13,942 rpm, where m'
     """
     return [
-        *_doubts(machine.lumped), *_not_the_rated_torque(machine.motor), *_permits_anything(machine),
+        *_doubts(machine.lever_rule_model),
+        *_not_the_rated_torque(machine.motor),
+        *_permits_anything(machine),
         *_nothing_holds(machine),
     ]  # fmt: skip
 
 
-def doubts_of_motion(
+def motion_warnings(
     machine: str, speed: float, acceleration: float, sine: float, balanced: bool
 ) -> Iterator[str]:
     """Sentences on how the load of a data sheet moves: `speed` in m/s, mean `acceleration` in m/s2.
@@ -78,9 +80,9 @@ def doubts_of_motion(
     `sine` is that of the slope; `balanced` says that there is a counterweight. Driven wheels transmit
     m (a + g sin) of the weight m g cos that they carry, at most: all of it if every wheel is driven.
 
-    >>> [one[:52] for one in doubts_of_motion("travel", 0.61, 1.5, 0.0, False)]
+    >>> [one[:52] for one in motion_warnings("travel", 0.61, 1.5, 0.0, False)]
     ['mean acceleration 1.5 m/s^2 needs 0.153 of the weigh']
-    >>> [one[:27] for one in doubts_of_motion("belt", 25.0, 1.5, 0.0, False)]
+    >>> [one[:27] for one in motion_warnings("belt", 25.0, 1.5, 0.0, False)]
     ['speed of the load 1,500 m/m']
     """
     low, high = USUAL_SPEEDS.get(machine, (0.0, math.inf))
@@ -199,7 +201,7 @@ def _permits_anything(machine: Any) -> Iterator[str]:
 
 def _nothing_holds(machine: Any) -> Iterator[str]:
     """The start begins in a state that cannot last, and nobody said that it does."""
-    two = machine.lumped
+    two = machine.lever_rule_model
     falls = two.falling > 0.0 and machine.brake == "none"
     at_rest = machine.initial_load_speed == machine.initial_motor_speed == 0.0
     if falls and at_rest and not machine.position_given:
