@@ -116,7 +116,7 @@ class State:
     angles: Vector  # of the samples that `free` has not seen yet
     means: Vector
     leads: Vector
-    plausibility_warnings: Vector
+    contact_noises: Vector
     sent: Vector
 
 
@@ -276,18 +276,18 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float
     h = p.period
     kept = int(m.kept)
     if kept == int(p.samples):
-        free_predict(m.free, m.means[0], m.leads[0], h, p.free_noise + m.plausibility_warnings[0])
+        free_predict(m.free, m.means[0], m.leads[0], h, p.free_noise + m.contact_noises[0])
         free_update(m.free, m.angles[0], p.rounding)
         kept -= 1
         for i in range(kept):
             m.angles[i] = m.angles[i + 1]
             m.means[i] = m.means[i + 1]
             m.leads[i] = m.leads[i + 1]
-            m.plausibility_warnings[i] = m.plausibility_warnings[i + 1]
+            m.contact_noises[i] = m.contact_noises[i + 1]
     m.angles[kept] = angle
     m.means[kept] = mean
     m.leads[kept] = early
-    m.plausibility_warnings[kept] = doubt
+    m.contact_noises[kept] = doubt
     m.kept = kept + 1.0
     free_after(p, m, kept + 1)
 
@@ -297,7 +297,7 @@ def free_after(p: Parameters, m: State, samples: int) -> None:
     """The free motor so many samples after the filter."""
     copy(m.free, m.now)
     for i in range(samples):
-        noise = p.free_noise + m.plausibility_warnings[i]
+        noise = p.free_noise + m.contact_noises[i]
         free_predict(m.now, m.means[i], m.leads[i], p.period, noise)
 
 
@@ -387,7 +387,7 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     first = kept - again
     shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
     for i in range(first, kept):
-        update_shaft_filter(p, m, m.angles[i], m.means[i], m.leads[i], m.plausibility_warnings[i])
+        update_shaft_filter(p, m, m.angles[i], m.means[i], m.leads[i], m.contact_noises[i])
 
 
 @inner
