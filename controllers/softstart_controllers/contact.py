@@ -121,7 +121,7 @@ class State:
 
 
 PARTS: Any = {"free": FREE, "now": FREE, "shaft": SHAFT}
-PARTS |= dict.fromkeys(("angles", "means", "leads", "doubts"), RING) | {"sent": QUEUE}
+PARTS |= dict.fromkeys(("angles", "means", "leads", "contact_noises"), RING) | {"sent": QUEUE}
 PARAMETERS, STATE = record(Parameters), record(State, **PARTS)
 
 

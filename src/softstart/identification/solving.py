@@ -123,15 +123,15 @@ def identify(
     minima = fitter.search(searches)
     fitter.progress("weights and fit")
     best, others = fitter.refined(minima[0][0]), list[Point]()
-    plausibility_warnings = misfits(fitter, best)
-    if not plausibility_warnings:
+    misfit_warnings = misfits(fitter, best)
+    if not misfit_warnings:
         seek, best = _untold(fitter, best), fitter.valued(best, best)
         if seek:
             fitter.progress("other explanations")
             best, others = fitter.explanations(best)
-        plausibility_warnings = misfits(fitter, best)
+        misfit_warnings = misfits(fitter, best)
     estimates = (
-        _without_intervals(unknowns, best.x) if plausibility_warnings else _estimates(fitter, best, others)
+        _without_intervals(unknowns, best.x) if misfit_warnings else _estimates(fitter, best, others)
     )
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     source = f"identified from {', '.join(one.name for one in read)}"
@@ -139,7 +139,7 @@ def identify(
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *_left_out(machine),
-        *(plausibility_warnings or _unknown(estimates)),
+        *(misfit_warnings or _unknown(estimates)),
         *_other_scale(drive, found),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
