@@ -601,7 +601,7 @@ def contact_undetectable(drive: Drive, coarse: float, slow: float = math.inf) ->
     time to Ms) later than `slow` sqrt(J1/c).
 
     >>> [contact_undetectable(Drive.load("crane-4amtkf"), coarse, 1.3) for coarse in (0.04, 0.002)]
-    (False, True)
+    [False, True]
     """
     late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
     return encoder_count(drive) > coarse * drive.Ms / drive.c or late * math.sqrt(drive.c / drive.J1) > slow

@@ -190,7 +190,7 @@ class TakeUp(CompiledController):
 
         u = clip(low + (full_torque - low) s - D1 (w1 - w2) - D2 T'/c, 0, Ms),   D = 2 zeta J1 Omega
 
-    zeta is `loop_damping` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
+    zeta is `damping_ratio` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
     ahead of the load in a gap that is still open. w2 is the estimated speed of the load: it begins at
     w1 - T'/c, accelerates by (T - Mc)/J2 and follows w1 by a loop of the bandwidth `corner`, so that a wrong
     J2 does not matter. It falls back no more. The start takes longer where D1 holds the motor back.
@@ -205,7 +205,7 @@ class TakeUp(CompiledController):
 
     >>> from softstart import simulate
     >>> from softstart.chain import Chain
-    >>> damped = {f"shaft[{k}].loop_damping": 0.02 for k in (1, 2, 3)}
+    >>> damped = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
     >>> chain = Chain.load("crane-4-mass", also=damped)
     >>> [round(simulate(chain, name).k_dyn, 1) for name in ("take-up", "pulse-coast-hold")]
     [1.1, 1.8]

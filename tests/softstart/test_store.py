@@ -116,9 +116,9 @@ def test_a_part_of_another_computation_is_no_part(path):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
 def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
     code = (
-        "import resource, sys; from pathlib import Path; from softstart.store import Records, Target\n"
+        "import resource, sys; from pathlib import Path; from softstart.store import PartStore, Target\n"
         "target = Target('save_to', Path(sys.argv[1]), 'tuning')\n"
-        f"with Records(target, {INPUTS}, ['cell', 'restart']) as kept:\n"
+        f"with PartStore(target, {INPUTS}, ['cell', 'restart']) as kept:\n"
         "    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
         "    for k in range(4, 999):\n"
         "        kept.add({'cell': k, 'restart': 0, 'text': 999 * 'x'})\n"
@@ -132,9 +132,9 @@ def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
 HOLDER = """
 import sys
 from pathlib import Path
-from softstart.store import Records, Target, fresh_folder
+from softstart.store import PartStore, Target, fresh_folder
 path = Path(sys.argv[1])
-with fresh_folder(path.parent), Records(Target("save_to", path, "tuning"), {}, ["cell"]) as kept:
+with fresh_folder(path.parent), PartStore(Target("save_to", path, "tuning"), {}, ["cell"]) as kept:
     kept.add({"cell": 1})
     print("held", flush=True)
     sys.stdin.read()

@@ -99,7 +99,7 @@ def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
     """Name, factor and unit of the columns as people write them.
 
     >>> asked_columns({"speed": "-n_act [rpm]", "angle": "1/4096 * pos[turn]"})["angle"]
-    Asked(name='pos', factor=0.000244140625, unit='turn')
+    WantedColumn(name='pos', factor=0.000244140625, unit='turn')
     """
     number = r"(?:[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)"
     form = rf"\s*(-?)\s*(?:({number})\s*(?:/\s*({number}))?\s*\*)?\s*(.+?)\s*(?:\[([^\]]*)\])?\s*"

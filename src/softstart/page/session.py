@@ -286,7 +286,7 @@ class Session:
         >>> session = Session()
         >>> session.select("ramp")
         >>> session.set_parameter("time", "200 ms")
-        >>> session.controllers["ramp"].time, session.with_typed_changes
+        >>> session.controllers["ramp"].time, session.changed
         (0.2, ('ramp',))
         """
         controller = changed_controller(self.controllers[self.selected], {name: value})

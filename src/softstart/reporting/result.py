@@ -182,7 +182,7 @@ class Report:
         """The recommendation, what the steps of the inverter do to it, and what no start can go below.
 
         >>> from softstart import report
-        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).text_answer[-49:]
+        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-49:]
         ' below 0.977; the gentlest start known has 0.978.'
         """
         from softstart.reporting.document import text_answer  # which renders a Report

@@ -153,9 +153,9 @@ STUCK = """
     import ctypes
     from pathlib import Path
     from softstart.parallel import Worker
-    from softstart.store import Records, Target, fresh_folder
+    from softstart.store import PartStore, Target, fresh_folder
     worker = Worker()
-    with Records(Target("to", Path("kept"), "test"), {{}}, []), fresh_folder(Path(".")):
+    with PartStore(Target("to", Path("kept"), "test"), {{}}, []), fresh_folder(Path(".")):
         print(worker.pid, sorted(path.name for path in Path(".").iterdir()), file=sys.stderr, flush=True)
         os.kill(os.getpid(), signal.{name})
         for _ in range(3):  # as compiled code does: no instruction of Python in between

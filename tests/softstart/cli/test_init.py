@@ -221,7 +221,7 @@ def test_a_machine_is_the_same_by_every_way_in(run, monkeypatch, place, typed, b
     """Prompt, --set, data sheet given to a command, form, and Python."""
     asks = []
     question = asking.prompt_text
-    monkeypatch.setattr(asking, "question", lambda p, *rest: asks.append(p) or question(p, *rest))
+    monkeypatch.setattr(asking, "prompt_text", lambda p, *rest: asks.append(p) or question(p, *rest))
     dialog = types.SimpleNamespace(isatty=lambda: True, readline=lambda: f"{typed.get(asks[-1].path, '')}\n")
     monkeypatch.setattr(sys, "stdin", dialog)
     assert run("init", "--out", "asked.toml").code == 0

@@ -66,7 +66,7 @@ def over(*jobs: Job) -> bool:
 def test_one_after_another_in_processes_of_low_priority(jobs: Jobs, works: Any, tmp_path: Path) -> None:
     log = str(tmp_path / "log")
     begun = [
-        jobs.begin(user, line, works.noted, log, line) for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
+        jobs.begin(user, line, works.collect, log, line) for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
     ]
     until(lambda: begun[0].state is not JobState.WAITING)
     assert [job.ahead for job in begun] == [0, 0, 1]
@@ -100,7 +100,7 @@ def test_two_at_once_and_an_end_with_the_last_tab_and_the_server(works: Any, tmp
     assert other.state is JobState.CANCELLED
     assert not any(alive(job.pid) for job in (first, other) if job.pid)
     with pytest.raises(InputError, match="ending"):
-        jobs.begin("A", "late", works.noted, str(tmp_path / "log"), "late")
+        jobs.begin("A", "late", works.collect, str(tmp_path / "log"), "late")
 
 
 def test_cancel_ends_even_a_deaf_process(jobs: Jobs, works: Any, tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
         jobs.warm()
         os.kill(dead := spare(jobs), signal.SIGKILL)
         until(lambda: not alive(dead))
-        job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
+        job = jobs.begin("A", "quick", works.collect, str(tmp_path / "log"), "quick")
         assert over(job)
         assert job.state is JobState.DONE
         last = spare(jobs)
