@@ -130,9 +130,7 @@ def identify(
             fitter.progress("other explanations")
             best, others = fitter.explanations(best)
         misfit_warnings = misfits(fitter, best)
-    estimates = (
-        _without_intervals(unknowns, best.x) if misfit_warnings else _estimates(fitter, best, others)
-    )
+    estimates = _without_intervals(unknowns, best.x) if misfit_warnings else _estimates(fitter, best, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     source = f"identified from {', '.join(one.name for one in read)}"
     found = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))

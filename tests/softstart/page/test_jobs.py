@@ -66,7 +66,8 @@ def over(*jobs: Job) -> bool:
 def test_one_after_another_in_processes_of_low_priority(jobs: Jobs, works: Any, tmp_path: Path) -> None:
     log = str(tmp_path / "log")
     begun = [
-        jobs.begin(user, line, works.collect, log, line) for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
+        jobs.begin(user, line, works.collect, log, line)
+        for user, line in (("A", "1"), ("A", "2"), ("B", "3"))
     ]
     until(lambda: begun[0].state is not JobState.WAITING)
     assert [job.ahead for job in begun] == [0, 0, 1]
