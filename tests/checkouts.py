@@ -3,6 +3,7 @@
     python tests/checkouts.py OLD NEW                   every number must be equal
     python tests/checkouts.py OLD NEW --rtol 1e-9       where arithmetic changes
     python tests/checkouts.py OLD NEW --only starts optima
+    python tests/checkouts.py OLD NEW --renamed tests/renames.toml
 
 Each part runs in a process of its own for each checkout, with that checkout's sources first on the path, and
 uses nothing but the names in `softstart.__all__` and the commands, so that it outlives any change of layout.
@@ -10,12 +11,18 @@ A difference is relative to the value, or to the largest of the array that it st
 units if that is more. Traces are taken at the same 101 instants of both runs; texts and written tables (CSV,
 TOML) are compared number by number too. Every larger difference is listed, the largest first, those of one
 array in one line. Computing times and versions are left out. Exit code 1 if any is listed.
+
+`--renamed TABLE` names a TOML file with the tables `json` (keys of results), `parameters` (of controllers)
+and `python` (names of the API), each `old = "new"`; "" is a key that is gone. This file uses the new names;
+the old checkout is called by the old ones. Texts with other words and equal numbers are then counted only.
+A checkout with a `.venv` of its own runs in that, with its entry points.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import inspect
 import io
 import json
 import math
@@ -24,7 +31,8 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -173,14 +181,49 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, str | bool | int | float | None) else str(value)
 
 
-def results_of(checkout: Path, part: str) -> dict[str, Any]:
-    """The results of one part on a checkout."""
+def table_of_names(path: Path | None) -> dict[str, str]:
+    """Old names and the new ones, of keys, parameters and Python."""
+    tables = {} if path is None else tomllib.loads(path.read_text(encoding="utf-8"))
+    # `Run.told` is the attribute `told`, whatever class it is of
+    return {
+        old.rpartition(".")[2]: new.rpartition(".")[2]
+        for table in tables.values()
+        for old, new in table.items()
+    }
+
+
+def call_by_old_names(names: dict[str, str]) -> None:
+    """Define the parts again as an older checkout knows them: each new name of the API is the old one."""
+    for function in (run_of, starts, optima, commands):
+        source = inspect.getsource(function)
+        for old, new in names.items():
+            source = re.sub(rf"\b{new}\b", old, source) if new else source
+        exec(compile(source, function.__name__, "exec"), globals())
+    PARTS.update(starts=globals()["starts"], optima=globals()["optima"], commands=globals()["commands"])
+
+
+def results_of(checkout: Path, part: str, renamed: Path | None = None) -> dict[str, Any]:
+    """The results of one part on a checkout; of an older one by the old names of the table `renamed`."""
     path = os.pathsep.join(str(checkout.resolve() / root) for root in ("src", "controllers", "studies"))
     environment = os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"}
-    words = [sys.executable, str(Path(__file__).resolve()), "--part", part]
+    python = checkout.resolve() / ".venv" / "bin" / "python"
+    words = [
+        str(python if python.exists() else sys.executable),
+        str(Path(__file__).resolve()),
+        "--part",
+        part,
+    ]
+    words += [] if renamed is None else ["--renamed", str(renamed.resolve())]
     run = subprocess.run(words, env=environment, cwd="/", stdout=subprocess.PIPE, text=True, check=False)
     found = dict(map(json.loads, run.stdout.splitlines()))
     return found | ({"exit code": f"{run.returncode} on {checkout}"} if run.returncode else {})
+
+
+def same_form(old: str, new: str, renamed: Mapping[str, str] | None) -> bool:
+    """Whether two texts have the same words; or, with names `renamed`, as many numbers between theirs."""
+    if renamed is None:
+        return NUMBER.split(old) == NUMBER.split(new)
+    return len(NUMBER.findall(old)) == len(NUMBER.findall(new)) and "(none)" not in (old, new)
 
 
 def numeric(value: Any) -> bool:
@@ -188,24 +231,42 @@ def numeric(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
+def by_new_keys(old: dict[str, Any], new: dict[str, Any], renamed: Mapping[str, str]) -> dict[str, Any]:
+    """`old` with the keys of `new`, where the table says which those are; without those that are gone.
+
+    >>> by_new_keys({"doubts": 1, "k_dyn": 2, "gone": 3}, {"warnings": 1}, {"doubts": "warnings", "gone": ""})
+    {'warnings': 1, 'k_dyn': 2}
+    """
+    keys = {key: key if key in new else renamed.get(key, key) for key in old}
+    return {keys[key]: value for key, value in old.items() if keys[key]}
+
+
 def compared(
-    old: Any, new: Any, place: str = "", scale: float = SMALL
-) -> Iterator[tuple[str, Any, Any, float]]:
+    old: Any, new: Any, place: str = "", scale: float = SMALL, renamed: Mapping[str, str] | None = None
+) -> Compared:
     """Each value: its place, the old one, the new one, and how large the difference is in relative terms.
+
+    Texts that differ in words alone are -1 apart where names are `renamed`.
 
     >>> [one[3] for one in compared([0.0, 100.0], [0.5, 100.0])]
     [0.005, 0.0]
+    >>> [one[3] for one in compared({"told": "2 rad"}, {"drive": "2 rad!"}, renamed={"told": "drive"})]
+    [-1.0, 0.0]
     """
     if isinstance(old, dict) and isinstance(new, dict):
+        old = by_new_keys(old, new, renamed or {})
         for key in {**old, **new}:
-            yield from compared(old.get(key, "(none)"), new.get(key, "(none)"), f"{place}.{key}")
+            values = old.get(key, "(none)"), new.get(key, "(none)")
+            yield from compared(*values, f"{place}.{key}", renamed=renamed)
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         largest = max((abs(v) for v in (*old, *new) if numeric(v)), default=0.0)
         for index, (one, other) in enumerate(zip(old, new, strict=True)):
-            yield from compared(one, other, f"{place}[{index}]", max(largest, SMALL))
+            yield from compared(one, other, f"{place}[{index}]", max(largest, SMALL), renamed)
     elif numeric(old) and numeric(new):
         yield place, old, new, abs(old - new) / max(scale, abs(old), abs(new))
-    elif isinstance(old, str) and isinstance(new, str) and NUMBER.split(old) == NUMBER.split(new):
+    elif isinstance(old, str) and isinstance(new, str) and same_form(old, new, renamed):
+        if NUMBER.split(old) != NUMBER.split(new):
+            yield place, old, new, -1.0
         for one, other in zip(NUMBER.findall(old), NUMBER.findall(new), strict=True):
             yield from compared(float(one), float(other), place)
     else:
@@ -219,9 +280,13 @@ def main() -> int:
     parser.add_argument("checkouts", nargs="*", type=Path, metavar="OLD NEW")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
     parser.add_argument("--rtol", type=float, default=0.0, help="relative difference that is no difference")
+    parser.add_argument("--renamed", type=Path, metavar="TABLE", help="old and new names, a TOML file")
     parser.add_argument("--part", help=argparse.SUPPRESS)
     given = parser.parse_args()
+    names = table_of_names(given.renamed)
     if given.part:
+        if names:
+            call_by_old_names(names)
         out = sys.stdout
         with contextlib.redirect_stdout(sys.stderr):
             for label, value in PARTS[given.part]():
@@ -232,10 +297,12 @@ def main() -> int:
     differing: dict[str, tuple[float, str]] = {}
     for part in given.only:
         with ThreadPoolExecutor() as pool:
-            before, after = pool.map(results_of, given.checkouts, (part, part))
-        values = list(compared(before, after, part))
+            before, after = pool.map(results_of, given.checkouts, (part, part), (given.renamed, None))
+        values = list(compared(before, after, part, renamed=names if given.renamed else None))
         above = [one for one in values if not one[3] <= given.rtol]
-        print(f"{part}: {len(before)} results, {len(values)} values, {len(above)} differ", flush=True)
+        reworded = sum(one[3] < 0.0 for one in values)
+        line = f"{part}: {len(before)} results, {len(values)} values, {len(above)} differ"
+        print(line + (f", {reworded} texts with other words" if reworded else ""), flush=True)
         for place, one, other, size in above:
             line = f"{place}: {str(one)[:200]} -> {str(other)[:200]}"
             name = re.sub(r"\[\d+\]", "", place)
