@@ -20,6 +20,7 @@ from softstart.controller import Measured as Measured
 from softstart.controller import PlainController as PlainController
 from softstart.controller import Sensor as Sensor
 from softstart.drive import Drive as Drive
+from softstart.drive import Machine as Machine
 from softstart.drive.data_sheet import DataSheet as DataSheet
 from softstart.drive.records import Records as Records
 from softstart.errors import InputError as InputError

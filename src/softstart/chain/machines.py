@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softstart.chain.model import Chain, load_machine
-from softstart.drive import Drive
+from softstart.drive import Drive, Machine
 from softstart.drive.checks import BROADCAST
 from softstart.drive.records import Columns, Records
 from softstart.errors import InputError
@@ -19,16 +19,15 @@ from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, read_value
 from softstart.quantities import RefusedError, parse, show
 
-Machine = Drive | Chain
 MachineLike = Machine | str | os.PathLike[str]  # one, or its name or file
 SINGLE = "records: all fields are single values; give a list for one, as gap=[0.5, 2.0]."
 Values = dict[str, tuple[Parameter, Any]]  # by path
 
 
-def one_machine(given: MachineLike, name: str = "drive") -> Machine:
+def as_machine(given: MachineLike, name: str = "drive") -> Machine:
     """The drive or chain, or that of a name or file; InputError for anything else. `name` is the argument's.
 
-    >>> one_machine("crane-4-mass").name == Chain.load("crane-4-mass").name
+    >>> as_machine("crane-4-mass").name == Chain.load("crane-4-mass").name
     True
     """
     return object_of(given, (Drive, Chain), load_machine, f"{name}: give one Drive or Chain")
@@ -121,7 +120,7 @@ def listed_of(given: Any, name: str) -> list[Any]:
 
 def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Columns]) -> Records:
     if not isinstance(machine, Records):
-        machine = one_machine(machine)
+        machine = as_machine(machine)
         machine = Records(machine, {}, (machine,))
     whole = machine.machine
     if isinstance(whole, Chain):

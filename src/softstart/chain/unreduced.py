@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from softstart.chain.elements import Motor
+from softstart.drive import Machine
 from softstart.errors import InputError
 
 
+@Machine.register
 class Unreduced:
     """What controllers may know of a chain that cannot be reduced to two masses.
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from softstart.chain.elements import START, TOP, Mass, Motor, Shaft
 from softstart.drive import PARAMETERS
+from softstart.drive.machine import Machine
 from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
@@ -26,7 +27,7 @@ POSITION = next(one for one in START.parameters if one.name == "position")  # a 
 SAME = 1e-12  # within this share two gaps are one, whatever binary makes of their sum
 
 
-class Words:
+class Words(Machine):
     """What a chain is asked and told by words, as a drive is: the base of `Chain`."""
 
     masses: tuple[Mass, ...]

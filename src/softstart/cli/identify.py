@@ -14,8 +14,8 @@ from softstart.cli.options import reading
 from softstart.cli.running import Answer, answers, working
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
     from softstart.drive import Drive
+    from softstart.drive.machine import Machine
     from softstart.identification.logs import TorqueIs
 
 STRATEGIES = ["direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold"]

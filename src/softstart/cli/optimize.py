@@ -21,7 +21,7 @@ from softstart.views.markdown import kept_state
 from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
+    from softstart.drive.machine import Machine
     from softstart.optimal.result import Optimum
     from softstart.start.run import Run
 

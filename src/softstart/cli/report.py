@@ -17,7 +17,7 @@ from softstart.errors import InputError
 from softstart.input.files import write_whole
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
+    from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
     from softstart.reporting import Report
     from softstart.views.sheet import Sheet

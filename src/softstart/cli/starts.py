@@ -15,8 +15,8 @@ from softstart.cli.running import Answer, answers, attributed, controllers_from_
 from softstart.quantities import whole_number
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
     from softstart.drive import Drive
+    from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
     from softstart.start.comparison import Comparison
 

@@ -21,8 +21,8 @@ from softstart.quantities import values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
     from softstart.controller.recipe import Recipe
+    from softstart.drive.machine import Machine
     from softstart.sweeping.entry import SweepProgress
     from softstart.sweeping.grid import Subject
 

@@ -21,7 +21,7 @@ from softstart.quantities import read_multiple, to_si, values_in
 from softstart.views.markdown import kept_state
 
 if TYPE_CHECKING:
-    from softstart.chain.machines import Machine
+    from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
 
 STATE = "tuning.sqlite"

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
-from softstart.drive.records import is_machine
+from softstart.drive.machine import Machine
 from softstart.plugins import CONTROLLERS, registered
 
 
@@ -98,7 +98,7 @@ def _plain(value: Any) -> Any:
         return [path.name, _of_file(path)] if path.suffix and path.is_file() else str(value)
     if value is None or isinstance(value, bool | int | float):
         return value
-    if is_machine(value):
+    if isinstance(value, Machine):
         return value.to_toml()
     if isinstance(value, np.ndarray):
         return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from softstart.drive.checks import FRICTIONS
 from softstart.drive.data_sheet import DataSheet
 from softstart.drive.limits import INFORMATIVE_TABLES, Limit, Limits, SNCurve
+from softstart.drive.machine import Machine
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
@@ -33,6 +34,7 @@ __all__ = [
     "Limit",
     "Limits",
     "LoadKind",
+    "Machine",
     "Position",
     "SNCurve",
     "library",

@@ -13,6 +13,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
+from softstart.drive.machine import Machine
 from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -51,7 +52,7 @@ def _rests(values: Mapping[str, Any]) -> Any:
     return values.get("load_kind") == "reactive" or held
 
 
-class Drive(ParameterSet):
+class Drive(ParameterSet, Machine):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
     Each quantity is a number in SI or a string with a unit; many drives are `softstart.records`. Angles are

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.drive.model import PARAMETERS, Drive
 
-__all__ = ["Columns", "Records", "each_of", "is_machine"]
+__all__ = ["Columns", "Records", "each_of"]
 
 
 class Columns(Drive):
@@ -54,11 +54,6 @@ class Columns(Drive):
         """A row for each drive."""
         most = self.limits.shaft_torque
         return each_of(self, math.nan if most is None else most)[:, None]
-
-
-def is_machine(given: object) -> bool:
-    """Whether this is a Drive or a Chain; a protocol with properties would compute them to find out."""
-    return hasattr(type(given), "design_drive")
 
 
 def each_of(machine: Any, values: object) -> Vector:

@@ -12,7 +12,7 @@ from scipy.linalg import orth
 from scipy.stats import chi2
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
@@ -106,7 +106,7 @@ def identify(
     D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
     Analysis, 1988; docs/identification.md.
     """
-    machine = one_machine(drive)
+    machine = as_machine(drive)
     drive = reduced_drive(machine)
     each = [logs] if isinstance(logs, Log) else logs
     read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in each]

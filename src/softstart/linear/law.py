@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import Machine
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor, label_of
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart.arrays import Complex, Matrix, Vector
-from softstart.chain.machines import Machine
+from softstart.drive.machine import Machine
 from softstart.kernel import motor as exchange
 from softstart.linear.law import OperatingPoint, SampledStart, closed_loop
 from softstart.linear.plant import Plant, contact_plant, plant_scales

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import Machine
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
 from softstart.kernel import records as at

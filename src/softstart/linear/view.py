@@ -18,9 +18,10 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from softstart.chain.machines import Machine, MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
 from softstart.linear.limit_cycles import Cycle, limit_cycles
@@ -216,8 +217,8 @@ def linear_view(
     >>> linear_view("crane-4amtkf", "ramp").kind
     'open loop'
     """
-    drive, made = one_machine(drive), make_controller(controller, parameters)
-    fitted_to = None if fitted_to is None else one_machine(fitted_to, "fitted_to")
+    drive, made = as_machine(drive), make_controller(controller, parameters)
+    fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
     for one in (drive, fitted_to or drive):
         if one.motor is None or one.target_speed is None:
             raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")

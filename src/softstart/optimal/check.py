@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Machine
 from softstart.controller import make_controller
+from softstart.drive.machine import Machine
 from softstart.kernel import records as at
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, OptimumError, largest_heat

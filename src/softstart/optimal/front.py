@@ -13,8 +13,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import Machine, MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller, ready_controller_names
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.notebook import OneLine, Shown
@@ -302,7 +303,7 @@ def pareto(
     """
     options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
     options["base"] = base = Problem(drive, 1.0, terminal, **options).base
-    drive = one_machine(drive)
+    drive = as_machine(drive)
     tell = progress or (lambda doing: None)
     times = None if start_times is None else _checked(start_times)
     names = ready_controller_names() if controllers is None else controllers

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from softstart.chain.machines import Machine, MachineLike, listed_of, one_machine, quantity_of
+from softstart.chain.machines import MachineLike, as_machine, listed_of, quantity_of
 from softstart.controller import ready_controller_names
 from softstart.drive import Limits
 from softstart.drive.limits import Limit
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as at
 from softstart.optimal import pulse_coast_hold, seeds
@@ -146,7 +147,7 @@ def optimize(
     IPOPT: Waechter and Biegler, Math. Prog. 106 (2006), doi 10.1007/s10107-004-0559-y.
     CasADi: Andersson et al., Math. Prog. Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
     """
-    machine = one_machine(drive)
+    machine = as_machine(drive)
     usual = start_time is None and minimise != "start_time" and not limits
     asked_for = USUAL if usual else None if start_time is None else StartTime.of(start_time)
     corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
@@ -735,7 +736,7 @@ def scenarios_of(
     ----------
     docs/optimal-starts.md.
     """
-    drive = one_machine(drive)
+    drive = as_machine(drive)
     given = {"gap": gaps, "load_inertia": inertias, "load_torque": load_torques}
     names = dict(zip(given, ("gaps", "inertias", "load_torques"), strict=True))
     axes = {key: _values(drive, key, names[key], values) for key, values in given.items()}

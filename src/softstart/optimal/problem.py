@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from numbers import Real
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from softstart.chain.machines import one_machine
-from softstart.drive.records import is_machine
+from softstart.chain.machines import as_machine
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.quantities import read_multiple, to_si
 
@@ -165,9 +165,9 @@ class Problem:
 
     def __post_init__(self) -> None:
         wrong: list[str] = []
-        others = [one_machine(one, "scenarios") for one in self.scenarios]
-        object.__setattr__(self, "drive", _without_delay(one_machine(self.drive)))
-        object.__setattr__(self, "base", None if self.base is None else one_machine(self.base, "base"))
+        others = [as_machine(one, "scenarios") for one in self.scenarios]
+        object.__setattr__(self, "drive", _without_delay(as_machine(self.drive)))
+        object.__setattr__(self, "base", None if self.base is None else as_machine(self.base, "base"))
         object.__setattr__(self, "scenarios", tuple(map(_without_delay, others)))
         for name, choices in (("terminal", TERMINALS), ("minimise", OBJECTIVES)):
             if getattr(self, name) not in (*choices, None):
@@ -306,13 +306,11 @@ def _rows(machine: Any) -> tuple[Any, Any]:
     return given, given.masses[0].view(MASS)[:, 0]
 
 
-def _without_delay(machine: Any) -> Any:
+def _without_delay(machine: Machine) -> Machine:
     """A profile that is known beforehand is sent earlier by the computing delay."""
-    if not is_machine(machine) or machine.motor is None or machine.motor.computing_delay == 0.0:
+    if machine.motor is None or machine.motor.computing_delay == 0.0:
         return machine
-    if machine.motor is machine:
-        return machine.replace(computing_delay=0.0)
-    return replace(machine, motor=machine.motor.replace(computing_delay=0.0))
+    return machine.with_values({"computing_delay": 0.0})
 
 
 def _wrong_with(machine: Any) -> Iterator[str]:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import Machine
 from softstart.controller import make_controller
+from softstart.drive.machine import Machine
 from softstart.kernel import records as at
 from softstart.profile import TorqueProfile
 from softstart.start.engine import ended, run_one

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.elements import LIBRARY
-from softstart.chain.machines import Machine
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
+from softstart.drive.machine import Machine
 from softstart.page.sentences import changes
 from softstart.quantities import shortest
 

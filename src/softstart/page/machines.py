@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Machine, Values, varied
+from softstart.chain.machines import Values, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
+from softstart.drive.machine import Machine
 from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
@@ -264,9 +265,9 @@ def with_typed_changes(machine: Machine, settings: Mapping[str, str]) -> Machine
     >>> with_typed_changes(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
     0.03490...
     """
-    if isinstance(machine, Chain):
-        return Chain.from_toml(machine.to_toml(), also=settings)
-    return machine.with_settings(f"{path}={text}" for path, text in settings.items())
+    if isinstance(machine, Drive):
+        return machine.with_settings(f"{path}={text}" for path, text in settings.items())
+    return Chain.from_toml(machine.to_toml(), also=settings)
 
 
 def without(machine: Machine, path: str) -> Machine:

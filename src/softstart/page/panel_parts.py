@@ -10,8 +10,8 @@ from weakref import WeakMethod
 
 from nicegui import app, context, ui
 
-from softstart.chain.machines import Machine
 from softstart.controller.base import Controller
+from softstart.drive.machine import Machine
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, JobState
 from softstart.page.sentences import changed_since, clipped, page_sentence, sentence_of

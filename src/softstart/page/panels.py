@@ -7,8 +7,8 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.chain.machines import Machine
 from softstart.controller.finding import controller_class, controller_names
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks

@@ -6,7 +6,8 @@ import logging
 import re
 from typing import Any, NamedTuple
 
-from softstart.chain.machines import Machine, Values
+from softstart.chain.machines import Values
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest

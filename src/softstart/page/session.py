@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine
 from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of

@@ -17,10 +17,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.page.downloads import file_name, written_text
 from softstart.page.machines import Loaded, with_typed_changes

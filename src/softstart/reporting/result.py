@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart import __version__
-from softstart.chain.machines import MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
@@ -295,7 +295,7 @@ def report(
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
     known, drawn, soft = as_far_as_known(drive)
-    machine: Any = one_machine(known)
+    machine: Any = as_machine(known)
     if budget is None:
         budget = SHAFTS_BUDGET if len(machine.shaft_names) > 1 else BUDGET
     mapped = "load.inertia" in machine.parameters_by_path()  # what a map varies is a parameter of the file

@@ -11,13 +11,14 @@ from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from softstart.chain.machines import Machine, MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.data_sheet import BAND, DataSheet, UnknownStiffness
+from softstart.drive.machine import Machine
 from softstart.drive.plausibility import plausibility_warnings
-from softstart.drive.records import Records, is_machine
+from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
@@ -224,8 +225,8 @@ def compare(
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
     known, drawn, soft = as_far_as_known(drive)
-    drive = one_machine(known)
-    if fitted_to is not None and not is_machine(fitted_to):
+    drive = as_machine(known)
+    if fitted_to is not None and not isinstance(fitted_to, Machine):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
     counted = (
         (worst_case,) if isinstance(worst_case, str) else CASES if worst_case is None else tuple(worst_case)

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.drive import Drive
+from softstart.drive import Drive, Machine
 from softstart.drive.records import Columns, each_of
 from softstart.errors import InputError
 from softstart.kernel import records as at
@@ -99,7 +99,7 @@ def joined(rows: Sequence[Rows]) -> Rows:
 
 
 def kernel_input(
-    machine: Drive | Chain,
+    machine: Machine,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, Any] | None = None,
@@ -113,7 +113,7 @@ def kernel_input(
     if isinstance(machine, Drive):
         made, stiff = _of_drive(machine)
     else:
-        made, stiff = _of_chain(machine, excitation or {})
+        made, stiff = _of_chain(cast("Chain", machine), excitation or {})
     named = made.machines.view(at.MACHINE)[:, 0]
     named["event_cap"] = max_events
     named["longest"] = np.where(named["period"] > 0.0, LONGEST * named["period"], math.inf)

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, overload
 
-from softstart.chain.machines import Machine, MachineLike
+from softstart.chain.machines import MachineLike
 from softstart.chain.model import load_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
-from softstart.drive.records import Records, is_machine
+from softstart.drive.machine import Machine
+from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
 from softstart.start.engine import check_limits, ended, run_one
@@ -137,7 +138,7 @@ def simulate(
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
-    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive))):
+    if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
     if isinstance(drive, list | tuple | Records):
         if made is None:
@@ -147,7 +148,7 @@ def simulate(
         ):
             raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
-    if not is_machine(drive):
+    if not isinstance(drive, Machine):
         raise InputError(
             "drive: give one Drive or Chain, records or a list of them, the path of a file, or a name."
         )
@@ -174,7 +175,7 @@ def _check_other(name: str, other: object, drive: object) -> None:
                 f"{name}: records of shape {other.shape} do not go with starts of shape {own}; give a single "
                 "machine, or records of the same shape."
             )
-    elif other is not None and not is_machine(other):
+    elif other is not None and not isinstance(other, Machine):
         raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
 
 

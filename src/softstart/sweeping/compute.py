@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine, varied
+from softstart.chain.machines import varied
 from softstart.controller.base import CompiledController
 from softstart.controller.recipe import Recipe
+from softstart.drive.machine import Machine
 from softstart.start.batch import prepared
 from softstart.start.status import Status
 from softstart.sweeping.grid import PREFIX, Grid, axis_lengths, grid_values

@@ -15,10 +15,10 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import Machine, MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
-from softstart.drive.records import is_machine
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole, nearest, show
@@ -118,8 +118,8 @@ def sweep(
     ----------
     docs/sweeps.md; each start: see `simulate`.
     """
-    drive, recipe, axes, kept, wrong = one_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
-    if fitted_to is not None and not is_machine(fitted_to):
+    drive, recipe, axes, kept, wrong = as_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
+    if fitted_to is not None and not isinstance(fitted_to, Machine):
         wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
     with wrong.collect():
         check_limits(until, None, 1, drive.KIND)

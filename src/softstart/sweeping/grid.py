@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.chain.machines import Machine
 from softstart.controller.finding import parameter_value
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, meant_by, read_value

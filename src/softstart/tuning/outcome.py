@@ -32,7 +32,7 @@ from softstart.tuning.question import TuningProblem, given_to
 if TYPE_CHECKING:
     import xarray
 
-    from softstart.chain.machines import Machine
+    from softstart.drive.machine import Machine
 
 What = Literal["schedule", "robust"]
 SAME = 1e-9  # within this share two values are one

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import Machine, listed_of, quantity_of, varied
+from softstart.chain.machines import listed_of, quantity_of, varied
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
+from softstart.drive.machine import Machine
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
 from softstart.input.parameters import ParameterValue

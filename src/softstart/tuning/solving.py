@@ -7,7 +7,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from softstart.chain.machines import MachineLike, one_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
@@ -157,7 +157,7 @@ def tune(
     if drawn is not None:
         gaps = [known.gap] if gaps is None else gaps
         inertias = [known.load_inertia] if inertias is None else inertias
-    drive = one_machine(known)
+    drive = as_machine(known)
     certified = isinstance(drive, Drive) if certified is None else certified
     wrong = Mistakes()
     whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softstart.chain.machines import Machine
 from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.optimal.optimize import optimize
 from softstart.optimal.result import InfeasibleError, OptimumError

@@ -21,7 +21,7 @@ from softstart.views.starts import machine_lines
 if TYPE_CHECKING:
     import xarray
 
-    from softstart.chain.machines import Machine
+    from softstart.drive.machine import Machine
     from softstart.sweeping.entry import SweepProgress
     from softstart.sweeping.summary import Summary
 
