@@ -20,10 +20,9 @@ second.set_label("Figure 3 of [B]: first order of the torque of gas, of inertia,
 # %%
 # The torque over the crank angle and its orders, and the residual of the first order for several balancer
 # designs:
-drawn = found.figures()
-torque = drawn["torque"]
+torque = found.figures["torque"]()
 torque.set_label("Reaction torque at 4500 rpm over two turns of the crank, and its orders.")
-left = drawn["residual"]
+left = found.figures["residual"]()
 left.set_label(
     "Residuals with balancers: first order of the moment, height of the shafts, force on the housing."
 )

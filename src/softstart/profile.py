@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.notebook import OneLine
+from softstart.results import OneLine
 
 MOST_SAMPLES = 1_000_000
 

@@ -27,10 +27,10 @@ import numpy as np
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.notebook import OneLine
+from softstart.results import Result
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
     from softstart.chain.model import Chain, ChainArrays
 
@@ -50,7 +50,7 @@ class Node(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Vibration(OneLine):
+class Vibration(Result, view="chains.vibration_sheet"):
     """Natural vibration of a chain, in SI at the motor shaft, gaps closed, undamped.
 
     `Omega[m]` is the frequency of mode m in rad/s; mode 0 is the rigid one, exactly 0, which a chain with a
@@ -86,12 +86,9 @@ class Vibration(OneLine):
         """
         return tuple(tuple(_nodes(shape.tolist())) for shape in self.shape)
 
-    def plot(self, modes: int = 3) -> Figure:
+    def plot(self, modes: int = 3, *, ax: Axes | None = None) -> Any:
         """The lowest elastic shapes with their nodes."""
-        from softstart.views import chains as views
-
-        figure: Figure = views.shapes_figure(self, modes)
-        return figure
+        return super().plot(ax=ax) if ax is not None else self.figures["shapes"](modes)
 
     def summary(self) -> dict[str, Any]:
         """The frequencies, shapes, torques and nodes as plain data."""
@@ -288,7 +285,7 @@ class TwoMassFigures(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Reduction(OneLine):
+class Reduction(Result, view="chains.reduction_sheet"):
     """A chain reduced to two masses at the motor shaft, which have its frequency, node, inertia and gap.
 
     `J1` at the motor and `J2` at the load, kg m2, `c` N m/rad, `d` N m s/rad, `gap` rad. `vibration` is the

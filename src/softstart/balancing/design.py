@@ -20,7 +20,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +29,8 @@ from softstart.balancing.engine import ORDERS, Engine, cleaned, force_at, larges
 from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
 from softstart.input.files import object_of
-from softstart.notebook import OneLine
 from softstart.quantities import number_in, to_si
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from softstart.results import OneLine, Result
 
 NOTHING = 1e-9  # of the forces of all cylinders: rounding, not a force
 RPM = 30.0 / math.pi  # of one rad/s
@@ -146,7 +143,7 @@ class Residual(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Balance(OneLine):
+class Balance(Result, view="balances.balance_sheet"):
     """An engine over its speed range at one load: as it is, and with the balancers designed for it.
 
     The first of `residuals` is the engine without balancer shafts; "own-shafts" follows if it has any; then,
@@ -257,19 +254,6 @@ class Balance(OneLine):
                 for one in self.residuals
             ],
         }
-
-    def plot(self) -> Figure:
-        """First-order moment, arm and force over the speed, for all designs."""
-        from softstart.views import balances as views
-
-        figure: Figure = views.residual_figure(self)
-        return figure
-
-    def figures(self) -> dict[str, Figure]:
-        """All figures by the stem of their file: torque over crank angle, residuals over speed, forces."""
-        from softstart.views import balances as views
-
-        return {stem: draw() for stem, draw in views.drawings(self).items()}
 
 
 def balance(

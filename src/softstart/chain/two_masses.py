@@ -18,8 +18,8 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.notebook import OneLine
 from softstart.profile import TorqueProfile
+from softstart.results import OneLine
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 

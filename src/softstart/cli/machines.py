@@ -83,7 +83,7 @@ def clutch_command(
     with working("looking for the best laws ...") as progress:
         law_class, most = "nondecreasing" if nondecreasing else "any", points or DEFAULT_POINTS
         front = study.optimize_engagement(clutch, most, law_class=law_class, progress=progress)
-    return front.summary, front.sheet()
+    return front.summary, front.sheet
 
 
 def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +20,6 @@ from softstart.input.files import write_whole
 if TYPE_CHECKING:
     from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
-    from softstart.reporting import Report
-    from softstart.views.sheet import Sheet
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
@@ -93,7 +92,8 @@ def report_command(
             with working("printing ..."):
                 printed = _printed(page, browser)
             write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
-    return made.summary, _sheet(made, " and ".join(filter(None, (to, pdf))))
+    sheet, written = made.sheet, " and ".join(filter(None, (to, pdf)))
+    return made.summary, replace(sheet, notes=[*sheet.notes, f"Written to {written}."])
 
 
 def _check_file(option: str, out: str) -> None:
@@ -148,22 +148,3 @@ def _printed(page: str, browser: str) -> bytes:
         if not target.exists():
             raise InputError(f"--pdf: {browser} did not print ({why}); print the HTML file of --out instead.")
         return target.read_bytes()
-
-
-def _sheet(made: Report, written: str) -> Sheet:
-    """What is printed of a report: its answer, and what rounding does to each strategy."""
-    from softstart.views.sheet import Sheet
-    from softstart.views.starts import both_ends, machine_lines
-
-    notes = []
-    for one in made.sheets:
-        if one.rounded is None:
-            notes.append(f"{one.name}: cannot be started with rounded values ({one.failure})")
-            continue
-        off = f", {one.worst_k_dyn:.4f} at most half a step off." if one.variants else "."
-        exact, rounded = one.exact.k_dyn, one.rounded.k_dyn
-        notes.append(f"{one.name}: K_dyn {exact:.4f} exact, {rounded:.4f} after rounding{off}")
-    notes += [*(f"{name} was left out: {reason}" for name, reason in made.failed), f"Written to {written}."]
-    return Sheet(
-        "Report", machine_lines(made.drive), found=[made.answer, *both_ends(made.comparison)], notes=notes
-    )

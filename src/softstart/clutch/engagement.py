@@ -34,8 +34,8 @@ from softstart.clutch.motion import (
 )
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import object_of
-from softstart.notebook import OneLine
 from softstart.quantities import number_in
+from softstart.results import Result
 
 MOST_STEPS = 400_000
 MOST_AT_ONCE = 40
@@ -94,7 +94,7 @@ class EnergyBalance:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Engagement(OneLine):
+class Engagement(Result, view="clutches.engagement_sheet"):
     """One engagement, as `engage` returns it: torques in N m, times in s, work in J.
 
     Attributes
@@ -192,12 +192,6 @@ class Engagement(OneLine):
             "phases": [asdict(phase) for phase in self.phases],
             "events": [{"time": event.t, "event": event.name} for event in self.events],
         }
-
-    def plot(self) -> Any:
-        """Torques, speeds and friction power over time."""
-        from softstart.views import clutches as views
-
-        return views.engagement_figure([self], self.clutch.name)
 
 
 def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None = None) -> Engagement:

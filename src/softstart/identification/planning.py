@@ -29,9 +29,9 @@ from softstart.identification.unknowns import (
 )
 from softstart.input.files import object_of
 from softstart.kernel.records import S_PHI
-from softstart.notebook import OneLine, Shown
 from softstart.profile import TorqueProfile
 from softstart.quantities import number_in, show
+from softstart.results import OneLine, Result
 from softstart.start.comparison import INTERVAL
 
 LEVEL: Final = 0.65  # of the starting torque
@@ -69,7 +69,7 @@ class Experiment(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ExperimentPlan(Shown, sheet="identification.plan_sheet"):
+class ExperimentPlan(Result, view="identification.plan_sheet"):
     """Experiments for a drive: the standard ones, then the planned one."""
 
     drive: Drive

@@ -21,8 +21,8 @@ from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
-from softstart.notebook import Shown
 from softstart.quantities import RefusedError
+from softstart.results import Result
 from softstart.start.comparison import INTERVAL
 
 FRICTIONS: Final[tuple[str, ...]] = (*OF_TWO, "load_friction")  # what may be 0
@@ -74,7 +74,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Shown, sheet="identification.identification_sheet"):
+class Identification(Result, view="identification.identification_sheet"):
     """A drive from its logs.
 
     Attributes
@@ -234,14 +234,6 @@ class Identification(Shown, sheet="identification.identification_sheet"):
             ],
             "notes": list(self.notes),
         }
-
-    def plot(self) -> Any:
-        """The logs beside the start of the drive found, and what is left; a matplotlib figure."""
-        from softstart.views import identification as views
-
-        if not self.logs:
-            raise InputError("logs: an identification that was loaded has none; their figure is beside it.")
-        return views.identification_figure(self)
 
 
 def _or_nan(value: Any) -> Any:

@@ -17,8 +17,8 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
 from softstart.errors import InputError
 from softstart.identification.result import Estimate, Identification
-from softstart.notebook import Shown
 from softstart.quantities import show
+from softstart.results import Result
 from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
@@ -91,7 +91,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Wear(Shown, sheet="identification.wear_sheet"):
+class Wear(Result, view="identification.wear_sheet"):
     """How the gap of a drive grows, and when it reaches its limit."""
 
     found: tuple[Identification, ...]  # the oldest first
@@ -131,12 +131,6 @@ class Wear(Shown, sheet="identification.wear_sheet"):
             "drive": self.found[-1].drive.name, "gaps": gaps, **growth, "limit": self.limit,
             **{key: when and str(when) for key, when in worn}, "notes": list(self.notes),
         }  # fmt: skip
-
-    def plot(self) -> Any:
-        """The gaps over time, the line with its interval, and the limit; a matplotlib figure."""
-        from softstart.views import identification as views
-
-        return views.wear_figure(self)
 
 
 def follow_wear(

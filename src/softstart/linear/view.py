@@ -25,17 +25,27 @@ from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
 from softstart.linear.limit_cycles import Cycle, limit_cycles
-from softstart.linear.loop import Loop
+from softstart.linear.loop import Loop, Margins
 from softstart.linear.plant import at_one_position, plant_scales
 from softstart.linear.systems import Mode
-from softstart.notebook import Shown
+from softstart.results import Result
 
 VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1)))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
 
 
+def margin_texts(m: Margins) -> dict[str, str]:
+    """The margins in words; the phase margin is not limited where the loop has no gain crossover."""
+    texts = {
+        "gain margin": (m.gain_margin, f"{m.gain_margin:.3g} ({20.0 * math.log10(m.gain_margin):.1f} dB)"),
+        "phase margin": (m.phase_margin, f"{math.degrees(m.phase_margin):.1f} degrees"),
+        "delay margin": (m.delay_margin, f"{1e3 * m.delay_margin:.3g} ms"),
+    }
+    return {name: "not limited" if math.isinf(value) else text for name, (value, text) in texts.items()}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class LinearView(Shown, sheet="linear.linear_sheet"):
+class LinearView(Result, view="linear.linear_sheet"):
     """The result of `linear_view`.
 
     Parameters
@@ -121,10 +131,14 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
 
     @property
     def conclusion(self) -> str:
-        """One sentence."""
-        from softstart.views import linear as views
-
-        return views.linear_conclusion(self)
+        """One sentence: the margins and the damping of the elastic mode, or why there are none."""
+        if self.loop is None:
+            return self.notes[0]
+        if not self.loop.stable:
+            return "the closed loop is unstable in contact"
+        margins = ", ".join(f"{name} {text}" for name, text in margin_texts(self.loop.margins).items())
+        mode = self.elastic_mode
+        return margins if mode is None else f"{margins}; elastic mode damped by {mode.damping_ratio:.3g}"
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
@@ -160,14 +174,6 @@ class LinearView(Shown, sheet="linear.linear_sheet"):
             ],
             "limit_cycles": [asdict(one) for one in self.cycles],
         }
-
-    def plot(self) -> Any:
-        """Bode diagram with the margins marked, and Nyquist diagram with the describing function's locus."""
-        from softstart.views import linear as views
-
-        if self.loop is None:
-            raise InputError(f'controller = "{self.name}": {self.notes[0]}')
-        return views.linear_figure(self)
 
 
 def linear_view(

@@ -18,13 +18,13 @@ from softstart.controller import Controller, make_controller, ready_controller_n
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.notebook import OneLine, Shown
 from softstart.optimal.descent import BEND
 from softstart.optimal.optimize import shortest_start_time, solve
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
+from softstart.results import OneLine, Result
 from softstart.start.recommendation import SLOW
 from softstart.start.simulation import simulate
 from softstart.store import PartStore, Target
@@ -149,7 +149,7 @@ class ControllerPoint(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Front(Shown, sheet="optima.front_sheet"):
+class Front(Result, view="optima.front_sheet"):
     """The least K_dyn for each bound on the start time, and the controllers against that limit.
 
     Parameters
@@ -214,24 +214,23 @@ class Front(Shown, sheet="optima.front_sheet"):
             "controllers": [point.summary() for point in self.controllers],
         }
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the curve, then the controllers, as one table; numbers with all their digits."""
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """The curve, then the controllers, as rows of one table."""
         rows = [{"what": "optimum", **point.summary()} for point in self.points]
         for one in self.controllers:  # a missing start time is an empty cell
             rows.append({**one.summary(), "what": one.name} | ({} if one.optimum else {"start_time": None}))
+        return [{name: row.get(name) for name in COLUMNS} for row in rows]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write `records`; numbers with all their digits."""
 
         def write(stream: Any) -> None:
-            table = csv.DictWriter(stream, COLUMNS, extrasaction="ignore", lineterminator="\n")
+            table = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
             table.writeheader()
-            table.writerows(rows)
+            table.writerows(self.records)
 
         write_whole(Path(path), write)
-
-    def plot(self) -> Any:
-        """The curve with its bound, and the controllers as points."""
-        from softstart.views import optima
-
-        return optima.front_figure(self)
 
 
 def pareto(

@@ -11,9 +11,9 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.kernel import records as at
-from softstart.notebook import Shown
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
+from softstart.results import Result
 from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
@@ -110,7 +110,7 @@ class Kept:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Optimum(Shown, sheet="optima.optimum_sheet"):
+class Optimum(Result, view="optima.optimum_sheet"):
     """The best start found, as the exact plant runs it, and how much better any start could be.
 
     Parameters

@@ -65,7 +65,9 @@ def shown(*sheets: Sheet, first: bool = False) -> str:
     from softstart.views.sheet import as_html
 
     each = (
-        replace(one, found=[*map(page_sentence, one.found)], notes=[*map(page_sentence, one.notes)])
+        replace(
+            one, conclusions=[*map(page_sentence, one.conclusions)], notes=[*map(page_sentence, one.notes)]
+        )
         for one in sheets
     )
     return "\n".join(as_html(one, len(one.figures), first=first, width=COLUMN) for one in each)

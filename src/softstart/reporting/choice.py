@@ -15,7 +15,7 @@ from softstart.chain.machines import varied
 from softstart.controller import Controller
 from softstart.controller.base import Effort
 from softstart.drive import Drive
-from softstart.notebook import OneLine
+from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row

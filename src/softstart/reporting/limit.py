@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.notebook import OneLine
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
 from softstart.optimal.front import FrontPoint, TimeRange
 from softstart.optimal.optimize import optimize
@@ -21,6 +20,7 @@ from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve_pul
 from softstart.parallel import DiedError, Worker
 from softstart.parallel import Progress as WorkerProgress
 from softstart.profile import TorqueProfile
+from softstart.results import OneLine
 from softstart.start.recommendation import Row
 
 TIGHT = 1.0  # per cent between an optimum and a lower bound that counts as proof

@@ -27,6 +27,7 @@ from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.sheet import ParameterSheet, make_sheet
+from softstart.results import Result
 from softstart.start.comparison import (
     REFERENCE,
     Comparison,
@@ -39,6 +40,8 @@ from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 from softstart.views.numbers import DASH, percent
+from softstart.views.sheet import Sheet
+from softstart.views.starts import both_ends, machine_lines
 
 BUDGET, SHAFTS_BUDGET = 20.0, 60.0  # s for optima that take a search, on one shaft and on several
 
@@ -68,7 +71,7 @@ def provenance(drive: Any, command: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Report:
+class Report(Result):
     """All data behind a report: strategies compared, limit, maps, recommendation and parameter sheets.
 
     Attributes
@@ -119,6 +122,21 @@ class Report:
         best = self.choice.chosen
         best_text = f"{best.name}, K_dyn {best.run.k_dyn:.3f}, {self.choice.role}" if best else "nothing"
         return f"<Report: {best_text}, for {self.drive.name}>"
+
+    @property
+    def sheet(self) -> Sheet:
+        """What is printed of it: its answer, and what rounding does to each strategy."""
+        notes = []
+        for one in self.sheets:
+            if one.rounded is None:
+                notes.append(f"{one.name}: cannot be started with rounded values ({one.failure})")
+                continue
+            off = f", {one.worst_k_dyn:.4f} at most half a step off." if one.variants else "."
+            exact, rounded = one.exact.k_dyn, one.rounded.k_dyn
+            notes.append(f"{one.name}: K_dyn {exact:.4f} exact, {rounded:.4f} after rounding{off}")
+        notes += [f"{name} was left out: {reason}" for name, reason in self.failed]
+        conclusions = [self.answer, *both_ends(self.comparison)]
+        return Sheet("Report", machine_lines(self.drive), conclusions=conclusions, notes=notes)
 
     @property
     def comparison(self) -> Comparison:

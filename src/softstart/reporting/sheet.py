@@ -15,8 +15,8 @@ from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError
-from softstart.notebook import OneLine
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
+from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits

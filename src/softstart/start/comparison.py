@@ -20,6 +20,7 @@ from softstart.drive.machine import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes, SimulationError
+from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
@@ -88,7 +89,7 @@ def intervals(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Result, view="starts.comparison_sheet"):
     """Strategies side by side on one drive.
 
     Attributes
@@ -145,13 +146,6 @@ class Comparison:
         """What is recommended if the stiffness is that of `drive`, whatever happens at the soft end."""
         rows = (replace(row, worst_case=tuple({*row.worst_case} - {SOFT_END})) for row in self.rows)
         return recommend(self.drive, tuple(rows))
-
-    def _repr_html_(self) -> Any:
-        """What a notebook shows."""
-        from softstart.views import sheet, starts
-
-        rows = sorted(self.rows, key=lambda row: row.run.k_dyn)
-        return sheet.as_html(starts.comparison_sheet(self, rows))
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""

@@ -14,8 +14,8 @@ from softstart.chain.machines import quantity_of
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.kernel import records as at
-from softstart.notebook import OneLine, Shown
 from softstart.quantities import number_in
+from softstart.results import OneLine, Result
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -132,7 +132,7 @@ class Life(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fatigue(Shown, sheet="fatigue.fatigue_sheet"):
+class Fatigue(Result, view="fatigue.fatigue_sheet"):
     """Lives of the shafts of a machine under several strategies. It is returned by `fatigue`.
 
     Attributes
@@ -199,12 +199,6 @@ class Fatigue(Shown, sheet="fatigue.fatigue_sheet"):
             "worn_gap": self.worn_gap,
             "strategies": [row.summary() for row in self.rows],
         }
-
-    def plot(self) -> Any:
-        """Ranges of the cycles over how many there are, for each strategy, and lives beside `direct`."""
-        from softstart.views import fatigue as views
-
-        return views.fatigue_figure(self)
 
 
 def fatigue(

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from softstart.controller.base import Controller, Effort, effort_of, label_of
 from softstart.drive import Limit, Limits
-from softstart.notebook import OneLine
+from softstart.results import OneLine
 from softstart.start.fatigue import undamped, worst_damage
 from softstart.start.run import Run
 

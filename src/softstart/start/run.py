@@ -19,7 +19,7 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.kernel import records as at
-from softstart.notebook import Shown
+from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.engine import run_one
 from softstart.start.recorded import StartRecorder, Trajectory
@@ -81,7 +81,7 @@ class Clipped(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(Shown, sheet="starts.run_sheet"):
+class Run(Result, view="starts.run_sheet"):
     """One start under one controller. Angles in rad, speeds and torques at the motor shaft, in SI units.
 
     It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
@@ -570,11 +570,20 @@ class Run(Shown, sheet="starts.run_sheet"):
         """Twist phi1 - phi2, rad."""
         return self._traces["theta"]
 
+    def columns(self, times: ArrayLike | None = None) -> dict[str, Vector]:
+        """The states by headings with units, at `times` or the plot's instants."""
+        instants = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
+        return {"t [s]": instants, **self.drive.columns_of(self.at(instants))}
+
+    def to_dataframe(self, times: ArrayLike | None = None) -> Any:
+        """The same as a pandas.DataFrame."""
+        import pandas  # comes with xarray
+
+        return pandas.DataFrame(self.columns(times))
+
     def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
         """Write the states under a header with units, at `times` or the plot's instants."""
-        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
-        states = self.at(when)
-        columns = {"t [s]": when, **self.drive.columns_of(states)}
+        columns = self.columns(times)
         header, table = ",".join(columns), np.column_stack(list(columns.values()))
 
         def write(stream: IO[Any]) -> None:
@@ -586,12 +595,6 @@ class Run(Shown, sheet="starts.run_sheet"):
     def energy(self) -> metrics.Energy:
         """Energy balance of the run."""
         return metrics.energy_balance(self.recorded)
-
-    def plot(self) -> Any:
-        """Torques, speeds and twist over time, stages shaded."""
-        from softstart.views import starts
-
-        return starts.run_figure(self)
 
     def by_position(self) -> dict[str, Any]:
         """K_dyn and start time from each position, and which is the worst for the shaft."""

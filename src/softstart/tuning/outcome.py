@@ -26,11 +26,12 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.notebook import OneLine, Shown
+from softstart.results import OneLine, Result
 from softstart.tuning.question import TuningProblem, given_to
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
     from softstart.drive.machine import Machine
 
@@ -74,7 +75,7 @@ class RobustSet(OneLine):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Shown, sheet="tuning.tuning_sheet"):
+class Tuning(Result, view="tuning.tuning_sheet"):
     """Tuned gains of one controller over a grid of gaps and load inertias; the result of `tune`.
 
     Attributes
@@ -173,14 +174,19 @@ class Tuning(Shown, sheet="tuning.tuning_sheet"):
             "seconds": self.seconds,
         }
 
-    def plot(self, what: Literal["gains", "metric", "robust", "price"] | None = None) -> Any:
+    def plot(
+        self, what: Literal["gains", "metric", "robust", "price"] | None = None, *, ax: Axes | None = None
+    ) -> Any:
         """A figure: maps of the gains, of the metric tuned and by default, of the robust set, of its price.
 
         By default the price of robustness if there is one, else the maps of the metric.
         """
-        from softstart.views import tuning as views
-
-        return views.figure_of(self, what)
+        figures = self.figures
+        if what is None or ax is not None:
+            return super().plot(ax=ax)
+        if what not in figures:
+            raise InputError(f"what = {what!r}: this tuning has no such figure; choose {', '.join(figures)}.")
+        return figures[what]()
 
     def to_toml(self, path: str | Path, what: What | None = None) -> None:
         """Write the schedule or the robust set as TOML, which any controller's name may stand for.

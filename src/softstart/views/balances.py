@@ -51,7 +51,7 @@ def balance_sheet(found: Balance) -> Sheet:
         title=f"{engine.name}: forces, moments and balancers",
         lines=_lines(found),
         tables=[_orders(found), _designs(found), *_speeds(found)],
-        found=[_conclusion(found)],
+        conclusions=[_conclusion(found)],
         notes=[
             f"{designs}. At most: over all speeds.",
             "The crank turns at constant speed; the moments are those that alternate, about the crank axis.",

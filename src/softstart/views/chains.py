@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -43,7 +44,7 @@ def vibration_sheet(found: Vibration) -> Sheet:
         title=f"{found.chain.name}: natural frequencies",
         lines=drive_lines(found.chain),
         tables=[frequencies_table(found)],
-        figures={"shapes": lambda: shapes_figure(found)},
+        figures={"shapes": partial(shapes_figure, found)},
         files={
             "frequencies.csv": rows_file(("mode", "Omega [rad/s]", "frequency [Hz]"), frequencies),
             "shapes.csv": rows_file(("mode", *masses), [[m, *found.shape[m].tolist()] for m in modes]),
@@ -65,7 +66,7 @@ def reduction_sheet(found: Reduction, off: TwoMassError | None = None) -> Sheet:
         shown,
         title=f"{shown.title} and reduction",
         tables=[*shown.tables, two_masses_table(found), verified_table(starts)],
-        found=[enough(off)] if off else [],
+        conclusions=[enough(off)] if off else [],
         notes=[note[0].upper() + note[1:] + "." for note in found.notes],
         files=files,
     )

@@ -75,8 +75,8 @@ def engagement_sheet(run: Engagement) -> Sheet:
         lines=clutch_lines(run.clutch),
         facts=[(name, text) for name, text in facts if text != NOTHING or name != "heat of the linings"],
         tables=[TextTable.of("Events", cells, ("event",), most=MOST_EVENTS)],
-        found=[STATUS[run.status] + slips],
-        figures={"engagement": run.plot},
+        conclusions=[STATUS[run.status] + slips],
+        figures={"engagement": lambda: engagement_figure([run], run.clutch.name)},
         files={
             "clutch.toml": run.clutch.to_toml(),
             "traces.csv": columns_file({"t [s]": run.t.tolist(), **traces}),

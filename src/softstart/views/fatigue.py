@@ -202,10 +202,11 @@ def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Any = No
         f"{found.drive.name}: life of the shaft line",
         machine_lines(found.drive, fitted_to),
         tables=fatigue_tables(found, rows or found.rows),
-        found=[fatigue_conclusion(found)],
+        conclusions=[fatigue_conclusion(found)],
         notes=fatigue_notes(found),
-        figures={"fatigue": found.plot},
+        figures={"fatigue": lambda: fatigue_figure(found)},
         files={"fatigue.csv": records_file(records), **files},
         machine=found.drive,
+        records=records,
         fitted_to=fitted_to,
     )

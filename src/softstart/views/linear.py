@@ -11,6 +11,7 @@ import numpy as np
 from softstart.linear.limit_cycles import SHARES, oscillating
 from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
+from softstart.linear.view import LinearView, margin_texts
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, TextTable, column_of, number
 from softstart.views.sheet import Sheet, rows_file
@@ -21,34 +22,12 @@ if TYPE_CHECKING:
 
     from softstart.linear.loop import Crossing, Loop, Margins
     from softstart.linear.systems import Mode
-    from softstart.linear.view import LinearView
 
 SHOWN_MODES, SHOWN_CROSSINGS = 16, 4
 DECADES = 2.0  # shown below the elastic frequency
 WIDEST = 3.0  # of the plane about -1
 DEEPEST, HIGHEST = 1e-3, 1e3  # of |L|
 MARKED = 100.0  # gain margins up to which a crossing is marked
-
-
-def linear_conclusion(view: LinearView) -> str:
-    """One sentence: the margins and the elastic mode, or why there are none."""
-    if view.loop is None:
-        return view.notes[0]
-    if not view.loop.stable:
-        return "the closed loop is unstable in contact"
-    sentence = ", ".join(f"{name} {text}" for name, text in _margins(view.loop.margins).items())
-    mode = view.elastic_mode
-    return sentence if mode is None else f"{sentence}; elastic mode damped by {mode.damping_ratio:.3g}"
-
-
-def _margins(m: Margins) -> dict[str, str]:
-    """The margins in words; that of the phase is not limited where the loop gain is nowhere 1."""
-    texts = {
-        "gain margin": (m.gain_margin, f"{m.gain_margin:.3g} ({20.0 * math.log10(m.gain_margin):.1f} dB)"),
-        "phase margin": (m.phase_margin, f"{math.degrees(m.phase_margin):.1f} degrees"),
-        "delay margin": (m.delay_margin, f"{1e3 * m.delay_margin:.3g} ms"),
-    }
-    return {name: "not limited" if math.isinf(value) else text for name, (value, text) in texts.items()}
 
 
 def _frequencies(found: Sequence[Crossing | Mode]) -> str:
@@ -61,7 +40,7 @@ def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
     m, mode = loop.margins, view.elastic_mode
     return [
         ("closed loop in contact", "stable" if loop.stable else "unstable"),
-        *_margins(m).items(),
+        *margin_texts(m).items(),
         *([("least gain", f"{m.gain_reduction:.3g} of the present one")] if m.gain_reduction > 0.0 else []),
         ("modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"),
         ("loop gain is 1 at", _frequencies(m.gain_crossovers)),
@@ -137,14 +116,15 @@ def linear_sheet(view: LinearView) -> Sheet:
     title = f"{view.drive.name}: loop of {view.name}"
     lines = [*machine_lines(view.drive), f"  under  {view.name}"]
     if loop is None:
-        return Sheet(title, lines, view.notes[0], machine=view.drive)
+        why = f'controller = "{view.name}": {view.notes[0]}'
+        return Sheet(title, lines, view.notes[0], machine=view.drive, no_figure=why)
     return Sheet(
         title,
         lines,
         facts=margin_rows(view, loop),
         tables=tables(view, loop),
         notes=linear_notes(view),
-        figures={"linear": view.plot},
+        figures={"linear": lambda: linear_figure(view)},
         files={"response.csv": rows_file(*response(loop))},
         machine=view.drive,
     )
@@ -194,7 +174,7 @@ def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
         label = f"_{label}"
     top = float(np.quantile(np.abs(L), 0.98))
     axes.set_ylim(max(DEEPEST, 0.5 * float(np.abs(L).min())), min(max(10.0, 3.0 * top), HIGHEST))
-    head(axes, f"gain margin {_margins(m)['gain margin']}", "|L|")
+    head(axes, f"gain margin {margin_texts(m)['gain margin']}", "|L|")
 
 
 def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
@@ -208,7 +188,7 @@ def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
         axes.plot([one.frequency] * 2, [bound, bound + at], "o-", ms=4.5, color=COLOURS[2])
         axes.text(1.05 * one.frequency, bound + 0.5 * at, f"{abs(at):.0f}", va="center", color=COLOURS[2])
     axes.set(ylim=(-190.0, 190.0), yticks=range(-180, 181, 60))
-    title = ", ".join(f"{name} {text}" for name, text in list(_margins(m).items())[1:])
+    title = ", ".join(f"{name} {text}" for name, text in list(margin_texts(m).items())[1:])
     head(axes, title, "phase of L, degrees")
 
 

@@ -264,7 +264,7 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
             *([scenario_table(best)] if several else []),
             TextTable.of("The strategies on this drive", beside, ("strategy",)),
         ],
-        found=[comparison(best, others)],
+        conclusions=[comparison(best, others)],
         notes=[*_known(best), bound_sentence(best)],
         figures={"optimum": lambda: optimum_figure(best)},
         files={
@@ -347,34 +347,39 @@ def _footnotes(front: Front) -> list[str]:
 
 
 def front_figure(front: Front) -> Any:
-    """Least K_dyn over start time with its lower bound, and the controllers as named points."""
+    """Minimum K_dyn over start time with its lower bound, and the controllers as named points."""
+    with drawing():
+        figure, axes = new_figure(1, 1, (8.0, 5.0))
+        draw_front(axes, front)
+    return figure
+
+
+def draw_front(axes: Axes, front: Front) -> None:
+    """The same on given axes."""
     found = [(p.start_time_bound, p.k_dyn, p.k_dyn_lower_bound) for p in front.points if p.k_dyn is not None]
     bounded = [one for one in found if one[2] is not None]
     placed = [one for one in front.controllers if not math.isnan(one.start_time)]
     best, shortest = best_start(front.drive), front.shortest_start_time
     refused = [p.start_time_bound for p in front.points if not p.found]
-    with drawing():
-        figure, axes = new_figure(1, 1, (8.0, 5.0))
-        if found:
-            times, k, _ = zip(*found, strict=True)
-            axes.plot(times, k, "o-", ms=3.5, color=COLOURS[0], label=best, zorder=3)
-        if bounded:
-            t, above, below = zip(*bounded, strict=True)
-            axes.fill_between(t, below, above, color=COLOURS[5], alpha=0.45, lw=0)
-            axes.plot(t, below, ls=DASHES[1], lw=1.2, color=COLOURS[4], label="lower bound", zorder=3)
-        if refused:
-            axes.plot(refused, [0.03] * len(refused), "x", ms=6, mew=1.5, color=GREY, clip_on=False,
-                      transform=axes.get_xaxis_transform(), label=f"no {best}")  # fmt: skip
-        if not math.isnan(shortest):
-            axes.axvline(shortest, color=GREY, ls=DASHES[1], label=f"shortest found, {shortest:.4f} s")
-        ratios = ("" if one.ratio is None else f", x{one.ratio:.2f}" for one in placed)
-        marks = [(one.name + x, one.start_time, one.k_dyn) for one, x in zip(placed, ratios, strict=True)]
-        mark_points(axes, marks)
-        _scale(axes, [k for _, k, _ in found] + [one.k_dyn for one in placed])
-        times_of = f"start time, s     (x: K_dyn over that of the {best} at the same start time)"
-        title = f"{front.drive.name}: {best_k_dyn(front.drive)}, terminal {front.terminal}"
-        head(axes, title, "K_dyn", times_of)
-    return figure
+    if found:
+        times, k, _ = zip(*found, strict=True)
+        axes.plot(times, k, "o-", ms=3.5, color=COLOURS[0], label=best, zorder=3)
+    if bounded:
+        t, above, below = zip(*bounded, strict=True)
+        axes.fill_between(t, below, above, color=COLOURS[5], alpha=0.45, lw=0)
+        axes.plot(t, below, ls=DASHES[1], lw=1.2, color=COLOURS[4], label="lower bound", zorder=3)
+    if refused:
+        axes.plot(refused, [0.03] * len(refused), "x", ms=6, mew=1.5, color=GREY, clip_on=False,
+                  transform=axes.get_xaxis_transform(), label=f"no {best}")  # fmt: skip
+    if not math.isnan(shortest):
+        axes.axvline(shortest, color=GREY, ls=DASHES[1], label=f"shortest found, {shortest:.4f} s")
+    ratios = ("" if one.ratio is None else f", x{one.ratio:.2f}" for one in placed)
+    marks = [(one.name + x, one.start_time, one.k_dyn) for one, x in zip(placed, ratios, strict=True)]
+    mark_points(axes, marks)
+    _scale(axes, [k for _, k, _ in found] + [one.k_dyn for one in placed])
+    times_of = f"start time, s     (x: K_dyn over that of the {best} at the same start time)"
+    title = f"{front.drive.name}: {best_k_dyn(front.drive)}, terminal {front.terminal}"
+    head(axes, title, "K_dyn", times_of)
 
 
 def _scale(axes: Axes, values: Sequence[float]) -> None:
@@ -401,9 +406,11 @@ def front_sheet(front: Front) -> Sheet:
         f"{front.drive.name}: {best_k_dyn(front.drive)} against start time, terminal {front.terminal}",
         machine_lines(front.drive),
         tables=_front_tables(front),
-        found=[_front_conclusion(front)],
+        conclusions=[_front_conclusion(front)],
         notes=_footnotes(front),
-        figures={"pareto": front.plot},
+        figures={"pareto": lambda: front_figure(front)},
+        panel=lambda ax: draw_front(ax, front),
+        records=front.records,
         files={"pareto.csv": front.to_csv},
         machine=front.drive,
     )

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from softstart import __version__
 from softstart.views.drawing import drawing, save_figure
@@ -18,6 +18,9 @@ from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
 from softstart.views.numbers import Column, TextTable
 from softstart.views.terminal import blocks_of, console, print_lines, print_table, sentence
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FITTED_TO = "fitted-to.toml"
 LETTER, PADDING = 6.5, 8.0  # pixels of a table on the page
@@ -41,10 +44,16 @@ class Sheet:
         Figures, each a name and its value.
     tables : sequence of Table
         Those without rows are left out.
-    found, notes : sequence of str
+    conclusions, notes : sequence of str
         What came out; what the figures mean.
     figures : mapping of str to callable
         By the stem of their files, each drawn when it is needed; the first one is that of a notebook.
+    panel : callable, optional
+        Draws the main panel of the first figure on given axes.
+    no_figure : str
+        Why there is no figure.
+    records : sequence of mapping
+        The rows of the main table as plain data, for a DataFrame.
     files : mapping of str to str or callable
         Further files of --out by their names: a text, or what writes a path.
     machine : Drive or Chain, optional
@@ -64,9 +73,12 @@ class Sheet:
     status: str = ""
     facts: Sequence[Sequence[str]] = ()
     tables: Sequence[TextTable] = ()
-    found: Sequence[str] = ()
+    conclusions: Sequence[str] = ()
     notes: Sequence[str] = ()
-    figures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+    figures: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    panel: Callable[[Axes], object] | None = None
+    no_figure: str = ""
+    records: Sequence[Mapping[str, object]] = ()
     files: Mapping[str, str | Writer] = field(default_factory=dict)
     machine: Any = None
     fitted_to: Any = None
@@ -91,9 +103,9 @@ def print_sheet(sheet: Sheet) -> None:
     for table in (one for one in sheet.tables if one.rows):
         to.print()
         print_table(to, table)
-    if sheet.found or sheet.notes:
+    if sheet.conclusions or sheet.notes:
         to.print()
-    for style, texts in (("bold", sheet.found), ("dim", sheet.notes)):
+    for style, texts in (("bold", sheet.conclusions), ("dim", sheet.notes)):
         for text in texts:
             sentence(to, text, style)
     if sheet.commands:
@@ -141,7 +153,7 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
         f"# {markdown(sheet.title)}",
         "\n".join(f"- {markdown(line.strip())}" for line in sheet.lines[1:]),
         markdown(sheet.status),
-        *map(markdown, sheet.found),
+        *map(markdown, sheet.conclusions),
         *(
             table_parts(TextTable("", [Column("figure", False), Column("value")], sheet.facts))
             if sheet.facts
@@ -211,7 +223,7 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     """
     facts = [TextTable("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
-    parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.found) if text]
+    parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.conclusions) if text]
     tables = [
         _html(block)
         for table in (*facts, *sheet.tables) if table.rows

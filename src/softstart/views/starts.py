@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
@@ -207,15 +208,16 @@ def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: st
 
 def run_figure(run: Run) -> Any:
     """Torques, speeds and twists over time."""
-
-    def torques(axes: Axes, run: Run) -> None:
-        axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
-        shaft_torques(axes, run)
-        if not math.isnan(run.permissible_torque):
-            axes.axhline(run.permissible_torque, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
-        head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
-
     return over_time(run, (torques, speeds, twists), f"{run.drive.name}: {run.controller_name}")
+
+
+def torques(axes: Axes, run: Run) -> None:
+    """Motor and shaft torques, and the permissible one."""
+    axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
+    shaft_torques(axes, run)
+    if not math.isnan(run.permissible_torque):
+        axes.axhline(run.permissible_torque, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
+    head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
 
 
 def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
@@ -286,7 +288,8 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         figure_rows(run),
         _start_tables(run),
         notes=run.drive.warnings,
-        figures={f"run-{stem}": run.plot},
+        figures={f"run-{stem}": lambda: run_figure(run)},
+        panel=lambda ax: torques(ax, run),
         files={
             f"trace-{stem}.csv": run.to_csv,
             "stages.csv": rows_file(STAGE_COLUMNS, stage_rows(run)),
@@ -525,17 +528,23 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
     """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 4.6))
-        mark_points(axes, points)
-        axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
-        axes.set_ylim(bottom=0.0)
-        axes.margins(x=0.08)
-        head(axes, title, "K_dyn", "start time, s")
+        draw_trade_off(axes, points, title)
     return figure
 
 
+def draw_trade_off(axes: Axes, points: Sequence[tuple[str, float, float]], title: str) -> None:
+    """The same on given axes."""
+    mark_points(axes, points)
+    axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.08)
+    head(axes, title, "K_dyn", "start time, s")
+
+
 def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: bool = True) -> Sheet:
-    """What is shown of a comparison; `rows` are its rows in another order."""
-    machine, rows = comparison.drive, rows or comparison.rows
+    """What is shown of a comparison; `rows` are its rows in an order other than by K_dyn."""
+    machine = comparison.drive
+    rows = rows or sorted(comparison.rows, key=lambda row: row.run.k_dyn)
     bold = [rows.index(row) for row in comparison.recommendation.shown]
     parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*PEAK_COLUMNS, *at_soft_end(rows), *TIME_COLUMNS))]
     if rows[0].intervals:
@@ -548,24 +557,27 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     figures = {"comparison": lambda: comparison_figure(rows, machine.name)}
     if points:
         figures["trade-off"] = lambda: trade_off_figure(points, machine.name)
-    files: dict[str, str | Writer] = {"comparison.csv": records_file(list(map(_record, rows)))}
+    records = list(map(_record, rows))
+    files: dict[str, str | Writer] = {"comparison.csv": records_file(records)}
     stems: list[str] = []
     behind = ["## The strategies"]
     for run in (row.run for row in rows):
         stems.append(stem := file_stem(run.controller_name, stems))
-        figures[f"run-{stem}"] = run.plot
+        figures[f"run-{stem}"] = partial(run_figure, run)
         files[f"trace-{stem}.csv"] = run.to_csv
         behind.append(f"### {markdown(stem)}\n\n{markdown(what_it_does(run))}\n\n![{stem}](run-{stem}.svg)")
     return Sheet(
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),
         tables=[comparison_table(rows, which, title, bold) for title, which in parts],
-        found=[comparison.recommendation.text, *both_ends(comparison)],
+        conclusions=[comparison.recommendation.text, *both_ends(comparison)],
         notes=[
             *(definitions(comparison) if details else [f"{LEGEND} More: --details."]),
             *remarks(comparison),
         ],
         figures=figures,
+        panel=lambda ax: draw_trade_off(ax, points, machine.name),
+        records=records,
         files=files,
         machine=machine,
         fitted_to=comparison.fitted_to,

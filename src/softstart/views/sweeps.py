@@ -253,7 +253,7 @@ def sweep_sheet(
         f"{drive.name}: {plural(summary.starts, 'start')}",
         [*machine_lines(drive), *([f"  {controllers_set_up(None, fitted_to)}"] if fitted_to else [])],
         tables=_tables(results, summary),
-        found=[sweep_conclusion(results, summary)],
+        conclusions=[sweep_conclusion(results, summary)],
         notes=[
             f"{plural(count, 'start')}: {Status[name].value}"
             for name, count in summary.statuses.items()

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.drive.data_sheet import BAND
-from softstart.errors import InputError
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
 from softstart.views.numbers import (
@@ -40,15 +39,11 @@ SHOWN = 24  # cells on a terminal
 SAME_TIME = 1e-3  # bounds on the start time that differ by less count as one
 
 
-def figure_of(tuning: Tuning, what: str | None) -> Any:
-    """Maps of what is asked for; InputError where there is nothing to draw."""
+def figure_of(tuning: Tuning, what: str) -> Any:
+    """Maps of the gains, of the metric tuned and by default, of the robust set, of its price."""
     robust = None if tuning.robust is None else tuning.robust.cells
-    made = {"price": tuning.price, "metric": tuning.schedule, "gains": tuning.schedule, "robust": robust}
-    there = [name for name, table in made.items() if table is not None]
-    what = what or there[0]
-    if (table := made.get(what)) is None:
-        choose = f"choose {', '.join(there)}"
-        raise InputError(f"what = {what!r}: there is no such figure of this tuning; {choose}.")
+    table = {"price": tuning.price, "robust": robust}.get(what, tuning.schedule)
+    assert table is not None
     name, metric = tuning.metric, _metric(tuning)
     if what == "gains":
         maps = {one.name: label(one.name, one.unit) for one in tuning.question.ranges}
@@ -269,7 +264,7 @@ def tuning_notes(tuning: Tuning) -> list[str]:
 def tuning_sheet(tuning: Tuning) -> Sheet:
     """What is shown of a tuning."""
     files: dict[str, str | Writer] = {}
-    figures, what = [], tuning.drive.WHAT.removeprefix("a ")
+    figures, what = ["price"] if tuning.price is not None else [], tuning.drive.WHAT.removeprefix("a ")
     if tuning.schedule is not None:
         figures += ["metric", "gains"]
         files |= {"schedule.toml": partial(tuning.to_toml, what="schedule"), "schedule.csv": tuning.to_csv}
@@ -280,13 +275,12 @@ def tuning_sheet(tuning: Tuning) -> Sheet:
     for name in ("between", "price"):
         if (table := getattr(tuning, name)) is not None:
             files[f"{name}.csv"] = columns_file(_columns(table))
-    figures += ["price"] if tuning.price is not None else []
     return Sheet(
         f"{tuning.drive.name}: {tuning.controller} tuned",
         machine_lines(tuning.drive),
         tuning_question(tuning),
         tables=list(_tables(tuning)),
-        found=conclusions(tuning),
+        conclusions=conclusions(tuning),
         notes=tuning_notes(tuning),
         figures={one: partial(figure_of, tuning, one) for one in figures},
         files=files,

@@ -45,4 +45,6 @@ class PaperB(Study):
         )  # fmt: skip
         claims = verdicts.claims(found)
         progress("drawing")
-        return self.result(made, claims, (*figures.over_speed(found), *found.figures().values()))
+        return self.result(
+            made, claims, (*figures.over_speed(found), *(draw() for draw in found.figures.values()))
+        )

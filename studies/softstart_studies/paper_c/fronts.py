@@ -16,6 +16,7 @@ import numpy as np
 from softstart.clutch import LAWS, Clutch, Engagement, engage
 from softstart.errors import InputError
 from softstart.quantities import nearest, show
+from softstart.results import Result
 from softstart.study import Table
 from softstart.views.clutches import clutch_lines
 from softstart.views.drawing import COLOURS, DASHES, GREY, MARKERS, drawing, entitle, head, new_figure
@@ -33,8 +34,8 @@ COVERS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class EngagementFront:
+@dataclass(frozen=True, eq=False, repr=False)
+class EngagementFront(Result):
     """Least friction work over the peak of the shaft torque, as `optimize_engagement` returns it; SI.
 
     `points` are the optimal laws of the class "any" or "nondecreasing" by rising peak. `laws` are known ones,
@@ -62,10 +63,7 @@ class EngagementFront:
             "laws": list(self.laws),
         }
 
-    def plot(self) -> Any:
-        """The front with the known laws, and the laws on it."""
-        return front_figure([self], (1.0, "N m"))
-
+    @property
     def sheet(self) -> Sheet:
         """What the command shows and writes; each law of the front is a file that --law reads."""
         points, laws = [one.summary() for one in self.points], self.laws
@@ -98,9 +96,9 @@ class EngagementFront:
                 ShownTable.of(f"Least friction work at a given peak, laws: {self.law_class}", found),
                 ShownTable.of("Known laws against the optimum", known, ("law",)),
             ],
-            found=[f"The law with the least peak has less peak and work than {beaten}."] if beaten else [],
+            conclusions=[f"The law with the least peak has less peak and work than {beaten}."] * bool(beaten),
             notes=[f"The bounds cover {COVERS[self.law_class]}."],
-            figures={"front": self.plot},
+            figures={"front": lambda: front_figure([self], (1.0, "N m"))},
             files={
                 "clutch.toml": self.clutch.to_toml(),
                 "front.csv": records_file(points),

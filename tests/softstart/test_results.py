@@ -5,7 +5,9 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 
 import softstart
 from softstart import (
@@ -20,8 +22,9 @@ from softstart import (
     reduce_chain,
     simulate,
 )  # fmt: skip
-from softstart.notebook import OneLine, Shown
+from softstart.errors import InputError
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
+from softstart.results import OneLine, Result
 from softstart.views.numbers import TextTable
 from softstart.views.sheet import Sheet, as_html
 
@@ -61,12 +64,37 @@ def test_no_result_prints_its_arrays():
     """A dataclass makes a repr of its own unless it is told not to."""
     house = Path(softstart.__file__).parent
     for path in house.rglob("*.py"):
-        if re.search(r"^class \w+\((OneLine|Shown)", path.read_text("utf-8"), re.MULTILINE):
+        if re.search(r"^class \w+\((OneLine|Result)", path.read_text("utf-8"), re.MULTILINE):
             import_module(".".join(("softstart", *path.relative_to(house).with_suffix("").parts)))
-    found = [*OneLine.__subclasses__(), *Shown.__subclasses__()]
+    found = [*OneLine.__subclasses__(), *Result.__subclasses__()]
     assert len(found) > 25
     own = {one.__name__ for one in found if "__repr__" in vars(one)}
-    assert own == {"Run", "Optimum", "LinearView"}
+    assert own == {"Result", "Run", "Comparison", "Optimum", "LinearView", "Report"}
+
+
+def test_a_result_draws_its_main_panel_on_given_axes():
+    figure, (left, right) = plt.subplots(1, 2)
+    run, both = simulate(CRANE, "ramp"), compare(CRANE, ["direct", "ramp"])
+    assert run.plot(ax=left) is figure
+    assert both.plot(ax=right) is figure
+    assert left.get_ylabel() == "torque, N m"
+    assert right.get_xlabel() == "start time, s"
+    assert len(both.plot().axes) == 2
+    with pytest.raises(InputError, match=r"^ax: the figure of Fatigue has several axes; leave ax out"):
+        fatigue([run]).plot(ax=left)
+    plt.close("all")
+
+
+def test_a_result_with_rows_is_a_dataframe():
+    run, both = simulate(CRANE, "ramp"), compare(CRANE, ["direct", "ramp"])
+    assert list(both.to_dataframe()["controller"]) == ["ramp", "direct"]
+    assert list(fatigue([run]).to_dataframe()["controller"]) == ["ramp"]
+    front = Front(CRANE, "reached", (POINT,), (ControllerPoint("ramp", 1.2, 0.4, "", POINT),))
+    assert list(front.to_dataframe()["what"]) == ["optimum", "ramp"]
+    traces = run.to_dataframe()
+    assert (traces["T [N*m]"].to_numpy() == run.T).all()
+    with pytest.raises(InputError, match=r"^to_dataframe: <Vibration: .* has no rows"):
+        natural_vibration(Chain.load("crane-4-mass")).to_dataframe()
 
 
 def test_a_table_that_is_too_wide_goes_on_below_its_keys():
