@@ -1,3 +1,3 @@
 """The interactive page: `softstart serve`. NiceGUI is imported only when the page is built."""
 
-USER = "softstart.user"  # in the scope of a request: whose browser it comes from
+USER = "user"  # in the session of a request: whose browser it comes from

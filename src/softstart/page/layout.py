@@ -124,7 +124,7 @@ def _end(task: asyncio.Task[Any], session: Session) -> None:
 def _panels(session: Session, client: Client) -> None:
     """The tabs for what is computed in the background, and for files."""
     try:
-        user = client.request.scope.get(USER, client.id)  # of all tabs of a browser
+        user = client.request.scope.get("session", {}).get(USER, client.id)  # of all tabs of a browser
     except RuntimeError:  # a page that no request has asked for
         user = client.id
     with ui.tabs().props("dense no-caps align=justify").classes("panel-tabs") as tabs:
