@@ -51,10 +51,10 @@ def enter(page: Any, path: str, text: str) -> None:
 
 
 def kept(page: Any) -> None:
-    """Wait until the tab has kept its bench."""
+    """Wait until the tab has stored its inputs."""
     at_rest(page)
     page.wait_for_function(
-        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
+        "(sessionStorage.getItem('softstart-inputs') ?? '').includes(location.hash.slice(1))"
     )
 
 

@@ -69,6 +69,6 @@ def _warm_up(machine: Loaded) -> None:
 
     for session in (Session(), Session(machine)):
         _ = session.strategies
-        if (axes := machines.axes_about(session.machine, 3, 3)) is not None:
-            controller = session.controllers[session.selected]
-            machines.k_dyn_row(session.machine, controller, axes.gaps, axes.inertias[1])
+        if (axes := machines.axes_about(session.inputs.machine, 3, 3)) is not None:
+            controller = session.inputs.controllers[session.inputs.selected]
+            machines.k_dyn_row(session.inputs.machine, controller, axes.gaps, axes.inertias[1])

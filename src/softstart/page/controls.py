@@ -9,7 +9,7 @@ from typing import Any
 
 from softstart.errors import InputError
 from softstart.page import links
-from softstart.page.frames import SERVER, Screen
+from softstart.page.frames import SERVER, FrameBuilder
 from softstart.page.machines import DIGITS, NODE_DIGITS, Entry
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
@@ -41,13 +41,13 @@ class Delay:
 class Controls:
     """Takes messages of the browser, dictionaries with `what` and more; never raises for a wrong one.
 
-    `poke` is called after each message that may change what is shown but has left the session unchanged; of
-    its own changes the session informs its listeners.
+    `poke` is called after each message that may change what is shown but has left the session unchanged; the
+    session informs its listeners of its own changes.
     """
 
-    def __init__(self, session: Session, screen: Screen, poke: Callable[[], None]) -> None:
+    def __init__(self, session: Session, frames: FrameBuilder, poke: Callable[[], None]) -> None:
         self._session = session
-        self._screen = screen
+        self._frames = frames
         self._poke = poke
         self._delay = Delay()
         # by `what`: what to do, and the arguments that it needs; other messages are none of this page's
@@ -62,44 +62,44 @@ class Controls:
             "select": (session.select, {"name": str}),
             "show": (session.show, {"name": str, "visible": bool}),
             "remove": (session.remove, {"name": str}),
-            "keep": (self._keep, {"kept": bool}),
-            "reference": (session.keep_reference, {"kept": bool}),
+            "fix": (self._fix, {"fixed": bool}),
+            "reference": (session.set_reference, {"on": bool}),
             "window": (self._window, {"begin": float, "end": float}),
-            "hello": (self._hello, {"kept": object, "link": object}),
+            "hello": (self._hello, {"stored": object, "link": object}),
         }
 
     def take(self, message: object) -> None:
-        """One message. What is wrong with it is said in the next frame, next to its field if it has one."""
+        """One message. What is wrong with it is in the next frame, next to its field if it has one."""
         if not isinstance(message, Mapping):
             return
         act, kinds = self._actions.get(str(message.get("what")), (None, {}))
         arguments = {name: message.get(name) for name in kinds}
         if act is None or not all(_is_a(kind, arguments[name]) for name, kind in kinds.items()):
             return
-        self._screen.follow()
+        self._frames.follow()
         # without a field, the message appears next to the figure
-        place = path if (path := str(arguments.get("path"))) in self._screen.entries else ""
+        place = path if (path := str(arguments.get("path"))) in self._frames.entries else ""
         version = self._session.version
         stamp: Any = message.get("stamp")
         if _is_a(float, stamp):
-            self._screen.stamp = float(stamp)
-            self._screen.late = self._delay.of(float(stamp) / 1000.0, perf_counter())
+            self._frames.stamp = float(stamp)
+            self._frames.late = self._delay.of(float(stamp) / 1000.0, perf_counter())
         try:
             act(*arguments.values())
         except Exception as error:  # a drive may refuse anything
-            self._screen.mistakes[place] = sentence_of(error)
+            self._frames.mistakes[place] = sentence_of(error)
         else:
-            self._screen.mistakes.pop(place, None)
+            self._frames.mistakes.pop(place, None)
         if self._session.version == version:
             self._poke()
 
     def _entry(self, path: str) -> Entry:
-        if path not in self._screen.entries:
+        if path not in self._frames.entries:
             raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
-        return self._screen.entries[path]
+        return self._frames.entries[path]
 
     def _slide(self, path: str, position: float) -> None:
-        entry, units = self._entry(path), self._screen.units
+        entry, units = self._entry(path), self._session.inputs.units
         if entry.scale is None:
             raise InputError(f"{path}: there is no such slider.")
         value = entry.scale.value(position)
@@ -113,40 +113,40 @@ class Controls:
             raise InputError(
                 f"{path}: the text has more than {LONGEST_TEXT} characters; write {entry.example}."
             )
-        words = self._screen.units.typed(" ".join(text.split()), entry.unit)
+        words = self._session.inputs.units.typed(" ".join(text.split()), entry.unit)
         if not (words or entry.optional):
             raise InputError(f"{path}: the field is empty; write for example {entry.example}.")
         self._session.set(path, words or None)
 
     def _reset(self, path: str) -> None:
         """A parameter of the machine as it was loaded, or the default of one of the strategy."""
-        _, loaded = self._session.origin.parameters_by_path().get(self._entry(path).path, (None, None))
+        _, loaded = self._session.inputs.origin.parameters_by_path().get(self._entry(path).path, (None, None))
         self._session.set(path, loaded)
 
     def _leave(self, path: str) -> None:
-        """What was written in a field is undone: nothing changes, and its error message disappears."""
+        """Discard the text of a field: nothing changes, and its error message disappears."""
 
     def _jump(self, gap: float, inertia: float) -> None:
-        self._session.move(self._screen.units.rounded(gap, "rad", NODE_DIGITS), inertia)
-        self._screen.mistakes.clear()
+        self._session.move(self._session.inputs.units.rounded(gap, "rad", NODE_DIGITS), inertia)
+        self._frames.mistakes.clear()
 
-    def _hello(self, kept: object, link: object) -> None:
-        """A page that is reloaded goes on with the bench that its tab has kept, or that of its address."""
-        self._screen.sent.clear()
-        if isinstance(kept, Mapping) and kept.get("server") == SERVER and kept.get("link") == link:
-            known = links.kept(str(kept.get("bench")), str(link))
-            if known is not None:
-                self._session.restore(known)
+    def _hello(self, stored: object, link: object) -> None:
+        """A reloaded page goes on with the inputs that its tab has stored, or those of its address."""
+        self._frames.sent.clear()
+        if isinstance(stored, Mapping) and stored.get("server") == SERVER and stored.get("link") == link:
+            inputs = links.stored(str(stored.get("name")), str(link))
+            if inputs is not None:
+                self._session.restore(inputs)
                 return
         if isinstance(link, str) and link:
-            self._session.restore(links.bench_of(link, self._session.bench))
+            self._session.restore(links.inputs_of(link, self._session.inputs))
 
-    def _keep(self, kept: bool) -> None:
-        self._screen.kept = kept
+    def _fix(self, fixed: bool) -> None:
+        self._frames.fixed = fixed
 
     def _window(self, begin: float, end: float) -> None:
-        """What of the starts is seen, in s; all of it if it has no length."""
-        self._screen.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
+        """Visible part of the starts, in s; all of it if it has no length."""
+        self._frames.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
 
 
 def _is_a(kind: type, value: object) -> bool:

@@ -97,7 +97,7 @@ class DataSheetPanel:
 
     def _use(self) -> None:
         if (found := self.sheet()) is not None:
-            self._session.take(found.possible)
+            self._session.load(found.possible)
             notify(f"{clipped(found.name)} is loaded.")
 
     def _save(self) -> None:

@@ -77,14 +77,14 @@ class DriveFiles:
 
     def _take_over(self, machine: Loaded) -> None:
         self._troubles.say(())
-        self._session.take(machine)
-        notify(f"{clipped(self._session.machine.name)} is loaded.")
+        self._session.load(machine)
+        notify(f"{clipped(self._session.inputs.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
         self._troubles.say(error.sentences, f"{clipped(name)} was not loaded; the drive is unchanged.")
 
     def _save(self) -> None:
-        save(self._session.machine.to_toml(), drive_file(self._session.machine))
+        save(self._session.inputs.machine.to_toml(), drive_file(self._session.inputs.machine))
 
 
 def machine_of(content: bytes, name: str) -> Loaded:
@@ -141,8 +141,8 @@ class Exports:
         if self._session.version == self._seen:
             return
         self._seen = self._session.version
-        self._caption.set_text(f"Selected: {self._session.selected}")
-        selected = self._session.controllers[self._session.selected]
+        self._caption.set_text(f"Selected: {self._session.inputs.selected}")
+        selected = self._session.inputs.controllers[self._session.inputs.selected]
         self._of_profile.set_visibility(profile_of(selected) is not None)
 
     def _state(self) -> None:
@@ -150,20 +150,20 @@ class Exports:
         self._again.set_visibility(bool(self._text) and not self._view.busy and not self._view.failed)
 
     def _named(self, *parts: str, suffix: str) -> str:
-        return file_name(self._session.machine.name, *parts, suffix=suffix)
+        return file_name(self._session.inputs.machine.name, *parts, suffix=suffix)
 
     def _traces(self) -> None:
-        found = self._session.result(self._session.selected)
+        found = self._session.result(self._session.inputs.selected)
         if found.run is None:
             raise InputError(f"{found.name} has no traces: {found.trouble}")
         save(written_text(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
 
     def _profile(self, suffix: str) -> None:
-        label = self._session.selected
-        profile = profile_of(self._session.controllers[label])
+        label = self._session.inputs.selected
+        profile = profile_of(self._session.inputs.controllers[label])
         if profile is None:  # another strategy was selected a moment ago
             raise InputError(f"{label}: this strategy plays no torque profile.")
-        about = {"drive": self._session.machine.name, "strategy": label}
+        about = {"drive": self._session.inputs.machine.name, "strategy": label}
         writers: dict[str, Any] = {
             ".csv": profile.to_csv,
             ".toml": lambda path: profile.to_toml(path, about),
@@ -173,10 +173,10 @@ class Exports:
 
     def _begin_report(self) -> None:
         session = self._session
-        strategies = dict(session.controllers)
+        strategies = dict(session.inputs.controllers)
         name, self._text = self._named("report", suffix=".html"), ""
-        command = command_text(session.seen, strategies, "report", f"--out={name}")
-        work = tasks.report_task, session.possible, list(strategies.values()), command
+        command = command_text(session.inputs.machine_in_units, strategies, "report", f"--out={name}")
+        work = tasks.report_task, session.inputs.both_ends, list(strategies.values()), command
         self._view.begin("report", *work, subject=name)
 
     def _done(self, text: str) -> None:
@@ -204,11 +204,18 @@ class CommandLine:
         if session.version == self._seen:
             return
         self._seen = session.version
-        text = command_text(session.machine, {label: session.controllers[label] for label in session.shown})
+        text = command_text(
+            session.inputs.machine,
+            {label: session.inputs.controllers[label] for label in session.inputs.drawn},
+        )
         self._text.set_text(text)
         words = text.replace(",", " ").replace("=", " ").split()
         needed = [word for word in words if word.endswith((".toml", ".csv"))]
-        profiles = [label for label in session.shown if profile_of(session.controllers[label]) is not None]
+        profiles = [
+            label
+            for label in session.inputs.drawn
+            if profile_of(session.inputs.controllers[label]) is not None
+        ]
         notes = [f"First save from here: {', '.join(needed)}." if needed else
                  "It gives the strategies that are drawn as a table in a terminal."]  # fmt: skip
         if len(profiles) > 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import secrets
 from base64 import b64encode
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from time import perf_counter
 from typing import Any
 
@@ -13,23 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.chain.machines import Machine
 from softstart.controller.tuned import Tuned
 from softstart.drive.plausibility import plausibility_warnings
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.page import links, machines
 from softstart.page.machines import STRATEGY, Axes, Entry
 from softstart.page.sentences import differences, sentence_of, written
-from softstart.page.session import Reference, Session, Strategy
+from softstart.page.session import Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
 from softstart.views.numbers import unit
 from softstart.views.starts import NO_STIFFNESS, position_notes
 
-QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
-QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
+QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are computed after it
+QUICK = 0.010  # s, of a start that is computed at every step of a slider, even if no frame follows
 LONG = (math.inf, math.inf)
-TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute overtakes the hand after a shorter halt
+TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute catches up after a shorter halt
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is reloaded comes back, or does not
 MOST_STAGES = 400  # of one gap, shaded and lit up
@@ -40,234 +41,222 @@ WIDEST = 32  # points of a bucket before thinning
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
 
 Frame = dict[str, Any]
+Mark = tuple[str, Any]  # on a slider: what it means, and its value
 
 
-class Screen:
+class FrameBuilder:
     """The frames of one session; of what the browser has in `sent`, nothing is sent again."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
-        self.kept = False  # the map keeps the controller as it is set up for the drive of the moment
+        self.fixed = False  # the controller of the map is set up once, for the machine as it is now
         self.stamp = 0.0  # the browser's clock at the last input that has been taken
         self.late = 0.0  # s, how long the last message has waited to be read
-        self.window: tuple[float, float] | None = None  # s, what of the starts is seen; None for all
-        self.mistakes: dict[str, str] = {}  # sentences by the field they stand beside
+        self.window: tuple[float, float] | None = None  # s, visible part of the starts; None for all
+        self.mistakes: dict[str, str] = {}  # sentences by the field that they stand next to
         self.sent: dict[str, Any] = {}  # by part of a frame
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
         self._next = 0  # whose turn it is among the other strategies
-        self._about: tuple[Any, ...] = (None,)  # what fields and axes are about
+        self._origin: Machine | None = None
+        self._fields_of: tuple[Any, ...] = ()
         self.follow()
 
     def follow(self) -> None:
-        """Fields, sliders and axes are about the machine as it was loaded and the selected strategy."""
-        session = self.session
-        origin, label = session.origin, session.selected
-        controller = session.controllers[label]
-        about = origin, label, type(controller)
-        if self._about[0] is origin and self._about == about:
-            return
-        if self._about[0] is not origin:
+        """Set fields, sliders and axes to the machine as it was loaded and the selected strategy."""
+        inputs = self.session.inputs
+        origin, label = inputs.origin, inputs.selected
+        controller = inputs.controllers[label]
+        if self._origin is not origin:
             self.axes, self._machine = machines.axes_about(origin), machines.parameter_fields(origin)
+            empty = {machines.LIMITS: not origin.limits, machines.GEAR: not origin.gear, machines.MORE: True}
+            self._folded = tuple(title for title, folded in empty.items() if folded)
             self.mistakes.clear()
-        self._about = about
+        elif self._fields_of == (label, type(controller)):
+            return
+        self._origin, self._fields_of = origin, (label, type(controller))
         try:
-            self._own = machines.strategy_entries(controller, origin, label)
+            self._strategy = machines.strategy_entries(controller, origin, label)
         except Exception as error:  # a controller is anyone's code; its start has said what is wrong
             sentence_of(error)  # which is logged
-            self._own = {}
+            self._strategy = {}
 
     @property
     def entries(self) -> Mapping[str, Entry]:
         """All fields by their paths: those of the machine, then those of the selected strategy."""
-        return {**self._machine, **self._own}
+        return {**self._machine, **self._strategy}
 
-    @property
-    def units(self) -> Units:
-        """Those of the session."""
-        return self.session.units
-
-    @property
-    def version(self) -> int:
-        """That of the session."""
-        return self.session.version
-
-    def _is_new(self, part: str, what: Any) -> bool:
+    def _is_new(self, part: str, content: Any) -> bool:
         """Whether the browser does not have this yet; it is sent then."""
-        if self.sent.get(part) == what:
+        if self.sent.get(part) == content:
             return False
-        self.sent[part] = what
+        self.sent[part] = content
         return True
 
     def _result(self, label: str) -> Strategy:
-        found = self.session.result(label, QUICK_EVENTS)
-        self._costs[label] = (self._costs.get(label, LONG)[1], found.cost)
-        return found
+        result = self.session.result(label, QUICK_EVENTS)
+        self._costs[label] = (self._costs.get(label, LONG)[1], result.cost)
+        return result
 
-    # frames that follow the hand -----------------------------------------------------------------------
+    # while a slider is dragged -------------------------------------------------------------------------
 
-    def glance(self) -> Frame | None:
+    def quick_frame(self) -> Frame | None:
         """The large figure alone, where one of the last two starts of the selected strategy was quick.
 
         None while messages wait to be read: then each start would make the others wait longer.
         """
-        session = self.session
-        slow = min(self._costs.get(session.selected, LONG)) > QUICK
-        if slow or self.late > TOO_LATE or self._about[0] is not session.origin:
+        session, label = self.session, self.session.inputs.selected
+        slow = min(self._costs.get(label, LONG)) > QUICK
+        if slow or self.late > TOO_LATE or self._origin is not session.inputs.origin:
             return None
-        found = self._result(session.selected)
-        return {
-            "stamp": self.stamp,
-            "version": session.version,
-            "figure": figure_view(session, found, self.units),
-        }
+        figure = figure_view(session, self._result(label))
+        return {"stamp": self.stamp, "version": session.version, "figure": figure}
 
-    def first(self) -> Frame:
+    def main_frame(self) -> Frame:
         """Fields, the large figure and the traces of the selected strategy."""
         self.follow()
-        session, units = self.session, self.units
-        found = self._result(session.selected)
-        gap, inertia = session.machine.gap_and_inertia
+        session, inputs, units = self.session, self.session.inputs, self.session.inputs.units
+        result = self._result(inputs.selected)
         frame = {
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": machine_fields(session, self._machine, units) | self._strategy_fields(found),
+            "fields": machine_fields(session, self._machine) | self._strategy_fields(result),
             "steps": session.steps,
-            "drive": session.machine.name,
-            "order": list(session.controllers),
-            "shown": list(session.shown),
+            "drive": inputs.machine.name,
+            "order": list(inputs.controllers),
+            "shown": list(inputs.drawn),
             "added": list(session.added),
             "changed": list(session.changed),
-            "selected": session.selected,
-            "figure": figure_view(session, found, units),
-            "traces": {session.selected: drawn(found, units, window=self.window)},
-            "rows": [row(session, found)],
+            "selected": inputs.selected,
+            "figure": figure_view(session, result),
+            "traces": {inputs.selected: drawn(result, units, window=self.window)},
+            "rows": [row(session, result)],
             "reference": self._reference(),
             "mapped": self.axes is not None,
-            "soft": session.soft is not None,
+            "soft": inputs.soft_drive is not None,
             # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
-            "here": (gap, inertia),
+            "here": inputs.machine.gap_and_inertia,
             "angle": (units.of("rad"), units.size("rad")),
             "map_is_old": not self._map_is_right(),
         }
-        for part, known in (("groups", self._machine), ("strategy", self._own)):
-            groups = self._grouped(known)
-            if self._is_new(part, groups):
-                frame[part] = groups
+        for part, entries in (("groups", self._machine), ("strategy", self._strategy)):
+            if self._is_new(part, (entries, units, self._folded)):
+                frame[part] = self._grouped(entries)
                 frame["filled"] = self._filled()
         return frame
 
     def _filled(self) -> list[str]:
-        """The groups in which something is not as it was when the drive was loaded: no fold hides that."""
-        now, before = self.session.machine.parameters_by_path(), self.session.origin.parameters_by_path()
-        return sorted({one.group for path, one in self._machine.items() if now.get(path) != before.get(path)})
+        """Groups with a value that is not as it was when the machine was loaded: these are unfolded."""
+        inputs = self.session.inputs
+        now, before = inputs.machine.parameters_by_path(), inputs.origin.parameters_by_path()
+        groups = {entry.group for path, entry in self._machine.items() if now.get(path) != before.get(path)}
+        return sorted(groups)
 
-    def _grouped(self, known: Mapping[str, Entry]) -> list[Frame]:
+    def _grouped(self, entries: Mapping[str, Entry]) -> list[Frame]:
         groups: dict[str, list[Frame]] = {}
-        for one in known.values():
-            groups.setdefault(one.group, []).append(described(one, self.units))
-        origin = self.session.origin
-        given = {machines.LIMITS: origin.limits, machines.GEAR: origin.gear, machines.MORE: False}
-        folded = [title for title, there in given.items() if not there]
-        return [{"title": title, "rows": rows, "folded": title in folded} for title, rows in groups.items()]
+        for entry in entries.values():
+            groups.setdefault(entry.group, []).append(described(entry, self.session.inputs.units))
+        return [
+            {"title": title, "rows": rows, "folded": title in self._folded} for title, rows in groups.items()
+        ]
 
-    def _strategy_fields(self, found: Strategy) -> dict[str, Frame]:
+    def _strategy_fields(self, result: Strategy) -> dict[str, Frame]:
         """The values with which the selected strategy starts; marks at its defaults and at tuned values."""
-        session = self.session
-        controller = session.controllers[session.selected]
-        told = found.run.told if found.run is not None else None
+        session, inputs, units = self.session, self.session.inputs, self.session.inputs.units
+        controller = inputs.controllers[inputs.selected]
+        told = None if result.run is None else result.run.told
         try:
-            default = controller.defaults(session.machine.design_drive if told is None else told)
+            default = controller.defaults(inputs.machine.design_drive if told is None else told)
         except Exception as error:  # as in `follow`
             sentence_of(error)
             return {}
         tuned = [
             (label, known.run.controller)
-            for label, other in session.controllers.items()
+            for label, other in inputs.controllers.items()
             if isinstance(other, Tuned) and type(other.controller) is type(controller)
             and (known := session.ready(label)) is not None and known.run is not None
         ]  # fmt: skip
-        shown = {}
-        for path, one in self._own.items():
+        fields = {}
+        for path, entry in self._strategy.items():
             name = path.removeprefix(STRATEGY)
-            given = getattr(controller, name)
-            value = default.get(name) if given is None else given
-            marks = [("default", default.get(name)), *((of, getattr(other, name)) for of, other in tuned)]
-            if value is not None and given is None and one.unit:
-                text = f"{self.units.shown(float(value), one.unit):.4g}"
+            setting = getattr(controller, name)
+            value = default.get(name) if setting is None else setting
+            marks = [("default", default.get(name)), *((of, getattr(gains, name)) for of, gains in tuned)]
+            if value is not None and setting is None and entry.unit:
+                text = f"{units.shown(float(value), entry.unit):.4g}"
             else:
-                text = written_value(value, one, self.units)
-            shown[path] = field_view(one, text, value, marks, self.units)
-            shown[path]["changed"] = given is not None and not isinstance(given, str)
-        return shown
+                text = written_value(value, entry, units)
+            fields[path] = field_view(entry, text, value, marks, units)
+            fields[path]["changed"] = setting is not None and not isinstance(setting, str)
+        return fields
 
     def _reference(self) -> Frame | None:
         """What the strategies are compared with, in words and figures; its trace if that is new."""
-        kept, found = self.session.bench.reference, self.session.reference()
-        if kept is None or found is None:
+        inputs, result = self.session.inputs, self.session.reference()
+        if inputs.reference is None or result is None:
             return None
-        line = outcomes(found) | {"name": ", ".join(filter(None, reference_words(kept, self.session)))}
-        if self._is_new("reference", (kept, self.window, self.units)):
-            line["trace"] = drawn(found, self.units, window=self.window)
+        line = outcomes(result) | {"name": ", ".join(filter(None, reference_words(inputs.reference, inputs)))}
+        if self._is_new("reference", (inputs.reference, self.window, inputs.units)):
+            line["trace"] = drawn(result, inputs.units, window=self.window)
         return line
 
-    def others(self) -> Iterator[Frame | None]:
-        """Rows of the other strategies and the traces of those that are shown, a few ms at a time.
+    def other_frames(self) -> Iterator[Frame | None]:
+        """Rows of the other strategies and the traces of those that are drawn, a few ms at a time.
 
-        While a hand keeps moving, each call goes on where the last one was left, so that all have their turn.
+        While a slider is dragged, each call goes on where the last one was left, so that all have their turn.
         """
-        session = self.session
-        labels = [label for label in session.controllers if label != session.selected]
+        session, inputs = self.session, self.session.inputs
+        labels = [label for label in inputs.controllers if label != inputs.selected]
+        visible = inputs.drawn
         begun = perf_counter()
         frame: Frame = {"rows": [], "traces": {}}
         for _ in labels:
             label = labels[self._next % len(labels)]
             self._next += 1
-            found = self._result(label)
-            frame["rows"].append(row(session, found))
-            if label in session.shown:
-                frame["traces"][label] = drawn(found, self.units, False, self.window)
+            result = self._result(label)
+            frame["rows"].append(row(session, result))
+            if label in visible:
+                frame["traces"][label] = drawn(result, inputs.units, False, self.window)
             if perf_counter() - begun > SLICE:
                 yield frame
                 begun, frame = perf_counter(), {"rows": [], "traces": {}}
         if frame["rows"]:
             yield frame
 
-    # when the drive is at rest -------------------------------------------------------------------------
+    # when nothing is dragged ---------------------------------------------------------------------------
 
-    def at_rest(self) -> Iterator[Frame | None]:
-        """The drive, for the tab to keep; long starts, changed drives, what is recommended, then the map."""
-        session, machine = self.session, self.session.machine
-        if self._is_new("bench", session.bench):
-            name, link = links.keep(session)
-            yield {"keep": {"server": SERVER, "bench": name, "link": link}}
-        for label in session.controllers:
+    def idle_frames(self) -> Iterator[Frame | None]:
+        """The inputs, for the tab to keep; long starts, changed drives, the recommendation, then the map."""
+        session, inputs = self.session, self.session.inputs
+        if self._is_new("inputs", inputs):
+            name, link = links.store(session)
+            yield {"keep": {"server": SERVER, "name": name, "link": link}}
+        for label in inputs.controllers:
             if session.ready(label) is None:
-                found = session.result(label)
-                frame: Frame = {"rows": [row(session, found)]}
-                if label == session.selected:
-                    frame |= self.first()
-                elif label in session.shown:
-                    frame["traces"] = {label: drawn(found, self.units, False, self.window)}
+                result = session.result(label)
+                frame: Frame = {"rows": [row(session, result)]}
+                if label == inputs.selected:
+                    frame |= self.main_frame()
+                elif label in inputs.drawn:
+                    frame["traces"] = {label: drawn(result, inputs.units, False, self.window)}
                 yield frame
-            yield from (None for _ in session.judged(label))
+            yield from session.compute_row(label)
+        advice = [session.recommendation().text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
         yield {
-            "rows": [row(session, found) for found in session.strategies],
-            "recommendation": " ".join(
-                [session.recommendation().text, *([NO_STIFFNESS] if session.soft else [])]
-            ),
-            "plausibility_warnings": plausibility_warnings(machine),
-            "assumed": [one for one in machine.assumed.split("; ") if one],
+            "rows": [row(session, result) for result in session.strategies],
+            "recommendation": " ".join(advice),
+            "plausibility_warnings": plausibility_warnings(inputs.machine),
+            "assumed": [text for text in inputs.machine.assumed.split("; ") if text],
         }
         yield from self._map()
 
     def _map(self) -> Iterator[Frame | None]:
-        session, axes = self.session, self.axes
+        inputs, axes = self.session.inputs, self.axes
         if axes is None or self._map_is_right():
             return
-        machine, controller = session.machine, session.controllers[session.selected]
-        wanted = controller, self.kept, axes, self._map_machine(axes)
-        nominal = machine if self.kept else None
+        machine, controller = inputs.machine, inputs.controllers[inputs.selected]
+        content = controller, self.fixed, axes, self._map_machine(axes)
+        nominal = machine if self.fixed else None
         cells = 4  # computed in one slice; as many as fit into it
         head = self._map_head(axes)
         away = np.abs(np.log(np.array(axes.inertias) / machine.gap_and_inertia[1]))  # nearest rows first
@@ -277,41 +266,37 @@ class Screen:
             k: list[float | None] = []
             while len(k) < len(axes.gaps):
                 begun = perf_counter()
-                part = axes.gaps[len(k) : len(k) + cells]
-                k += numbers(
-                    machines.k_dyn_row(
-                        machine, controller, part, axes.inertias[index], nominal, session.origin
-                    )
-                )
-                each = (perf_counter() - begun) / len(part)
+                gaps, inertia = axes.gaps[len(k) : len(k) + cells], axes.inertias[index]
+                k += numbers(machines.k_dyn_row(machine, controller, gaps, inertia, nominal, inputs.origin))
+                each = (perf_counter() - begun) / len(gaps)
                 cells = min(max(int(SLICE / each), 1), len(axes.gaps))
                 yield None
             if index == rows[-1]:
-                self.sent["map"] = wanted
+                self.sent["map"] = content
             yield {"map_row": {"index": index, "k": k}, "map": head}
 
     def _map_is_right(self) -> bool:
         """True if the browser has the map of this machine and strategy."""
-        axes, known = self.axes, self.sent.get("map")
-        if known is None or axes is None:
+        axes, sent, inputs = self.axes, self.sent.get("map"), self.session.inputs
+        if sent is None or axes is None:
             return False
-        same = known[0] is self.session.controllers[self.session.selected]
-        return same and known[1:] == (self.kept, axes, self._map_machine(axes))
+        same = sent[0] is inputs.controllers[inputs.selected]
+        return same and sent[1:] == (self.fixed, axes, self._map_machine(axes))
 
     def _map_machine(self, axes: Axes) -> Any:
-        """What of the machine a map depends on: not its gap and inertia, unless the controller is kept."""
-        machine = self.session.machine
-        return machine if self.kept else machines.placeless(machine, axes, self.session.origin)
+        """What of the machine a map depends on: not its gap and inertia, unless the controller is fixed."""
+        inputs = self.session.inputs
+        return inputs.machine if self.fixed else machines.placeless(inputs.machine, axes, inputs.origin)
 
     def _map_head(self, axes: Axes) -> Frame:
-        machine = self.session.machine
+        machine = self.session.inputs.machine
         allowed = machine.limits.shaft_torque
-        inertias = (machine.gap_and_inertia[1],) * len(axes.inertias) if self.kept else axes.inertias
+        inertias = (machine.gap_and_inertia[1],) * len(axes.inertias) if self.fixed else axes.inertias
         symbols, labels = machines.map_words(machine)
         return {
             "gaps": list(axes.gaps),
             "inertias": list(axes.inertias),
-            "strategy": self.session.selected,
+            "strategy": self.session.inputs.selected,
             "of": str(hash(self._map_machine(axes))),
             "limit": None if allowed is None else numbers(allowed / machines.bases(machine, inertias)),
             "symbols": symbols,
@@ -324,7 +309,7 @@ def json_number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def numbers(values: Any) -> list[float | None]:
+def numbers(values: Vector) -> list[float | None]:
     """Numbers that JSON can carry."""
     return [json_number(value) for value in values.tolist()]
 
@@ -332,66 +317,67 @@ def numbers(values: Any) -> list[float | None]:
 # fields -------------------------------------------------------------------------------------------------
 
 
-def described(one: Entry, units: Units) -> Frame:
+def described(entry: Entry, units: Units) -> Frame:
     """A field as the browser builds it; `text` says that it takes words alone."""
-    text = not (one.unit or one.choices or one.path.startswith(STRATEGY))
-    return vars(one) | {"unit": unit(units.of(one.unit)), "scale": one.scale is not None, "text": text}
+    text = not (entry.unit or entry.choices or entry.path.startswith(STRATEGY))
+    return vars(entry) | {"unit": unit(units.of(entry.unit)), "scale": entry.scale is not None, "text": text}
 
 
-def field_view(one: Entry, text: str, value: Any, marks: Any, units: Units) -> Frame:
+def field_view(entry: Entry, text: str, value: Any, marks: Iterable[Mark], units: Units) -> Frame:
     """What a field shows: its text, where its slider is, and marks on that, each with what it means."""
-    scale = one.scale
+    scale = entry.scale
     if scale is None:
         return {"text": text}
     return {
         "text": text,
         "position": scale.position(0.0 if value is None else float(value)),
         "marks": [
-            (scale.position(float(at)), f"{of}: {written(float(at), one.unit, units)}")
-            for of, at in marks
-            if at is not None
+            (scale.position(float(mark)), f"{of}: {written(float(mark), entry.unit, units)}")
+            for of, mark in marks
+            if mark is not None
         ],
     }
 
 
-def written_value(value: Any, one: Entry, units: Units) -> str:
+def written_value(value: Any, entry: Entry, units: Units) -> str:
     """The text of a field; empty for a value that is not given."""
     if value is None or isinstance(value, str):
         return value or ""
-    each = value if isinstance(value, tuple) else (value,)
-    return "; ".join(written(float(part), one.unit, units) for part in each)
+    parts = value if isinstance(value, tuple) else (value,)
+    return "; ".join(written(float(part), entry.unit, units) for part in parts)
 
 
-def machine_fields(session: Session, known: Mapping[str, Entry], units: Units) -> dict[str, Frame]:
+def machine_fields(session: Session, entries: Mapping[str, Entry]) -> dict[str, Frame]:
     """By path what the fields of the machine show; a mark is where its value was when it was loaded."""
-    now, before = session.machine.parameters_by_path(), session.origin.parameters_by_path()
-    shown = {}
-    for path, one in known.items():
-        if path in now:
-            # no damping is a damping ratio of 0
-            value, first = (0.0 if one.scale and v is None else v for v in (now[path][1], before[path][1]))
-            text = written_value(value, one, units)
-            typed = session.typed.get((path, value), "")
-            if (
-                " " in text and " " in typed
-            ):  # with a unit of its own: that which was typed, 36 arcmin or 0.6 deg
-                text = typed
-            if path == "units":
-                text = text or units.text  # as the machine was given
-            shown[path] = field_view(one, text, value, [("as loaded", first)], units)
-    return shown
+    inputs, units = session.inputs, session.inputs.units
+    now, before = inputs.machine.parameters_by_path(), inputs.origin.parameters_by_path()
+    fields = {}
+    for path, entry in entries.items():
+        if path not in now:
+            continue
+        value, loaded = now[path][1], before[path][1]
+        if entry.scale:  # no damping is a damping ratio of 0
+            value, loaded = (0.0 if number is None else number for number in (value, loaded))
+        text = written_value(value, entry, units)
+        typed = session.typed.get((path, value), "")
+        if " " in text and " " in typed:  # with a unit of its own, as it was typed: 36 arcmin or 0.6 deg
+            text = typed
+        if path == "units":
+            text = text or units.text  # as the machine was given
+        fields[path] = field_view(entry, text, value, [("as loaded", loaded)], units)
+    return fields
 
 
 # figures ------------------------------------------------------------------------------------------------
 
 
-def figure_view(session: Session, found: Strategy, units: Units) -> Frame:
+def figure_view(session: Session, result: Strategy) -> Frame:
     """The large figure and the numbers around it."""
-    run = found.run
-    facts = outcomes(found) | {
-        "time_lost": json_number(session.time_lost(found)),
-        "status": found.status,
-        "base": json_number(float(session.machine.mean_torque)),
+    run, units = result.run, session.inputs.units
+    facts = outcomes(result) | {
+        "time_lost": json_number(session.time_lost(result)),
+        "status": result.status,
+        "base": json_number(float(session.inputs.machine.mean_torque)),
         "speed_unit": units.of("rad/s"),
     }
     if run is not None:
@@ -405,63 +391,66 @@ def figure_view(session: Session, found: Strategy, units: Units) -> Frame:
     return facts
 
 
-def outcomes(found: Strategy) -> Frame:
-    """What came out of a start by itself."""
+def outcomes(result: Strategy) -> Frame:
+    """Figures of a start that need no other one."""
     return {
-        "name": found.name,
-        "k_dyn": json_number(found.k_dyn),
-        "start_time": json_number(found.start_time),
-        "peak_torque": json_number(found.peak_torque),
+        "name": result.name,
+        "k_dyn": json_number(result.k_dyn),
+        "start_time": json_number(result.start_time),
+        "peak_torque": json_number(result.peak_torque),
     }
 
 
-def row(session: Session, found: Strategy) -> Frame:
+def row(session: Session, result: Strategy) -> Frame:
     """One line of the table; `worn`, `soft`, `settled`, `limits`, `flag` are empty until computed."""
-    known = session.row(found.name)
-    flags = () if known is None else known.flags
-    trouble = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
-    return outcomes(found) | {
-        "time_lost": json_number(session.time_lost(found)),
-        "worn": None if known is None else json_number(known.k_dyn_worn_gap),
-        "soft": json_number(known.cases[SOFT_END].k_dyn) if known and SOFT_END in known.cases else None,
-        "settled": None if known is None else json_number(known.run.settled_time),
-        "limits": "" if known is None else known.against_limits,
-        "flag": ", ".join(flag.word for flag in flags),
-        "trouble": trouble or "; ".join(flag.text for flag in flags),
+    line = outcomes(result) | {
+        "time_lost": json_number(session.time_lost(result)),
+        "trouble": result.trouble or ("" if math.isfinite(result.start_time) else result.status),
+    }
+    known = session.row(result.name)
+    if known is None:
+        return line | {"worn": None, "soft": None, "settled": None, "limits": "", "flag": ""}
+    return line | {
+        "worn": json_number(known.k_dyn_worn_gap),
+        "soft": json_number(known.cases[SOFT_END].k_dyn) if SOFT_END in known.cases else None,
+        "settled": json_number(known.run.settled_time),
+        "limits": known.against_limits,
+        "flag": ", ".join(flag.word for flag in known.flags),
+        "trouble": line["trouble"] or "; ".join(flag.text for flag in known.flags),
     }
 
 
-def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
-    """A reference's strategy, and what of it and of its drive is not as it is now.
+def reference_words(reference: Reference, inputs: Inputs) -> tuple[str, ...]:
+    """A reference's strategy, and what of it and of its machine is not as it is now.
 
     >>> session = Session()
     >>> session.select("ramp")
-    >>> session.keep_reference()
+    >>> session.set_reference()
     >>> session.set("gap", 1.0)
     >>> session.set_parameter("time", "200 ms")
-    >>> reference_words(session.bench.reference, session)
+    >>> reference_words(session.inputs.reference, session.inputs)
     ('ramp', 'time default', 'shaft.gap 0.5 rad')
     """
-    controller, other = kept.controller, session.controllers.get(kept.label)
+    controller, now = reference.controller, inputs.controllers.get(reference.label)
     words = [
-        f"{one.name} {'default' if value is None else value}"
-        for one in (machines.page_parameters(controller) if type(other) is type(controller) else ())
-        if (value := getattr(controller, one.name)) != getattr(other, one.name)
+        f"{parameter.name} {'default' if value is None else value}"
+        for parameter in (machines.page_parameters(controller) if type(now) is type(controller) else ())
+        if (value := getattr(controller, parameter.name)) != getattr(now, parameter.name)
     ]
-    return kept.label, *words, differences(kept.drive, session.seen)
+    return reference.label, *words, differences(reference.machine, inputs.machine_in_units)
 
 
 # traces -------------------------------------------------------------------------------------------------
 
 
 def drawn(
-    found: Strategy, units: Units, whole: bool = True, window: tuple[float, float] | None = None
+    result: Strategy, units: Units, whole: bool = True, window: tuple[float, float] | None = None
 ) -> Frame | None:
     """A start as the browser draws it: channels in single precision, the peak; if `whole` shafts and bodies.
 
     Speeds and angles are in these units; `turn` is how much of a rad/s one of the speeds is.
     """
-    run = found.run
+    run = result.run
     if run is None:
         return None
     traces = traces_of(run, window)
@@ -500,10 +489,10 @@ def stages_of(run: Run, shaft: int) -> list[tuple[float, float, int]]:
     """
     spans = run.recorded.spans
     mode, side = run.recorded.of_shafts(1)[:-1, shaft], run.recorded.of_shafts(2)[:-1, shaft]
-    touched = np.where(np.isin(mode, (at.OPEN, at.BEYOND)), 0, np.where(side < 0.0, -1, 1))
+    touched = np.where(np.isin(mode, (rec.OPEN, rec.BEYOND)), 0, np.where(side < 0.0, -1, 1))
     first = np.flatnonzero(np.diff(touched, prepend=2))[:MOST_STAGES]
-    begins = spans[first, at.S_START]
-    ends = np.append(spans[first[1:], at.S_START], run.end_time)
+    begins = spans[first, rec.S_START]
+    ends = np.append(spans[first[1:], rec.S_START], run.end_time)
     return list(zip(begins.tolist(), ends.tolist(), touched[first].tolist(), strict=True))
 
 
@@ -536,9 +525,9 @@ def channels_at(run: Run, times: Vector) -> dict[str, Vector]:
     states = run.at(times)
     if len(run.drive.shaft_names) == 1:
         names = {"T[0]": "T", "theta[0]": "theta", "w[0]": "w1", "w[1]": "w2"}
-        return {"u": states["u"], **{name: states[own] for name, own in names.items()}}
+        return {"u": states["u"], **{name: states[state] for name, state in names.items()}}
     parts = {"T": states["T"], "theta": states["twist"], "w": states["w"]}
-    each = {f"{name}[{k}]": one for name, rows in parts.items() for k, one in enumerate(rows.T)}
+    each = {f"{name}[{k}]": row for name, rows in parts.items() for k, row in enumerate(rows.T)}
     return {"u": states["u"], **each}
 
 
@@ -546,14 +535,14 @@ def landmarks(run: Run) -> Vector:
     """Instants that are never thinned away: events and the instants just before, peaks of all stages, the
     peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
     """
-    events, joints = run.recorded.events["time"], run.recorded.spans[:, at.S_START]
+    events, joints = run.recorded.events["time"], run.recorded.spans[:, rec.S_START]
     peaks = [*run.recorded.shafts["peak_time"], *(stage.peak_time for stage in run.stages)]
     if joints.size > JUMPS:
         joints = joints[:0]
     sudden = np.concatenate([events, joints])
     others = [run.peak_time, run.start_time, 0.0, run.end_time]
-    found = np.concatenate([sudden, np.nextafter(sudden, 0.0), peaks, others])
-    return np.unique(found[~np.isnan(found)].clip(0.0, run.end_time))
+    times = np.concatenate([sudden, np.nextafter(sudden, 0.0), peaks, others])
+    return np.unique(times[~np.isnan(times)].clip(0.0, run.end_time))
 
 
 def thinned(rows: Vector, width: int) -> NDArray[np.intp]:

@@ -96,12 +96,9 @@ class Guard:
         # TrustedHostMiddleware knows no literal address of an exposed page, and the first of two Host headers
         hosts = request.headers.getlist("host")
         if len(hosts) != 1 or not self._is_this_machine(hosts[0]):
-            return (
-                403,
-                "This name is not one of this machine; open the address that softstart serve has printed.",
-            )
-        # CORSMiddleware forbids a foreign page to read the answer, not to ask, and leaves sockets alone. For
-        # requests without Origin, as for an image, browsers name the site: only a link may come from elsewhere
+            return 403, "This host is not served here; open the address that softstart serve has printed."
+        # CORSMiddleware forbids a foreign page to read the answer, not to ask, and ignores sockets. Requests
+        # without Origin, as for an image, name their site in browsers: only a link may come from elsewhere
         own = {f"{scheme}://{hosts[0].lower()}" for scheme in ("http", "https")}
         foreign = any(origin.lower() not in own for origin in request.headers.getlist("origin"))
         elsewhere = {"cross-site", "same-site"}.intersection(request.headers.getlist("sec-fetch-site"))

@@ -17,7 +17,7 @@ from nicegui.element import Element
 
 from softstart.page import USER
 from softstart.page.controls import Controls
-from softstart.page.frames import Screen
+from softstart.page.frames import FrameBuilder
 from softstart.page.live import Frame, Live
 from softstart.page.machines import Loaded
 from softstart.page.sentences import log, sentence_of
@@ -56,18 +56,18 @@ def style() -> str:
 
 def warm(drive: Loaded) -> None:
     """Do what the first tab would wait for, and others behind it."""
-    gentlest_strategy(drive)
+    first_strategy(drive)
     for _, module, _ in PANELS:
         with suppress(Exception):  # said in its tab
             import_module(f"softstart.page.{module}")
 
 
 @cache
-def gentlest_strategy(drive: Loaded) -> str:
+def first_strategy(drive: Loaded) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
-    session.select_gentlest()
-    return session.selected
+    session.select_lowest_k_dyn()
+    return session.inputs.selected
 
 
 def build(drive: Loaded) -> Session:
@@ -75,9 +75,9 @@ def build(drive: Loaded) -> Session:
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.select(gentlest_strategy(drive))
-    session.restore(session.bench)  # the page begins here: that is no step to undo
-    screen = Screen(session)
+    session.select(first_strategy(drive))
+    session.restore(session.inputs)  # the page begins here: that is no step to undo
+    frames = FrameBuilder(session)
     with instrument()() as element:
         _panels(session, client)
 
@@ -90,8 +90,8 @@ def build(drive: Loaded) -> Session:
             with client:
                 ui.notify(sentence, type="negative", position="bottom-left", close_button="close")
 
-    live = Live(screen, send, show)
-    controls = Controls(session, screen, live.poke)
+    live = Live(frames, send, show)
+    controls = Controls(session, frames, live.poke)
 
     def take(message: Any) -> None:
         if isinstance(message, dict) and message.get("what") == "drawn":

@@ -1,8 +1,8 @@
-"""A bench in the address of the page, so that a link brings back the same picture; and those in memory.
+"""The inputs of a page in its address, so that a link brings back the same picture; and those in memory.
 
-A link holds the drive, the parameters of installed strategies, what is selected and drawn, and the reference.
-Tuned gains and profiles come from files and are not part of it; the server keeps them for a tab that is
-reloaded.
+A link holds the machine, the parameters of installed strategies, what is selected and drawn, and the
+reference. Tuned gains and profiles come from files and are not part of it; the server keeps them for a tab
+that is reloaded.
 """
 
 from __future__ import annotations
@@ -18,106 +18,111 @@ from typing import Any
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, make_controller
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.page.machines import machine_from, startable
 from softstart.page.session import SOFT, Inputs, Reference, Session
 
-MOST_KEPT = 64  # benches of tabs that may be reloaded
+MAX_STORED = 64  # inputs of tabs that may be reloaded
 LONGEST = 16_384  # characters of a link
 LARGEST = 65_536  # bytes that it may hold
+WRONG = "the address after #"
 
-_kept: OrderedDict[str, tuple[str, Inputs]] = OrderedDict()  # link and bench
+_stored: OrderedDict[str, tuple[str, Inputs]] = OrderedDict()  # link and inputs by name
 
 
-def keep(session: Session) -> tuple[str, str]:
-    """Keep the bench of a session: the name under which `kept` finds it, and its link."""
-    name, link = session.name, link_of(session)
-    _kept[name] = link, session.bench
-    _kept.move_to_end(name)
-    while len(_kept) > MOST_KEPT:
-        _kept.popitem(last=False)
+def store(session: Session) -> tuple[str, str]:
+    """Store the inputs of a session: the name under which `stored` finds them, and their link."""
+    name, link = session.name, link_of(session.inputs)
+    _stored[name] = link, session.inputs
+    _stored.move_to_end(name)
+    while len(_stored) > MAX_STORED:
+        _stored.popitem(last=False)
     return name, link
 
 
-def kept(name: str, link: str) -> Inputs | None:
-    """The bench that is kept under this name, if this is its link: a tab may not know of the latest one."""
-    known, bench = _kept.get(name, ("", None))
-    return bench if known == link else None
+def stored(name: str, link: str) -> Inputs | None:
+    """The inputs that are stored under this name, if this is their link: a tab may have missed the latest."""
+    known, inputs = _stored.get(name, ("", None))
+    return inputs if known == link else None
 
 
-def link_of(session: Session) -> str:
+def link_of(inputs: Inputs) -> str:
     """What follows # in the address.
 
     >>> session = Session()
     >>> session.select("ramp")
     >>> session.set_parameter("time", "200 ms")
     >>> session.set("gap", 1.0)
-    >>> other = bench_of(link_of(session), Session().bench)
-    >>> other.drive.gap, other.selected, other.controllers["ramp"].time
+    >>> other = inputs_of(link_of(session.inputs), Session().inputs)
+    >>> other.machine.gap, other.selected, other.controllers["ramp"].time
     (1.0, 'ramp', 0.2)
     """
-    bench, installed = session.bench, controller_names()
-    kept = bench.reference
+    installed, reference = controller_names(), inputs.reference
     content = {
-        "drive": bench.drive.to_toml(),
-        "origin": bench.origin.to_toml() if bench.origin is not bench.drive else "",
-        "parameters": {name: given for name, controller in bench.controllers.items()
-                       if name in installed and (given := _given(controller))},
-        "selected": bench.selected,
-        "drawn": sorted(bench.drawn),
-        "soft": dict(bench.soft),
-        "reference": None if kept is None or kept.label not in installed else {
-            "drive": kept.drive.to_toml(), "label": kept.label, "parameters": _given(kept.controller),
+        "drive": inputs.machine.to_toml(),
+        "origin": inputs.origin.to_toml() if inputs.origin is not inputs.machine else "",
+        "parameters": {name: settings for name, controller in inputs.controllers.items()
+                       if name in installed and (settings := _settings(controller))},
+        "selected": inputs.selected,
+        "drawn": sorted(inputs.visible),
+        "soft": dict(inputs.soft_end),
+        "reference": None if reference is None or reference.label not in installed else {
+            "drive": reference.machine.to_toml(), "label": reference.label,
+            "parameters": _settings(reference.controller),
         },
     }  # fmt: skip
     packed = zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 9)
     return urlsafe_b64encode(packed).decode("ascii").rstrip("=")
 
 
-def _given(controller: Controller) -> dict[str, Any]:
-    values = {one.name: getattr(controller, one.name) for one in fields(controller)}
+def _settings(controller: Controller) -> dict[str, str | int | float]:
+    values = {field.name: getattr(controller, field.name) for field in fields(controller)}
     return {name: value for name, value in values.items() if isinstance(value, str | int | float)}
 
 
-def bench_of(link: str, now: Inputs) -> Inputs:
-    """The bench of a link; the strategies that it does not name are those of `now`, or for another machine
+def inputs_of(link: str, now: Inputs) -> Inputs:
+    """The inputs of a link; the strategies that it does not name are those of `now`, or for another machine
     those of them that are installed.
 
-    >>> bench_of("nonsense", Session().bench)
+    >>> inputs_of("nonsense", Session().inputs)
     Traceback (most recent call last):
-    softstart.errors.InputError: the address after #: this is no bench that softstart has written; ...
+    softstart.errors.InputError: the address after #: this is not a link that softstart has written; ...
     """
     try:
         content = _content(link)
-        drive = machine_from(content["drive"])
-        origin = machine_from(content["origin"]) if content["origin"] else drive
-        parameters = content["parameters"]
-        soft = {name: float(content["soft"][name]) for name in SOFT} if content.get("soft") else {}
-        origin.with_values(soft)  # refused here, not in the midst of a page
+        machine = machine_from(content["drive"])
+        origin = machine_from(content["origin"]) if content["origin"] else machine
+        soft_end = {name: float(content["soft"][name]) for name in SOFT} if content.get("soft") else {}
+        origin.with_values(soft_end)  # refused here, not in the midst of a page
         same = origin == now.origin
-        own = {name: one for name, one in now.controllers.items() if same or name in controller_names()}
-        given = {name: dict(parameters[name]) for name in own if name in parameters}
-        selected, drawn = str(content["selected"]), frozenset(map(str, content["drawn"]))
+        controllers = {
+            name: controller
+            for name, controller in now.controllers.items()
+            if same or name in controller_names()
+        }
+        parameters = content["parameters"]
+        settings = {name: dict(parameters[name]) for name in controllers if name in parameters}
+        selected, visible = str(content["selected"]), frozenset(map(str, content["drawn"]))
         reference = _reference(content.get("reference"), now)
     except (KeyError, TypeError, ValueError, RecursionError, binascii.Error, zlib.error):
         raise InputError(
-            "the address after #: this is no bench that softstart has written; copy the whole link again, "
-            "or delete what follows the #."
+            f"{WRONG}: this is not a link that softstart has written; copy the whole link again, or delete "
+            "what follows the #."
         ) from None
-    for one in (drive, origin, *([reference.drive] if reference else [])):
-        try:
-            startable(one)
-        except InputError as error:
-            raise InputError([f"the address after #: {sentence}" for sentence in error.sentences]) from None
-    made = {name: make_controller(name, values) for name, values in given.items()}
+    mistakes = Mistakes()
+    for part in (machine, origin, *([reference.machine] if reference else [])):
+        with mistakes.collect(f"{WRONG}: "):
+            startable(part)
+        mistakes.raise_if_any()
+    controllers |= {name: make_controller(name, values) for name, values in settings.items()}
     return Inputs(
-        drive,
+        machine,
         origin,
-        {**own, **made},
-        next(one for one in (selected, now.selected, *own) if one in own),
-        drawn & own.keys(),
+        controllers,
+        next(label for label in (selected, now.selected, *controllers) if label in controllers),
+        visible & controllers.keys(),
         reference,
-        soft,
+        soft_end,
     )
 
 
@@ -125,8 +130,8 @@ def _reference(content: Any, now: Inputs) -> Reference | None:
     """The reference of a link; like all strategies, only one that the page has can be given parameters."""
     if content is None or (label := str(content["label"])) not in now.controllers:
         return None
-    drive, parameters = machine_from(content["drive"]), dict(content["parameters"])
-    return Reference(drive, label, make_controller(label, parameters))
+    machine, parameters = machine_from(content["drive"]), dict(content["parameters"])
+    return Reference(machine, label, make_controller(label, parameters))
 
 
 def _content(link: str) -> Mapping[str, Any]:

@@ -206,13 +206,13 @@ class StaleNote:
         if self._drive is None or self._session.version == self._seen:
             return
         self._seen = self._session.version
-        sentence = changed_since(self._drive, self._session.seen)
+        sentence = changed_since(self._drive, self._session.inputs.machine_in_units)
         self._label.set_text(sentence)
         self._label.set_visibility(bool(sentence))
 
     def check(self) -> None:
         """Refuse what was computed for another machine: it is none of this one's strategies."""
-        now, drive = self._session.machine, self._drive
+        now, drive = self._session.inputs.machine, self._drive
         if drive is not None and drive.name != now.name and (sentence := changed_since(drive, now)):
             raise InputError(f"{sentence[:-1]}: it is not added to the strategies.")
 
@@ -413,7 +413,7 @@ class TaskPanel:
         except InputError as error:
             self.view.refuse(error)
         else:
-            self.view.begin(title, *work, subject=self.session.machine)
+            self.view.begin(title, *work, subject=self.session.inputs.machine)
 
     def _state(self) -> None:
         self.go.set_enabled(not self.view.busy)
@@ -447,7 +447,7 @@ class TaskPanel:
 
     def _use(self) -> None:
         if self._found is not None and self._found.drive is not None:
-            self.session.take(self._found.drive)
+            self.session.load(self._found.drive)
             notify(f"{clipped(self._found.drive.name)} is loaded.")
 
 

@@ -44,7 +44,7 @@ class OptimumPanel(TaskPanel):
         """The gentlest start."""
         text = str(self.time.value).strip()
         StartTime.of(text, "Start time")
-        return "optimal start", tasks.optimum_task, self.session.seen, text, self.end.value
+        return "optimal start", tasks.optimum_task, self.session.inputs.machine_in_units, text, self.end.value
 
 
 class LimitPanel(TaskPanel):
@@ -62,8 +62,14 @@ class LimitPanel(TaskPanel):
 
     def question(self) -> tuple[Any, ...]:
         """The curve."""
-        controllers = list(self.session.controllers.values())
-        return "best profile over start time", tasks.curve, self.session.seen, controllers, self.end.value
+        controllers = list(self.session.inputs.controllers.values())
+        return (
+            "best profile over start time",
+            tasks.curve,
+            self.session.inputs.machine_in_units,
+            controllers,
+            self.end.value,
+        )
 
 
 class ChecksPanel(TaskPanel):
@@ -78,7 +84,12 @@ class ChecksPanel(TaskPanel):
     def question(self) -> tuple[Any, ...]:
         """All checks."""
         session = self.session
-        return "positions, limits and life", tasks.checked, session.possible, dict(session.controllers)
+        return (
+            "positions, limits and life",
+            tasks.checked,
+            session.inputs.both_ends,
+            dict(session.inputs.controllers),
+        )
 
 
 class TuningPanel(TaskPanel):
@@ -106,10 +117,10 @@ class TuningPanel(TaskPanel):
 
     def question(self) -> tuple[Any, ...]:
         """The tuning."""
-        drive, name = self.session.seen, str(self.controller.value)
+        drive, name = self.session.inputs.machine_in_units, str(self.controller.value)
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
-        return f"tuning of {name}", tasks.tuning, self.session.possible, name, *grid, *more
+        return f"tuning of {name}", tasks.tuning, self.session.inputs.both_ends, name, *grid, *more
 
 
 def tunable_controllers() -> list[str]:
@@ -190,5 +201,5 @@ class LogPanel(TaskPanel):
         """The identification."""
         content, name = self.file
         columns = tasks.columns_of(str(self.columns.value or ""))
-        guess, kind = self.session.seen, str(self.torque_is.value)
+        guess, kind = self.session.inputs.machine_in_units, str(self.torque_is.value)
         return f"drive from {clipped(name)}", tasks.identified, content, name, guess, kind, columns

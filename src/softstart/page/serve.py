@@ -107,11 +107,10 @@ def listening(address: Address) -> socket.socket:
         listener.listen(64)
     except OSError as error:
         listener.close()
+        port = f"--port {address.port}"
         reasons = {
-            errno.EADDRINUSE: f"--port {address.port}: the port is in use; choose another one, or --port 0 for "
-            "any that is free.",
-            errno.EACCES: f"--port {address.port}: ports below 1024 need administrator rights; choose another "
-            "one.",
+            errno.EADDRINUSE: f"{port}: the port is in use; choose another one, or --port 0 for a free one.",
+            errno.EACCES: f"{port}: ports below 1024 need administrator rights; choose another one.",
         }
         other = f"--host {address.host}: this machine cannot listen there ({error.strerror or error})."
         raise InputError(reasons.get(error.errno or 0, other)) from None

@@ -8,7 +8,7 @@ from tests.softstart.variants import TOGETHER, machines, variants
 from softstart import Chain, InputError
 from softstart.page import links
 from softstart.page.downloads import command_text
-from softstart.page.frames import Screen, machine_fields
+from softstart.page.frames import FrameBuilder, machine_fields
 from softstart.page.machines import axes_about, map_words, placeless
 from softstart.page.sentences import differences
 from softstart.page.session import Session
@@ -38,19 +38,25 @@ def test_what_a_field_shows_can_be_typed_into_it(name: str, lists: bool) -> None
     count = len(TOGETHER["chain" if isinstance(base, Chain) else "drive"]) if lists else None
     for what, machine in list(variants(base))[:count]:
         session = Session(machine, controllers=["direct"])
-        screen = Screen(session)
-        shown = machine_fields(session, screen.entries, session.units)
+        frames = FrameBuilder(session)
+        shown = machine_fields(session, frames.entries)
         for path, one in shown.items():
             value = machine.parameters_by_path()[path][1]
             if path == "units" or not one["text"] or value is None:
                 continue
             try:
-                session.set(path, session.units.typed(one["text"], screen.entries[path].unit))
+                session.set(path, session.inputs.units.typed(one["text"], frames.entries[path].unit))
             except InputError as error:
                 raise AssertionError((what, path, one["text"])) from error
-            assert alike(session.machine.parameters_by_path()[path][1], value), (what, path, one["text"])
-        assert links.bench_of(links.link_of(session), session.bench).drive == session.machine, what
-        assert command_text(machine, {"direct": session.controllers["direct"]}), what
+            assert alike(session.inputs.machine.parameters_by_path()[path][1], value), (
+                what,
+                path,
+                one["text"],
+            )
+        assert (
+            links.inputs_of(links.link_of(session.inputs), session.inputs).machine == session.inputs.machine
+        ), what
+        assert command_text(machine, {"direct": session.inputs.controllers["direct"]}), what
         assert map_words(machine), what
         if (axes := axes_about(machine)) is not None:
             assert placeless(machine, axes, machine), what

@@ -18,8 +18,8 @@ from softstart.drive.plausibility import plausibility_warnings
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
-from softstart.page.frames import Screen
-from softstart.page.live import GLANCES, WINDOW, Live
+from softstart.page.frames import FrameBuilder
+from softstart.page.live import MAX_QUICK, WINDOW, Live
 from softstart.page.machines import STEPS, axes_about, parameter_fields
 from softstart.page.panels import grid_of
 from softstart.page.session import Session
@@ -55,9 +55,9 @@ async def until(true) -> None:
 async def followed(session: Session, hand, line: Line | None = None) -> Line:
     """Run a page without a browser while `hand` moves."""
     line = line or Line()
-    screen = Screen(session)
-    live = line.live = Live(screen, line.send)
-    controls = Controls(session, screen, lambda: None)
+    frames = FrameBuilder(session)
+    live = line.live = Live(frames, line.send)
+    controls = Controls(session, frames, lambda: None)
     session.on_change(live.poke)
     task = asyncio.create_task(live.run())
     try:
@@ -85,27 +85,27 @@ def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
     frames = [frame for number, frame in line.frames if number and "figure" in frame]
     assert len(frames) < 60  # coalesced
     assert frames[-1]["stamp"] == 395
-    assert frames[-1]["figure"]["k_dyn"] == simulate(session.machine, "direct").k_dyn
+    assert frames[-1]["figure"]["k_dyn"] == simulate(session.inputs.machine, "direct").k_dyn
     rows = {}
     for _, frame in line.frames:
         rows |= {row["name"]: row for row in frame.get("rows", [])}
-    for name in session.controllers:
-        assert rows[name]["k_dyn"] == simulate(session.machine, name).k_dyn
+    for name in session.inputs.controllers:
+        assert rows[name]["k_dyn"] == simulate(session.inputs.machine, name).k_dyn
         assert rows[name]["worn"] == session.row(name).k_dyn_worn_gap
 
 
-def test_every_step_has_its_glance_until_the_browser_stops_drawing():
+def test_every_step_has_its_quick_frame_until_the_browser_stops_drawing():
     session = Session(controllers=["direct"])
 
     async def hand(controls, line):
         await until(lambda: line.frames and line.live.on_their_way == 0)
         line.frames.clear()
         line.draws = False
-        for position in range(GLANCES + 20):
+        for position in range(MAX_QUICK + 20):
             controls.take({"what": "slide", "path": "shaft.gap", "position": position + 100})
 
     line = asyncio.run(followed(session, hand))
-    assert len([number for number, _ in line.frames if number == 0]) == GLANCES
+    assert len([number for number, _ in line.frames if number == 0]) == MAX_QUICK
 
 
 def test_a_map_left_half_way_is_old_until_all_its_rows_have_come():
@@ -130,12 +130,12 @@ def test_what_fails_is_told_and_following_goes_on():
     line, told = Line(), []
 
     async def scene():
-        screen = Screen(Session(controllers=["direct"]))
-        whole, screen.first = screen.first, {}.popitem  # a KeyError
-        line.live = Live(screen, line.send, told.append)
+        frames = FrameBuilder(Session(controllers=["direct"]))
+        whole, frames.main_frame = frames.main_frame, {}.popitem  # a KeyError
+        line.live = Live(frames, line.send, told.append)
         task = asyncio.create_task(line.live.run())
         await until(lambda: told)
-        screen.first = whole
+        frames.main_frame = whole
         line.live.poke()
         await until(lambda: any("figure" in frame for number, frame in line.frames if number))
         task.cancel()
@@ -144,75 +144,75 @@ def test_what_fails_is_told_and_following_goes_on():
     assert ["KeyError" in one for one in told] == [True]
 
 
-def controls_of(session: Session) -> tuple[Controls, Screen]:
-    screen = Screen(session)
-    return Controls(session, screen, lambda: None), screen
+def controls_of(session: Session) -> tuple[Controls, FrameBuilder]:
+    frames = FrameBuilder(session)
+    return Controls(session, frames, lambda: None), frames
 
 
 def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     session = Session(controllers=["direct"])
-    controls, screen = controls_of(session)
+    controls, frames = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 metres"})
-    assert "not an angle" in screen.first()["mistakes"]["shaft.gap"]
+    assert "not an angle" in frames.main_frame()["mistakes"]["shaft.gap"]
     controls.take({"what": "edit", "path": "load.torque", "text": "8"})
-    assert list(screen.mistakes) == ["shaft.gap"]
-    assert session.machine.gap == 0.5
+    assert list(frames.mistakes) == ["shaft.gap"]
+    assert session.inputs.machine.gap == 0.5
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
-    assert not screen.mistakes
-    shown = screen.first()["fields"]["shaft.gap"]
+    assert not frames.mistakes
+    shown = frames.main_frame()["fields"]["shaft.gap"]
     assert (shown["text"], shown["position"]) == ("4 deg", 21)  # the page stays in rad
     controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
-    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")
+    assert frames.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 characters")
     controls.take({"what": "leave", "path": "shaft.gap"})  # Escape: the drive keeps every digit
-    assert not screen.mistakes
-    assert session.machine.gap == parse("4 deg", "rad")
+    assert not frames.mistakes
+    assert session.inputs.machine.gap == parse("4 deg", "rad")
     controls.take({"what": "reset", "path": "shaft.gap"})
     controls.take({"what": "reset", "path": "load.torque"})
-    assert session.machine == session.origin
-    session.take(session.machine.replace(gap=0.005))  # another drive brings its own sliders
-    assert screen.first()["mistakes"] == {}
-    assert screen.entries["shaft.gap"].scale.high == max(screen.axes.gaps) == 0.02
+    assert session.inputs.machine == session.inputs.origin
+    session.load(session.inputs.machine.replace(gap=0.005))  # another drive brings its own sliders
+    assert frames.main_frame()["mistakes"] == {}
+    assert frames.entries["shaft.gap"].scale.high == max(frames.axes.gaps) == 0.02
 
 
-def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
+def test_a_page_loaded_anew_goes_on_with_the_inputs_that_its_tab_has_stored():
     before = Session(controllers=["direct", "ramp"])
     before.set_all({"shaft.gap": 0.1 + 0.2, "name": 'my "own" drive'})
-    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), before.machine)
+    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), before.inputs.machine)
     before.add("ramp (robust)", tuned)
-    (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
+    (kept,) = [frame["keep"] for frame in FrameBuilder(before).idle_frames() if frame and "keep" in frame]
     session = Session(controllers=["direct", "ramp"])
-    controls, screen = controls_of(session)
-    controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}, "link": ""})
-    assert session.machine == session.origin != before.machine
-    controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
-    assert session.machine is before.machine
-    assert session.controllers["ramp (robust)"] is tuned
-    assert session.selected == "ramp (robust)"
+    controls, frames = controls_of(session)
+    controls.take({"what": "hello", "stored": {**kept, "server": "of yesterday"}, "link": ""})
+    assert session.inputs.machine == session.inputs.origin != before.inputs.machine
+    controls.take({"what": "hello", "stored": kept, "link": kept["link"]})
+    assert session.inputs.machine is before.inputs.machine
+    assert session.inputs.controllers["ramp (robust)"] is tuned
+    assert session.inputs.selected == "ramp (robust)"
     assert session.steps == (0, 0)
-    assert not screen.mistakes
-    assert len([frame for frame in screen.at_rest() if frame and "keep" in frame]) == 1
-    assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
+    assert not frames.mistakes
+    assert len([frame for frame in frames.idle_frames() if frame and "keep" in frame]) == 1
+    assert not [frame for frame in frames.idle_frames() if frame and "keep" in frame]  # not twice
 
 
 @pytest.mark.parametrize("machine", ["crane-4amtkf", "crane-4-mass"])
 def test_a_slider_sets_exactly_the_value_that_its_field_shows_and_no_other(machine):
     session = Session(machine, controllers=["direct"])
-    controls, screen = controls_of(session)
-    scales = {path: one.scale for path, one in parameter_fields(session.machine).items() if one.scale}
+    controls, frames = controls_of(session)
+    scales = {path: one.scale for path, one in parameter_fields(session.inputs.machine).items() if one.scale}
     for path, scale in scales.items():
-        before = session.machine.parameters_by_path()
+        before = session.inputs.machine.parameters_by_path()
         for position in (0, 77, 300, STEPS):
             controls.take({"what": "slide", "path": path, "position": position})
-            assert not screen.mistakes, path
-            shown, si = screen.first()["fields"][path], screen.entries[path].unit
-            text, value = shown["text"], session.machine.parameters_by_path()[path][1]
-            assert parse(screen.units.typed(text, si), si) == value
+            assert not frames.mistakes, path
+            shown, si = frames.main_frame()["fields"][path], frames.entries[path].unit
+            text, value = shown["text"], session.inputs.machine.parameters_by_path()[path][1]
+            assert parse(session.inputs.units.typed(text, si), si) == value
             assert value == pytest.approx(scale.value(position), rel=1e-3)
             assert scale.low <= scale.value(position) <= scale.high
             assert shown["position"] == pytest.approx(position, abs=1)
-        now = session.machine.parameters_by_path()
+        now = session.inputs.machine.parameters_by_path()
         assert {key for key in before if before[key] != now[key]} <= {path}
-        session.take(session.origin)
+        session.load(session.inputs.origin)
 
 
 @pytest.mark.parametrize(
@@ -221,34 +221,34 @@ def test_a_slider_sets_exactly_the_value_that_its_field_shows_and_no_other(machi
 def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     """In fields, sliders, plots, map, link and command; a bare number is one of them, and stays it."""
     session = Session(machine, controllers=["direct", "ramp"])
-    controls, screen = controls_of(session)
-    loaded = session.origin
-    assert (screen.units.angle, screen.units.speed) == ("rad", "rpm")  # as its file has them
+    controls, frames = controls_of(session)
+    loaded = session.inputs.origin
+    assert (session.inputs.units.angle, session.inputs.units.speed) == ("rad", "rpm")  # as its file has them
     controls.take({"what": "edit", "path": "units", "text": "deg, rad/s"})
-    frame = screen.first()
+    frame = frames.main_frame()
     rows = {row["path"]: row for group in frame["groups"] for row in group["rows"]}
     assert (rows[gap]["unit"], rows["start.target_speed"]["unit"]) == ("deg", "rad/s")
     first = loaded.parameters_by_path()[gap][1]
     assert float(frame["fields"][gap]["text"]) == pytest.approx(math.degrees(first), rel=1e-5)
-    assert session.machine.parameters_by_path()[gap][1] == first  # only what is typed changes
+    assert session.inputs.machine.parameters_by_path()[gap][1] == first  # only what is typed changes
     assert frame["traces"]["direct"]["units"]["angle"] == "deg"
     assert (frame["here"][0], frame["angle"][0]) == (loaded.gap_and_inertia[0], "deg")
 
     controls.take({"what": "edit", "path": gap, "text": "4"})
-    assert session.machine.parameters_by_path()[gap][1] == parse("4 deg", "rad")
+    assert session.inputs.machine.parameters_by_path()[gap][1] == parse("4 deg", "rad")
     controls.take({"what": "slide", "path": gap, "position": 77})
-    text = screen.first()["fields"][gap]["text"]
+    text = frames.main_frame()["fields"][gap]["text"]
     assert len(text) <= 5
-    assert f'"{text} deg"' in session.machine.to_toml()
-    assert f"{gap}={text}deg" in command_text(session.machine, {"direct": make_controller("direct")})
-    assert links.bench_of(links.link_of(session), session.bench).drive == session.machine
+    assert f'"{text} deg"' in session.inputs.machine.to_toml()
+    assert f"{gap}={text}deg" in command_text(session.inputs.machine, {"direct": make_controller("direct")})
+    assert links.inputs_of(links.link_of(session.inputs), session.inputs).machine == session.inputs.machine
     controls.take({"what": "jump", "gap": math.radians(30.0), "inertia": loaded.gap_and_inertia[1]})
-    assert screen.first()["here"][0] == pytest.approx(math.radians(30.0), rel=1e-6)
+    assert frames.main_frame()["here"][0] == pytest.approx(math.radians(30.0), rel=1e-6)
     controls.take({"what": "edit", "path": "units", "text": "mm on 80 mm"})
     controls.take({"what": "edit", "path": gap, "text": "0.3"})
-    assert session.machine.parameters_by_path()[gap][1] == 0.0075
+    assert session.inputs.machine.parameters_by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
-    assert 'write for example "deg, rpm"' in screen.mistakes["units"]
+    assert 'write for example "deg, rpm"' in frames.mistakes["units"]
 
 
 class Reader:
@@ -266,21 +266,21 @@ class Reader:
             "rpm": math.pi / 30,
         }
         self.session = Session(machine, controllers=["direct"])
-        self.controls, self.screen = controls_of(self.session)
-        self.screen.axes = axes_about(self.session.origin, 5, 2)
+        self.controls, self.frames = controls_of(self.session)
+        self.frames.axes = axes_about(self.session.inputs.origin, 5, 2)
         self.labels: dict[str, str] = {}
         self.seen: dict[str, Any] = {}
         self.arc = 0.04  # m, half the diameter of the circle on which angles in mm are arcs
         self.look()
-        self.head = next(frame for frame in self.screen.at_rest() if frame and "map" in frame)["map"]
+        self.head = next(frame for frame in self.frames.idle_frames() if frame and "map" in frame)["map"]
 
     def do(self, what: str, **arguments: Any) -> None:
         self.controls.take({"what": what, **arguments})
-        assert not self.screen.mistakes
+        assert not self.frames.mistakes
         self.look()
 
     def look(self) -> None:
-        self.seen = self.screen.first()
+        self.seen = self.frames.main_frame()
         for group in self.seen.get("groups", ()):
             self.labels |= {row["path"]: row["unit"] for row in group["rows"]}
 
@@ -318,10 +318,10 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
     reader = Reader(machine)
     session = reader.session
     for act, value, unit in acts:
-        before = session.machine.gap_and_inertia[0]
+        before = session.inputs.machine.gap_and_inertia[0]
         if act == "units":
             reader.do("edit", path="units", text=f"{value}, {unit}")
-            assert session.machine.gap_and_inertia[0] == before
+            assert session.inputs.machine.gap_and_inertia[0] == before
             assert (reader.labels[gap], reader.labels["start.target_speed"]) == (
                 value[:2] if "mm" in value else value,
                 unit,
@@ -331,7 +331,7 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
             reader.do("edit", path=gap, text=f"{value}{unit}")
             assert reader.labels == units  # nothing else changes its unit
             typed = reader.si(str(value), unit.strip() or units[gap])
-            assert session.machine.parameters_by_path()[gap][1] == pytest.approx(typed, rel=1e-8)
+            assert session.inputs.machine.parameters_by_path()[gap][1] == pytest.approx(typed, rel=1e-8)
         elif act == "speed":
             units = dict(reader.labels)
             reader.do("edit", path="start.target_speed", text=f"{value}{unit}")
@@ -342,14 +342,16 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
             name, size = reader.seen["angle"]
             said = f"{node / size:.6g}"  # what the read-out of the map shows
             reader.do("jump", gap=node, inertia=reader.head["inertias"][0])
-            assert session.machine.gap_and_inertia[0] == pytest.approx(
+            assert session.inputs.machine.gap_and_inertia[0] == pytest.approx(
                 reader.si(said, name), rel=1e-5, abs=1e-12
             )
         else:
             reader.do(act, **({"path": gap, "position": value} if act == "slide" else {}))
         for path in (gap, "start.target_speed"):
-            assert reader.read(path) == pytest.approx(session.machine.parameters_by_path()[path][1], rel=1e-5)
-        seen, drive = reader.seen, session.machine
+            assert reader.read(path) == pytest.approx(
+                session.inputs.machine.parameters_by_path()[path][1], rel=1e-5
+            )
+        seen, drive = reader.seen, session.inputs.machine
         assert seen["here"] == drive.gap_and_inertia
         assert seen["angle"][0] == reader.labels[gap]
         assert seen["figure"]["speed_unit"] == reader.labels["start.target_speed"]
@@ -361,10 +363,12 @@ def test_what_is_read_what_is_typed_and_what_is_clicked_are_in_one_unit(machine,
         shown = reader.si(str(trace["target"]), trace["units"]["speed"])
         assert shown == pytest.approx(drive.target_speed, rel=1e-9)
         if drive.gap_and_inertia[0] > 0.0:  # else there is nothing to tune
-            assert grid_of(session.seen, "0.2", "1x")[0] == [
+            assert grid_of(session.inputs.machine_in_units, "0.2", "1x")[0] == [
                 pytest.approx(reader.si("0.2", seen["angle"][0]), rel=1e-8)
             ]
-        assert units_of(session.seen) == reader.screen.units  # those of a report and of a tab
+        assert (
+            units_of(session.inputs.machine_in_units) == reader.session.inputs.units
+        )  # those of a report and of a tab
 
 
 def test_a_value_is_shown_in_the_unit_in_which_it_was_typed_and_no_other_field_is():
@@ -383,56 +387,56 @@ def test_a_value_is_shown_in_the_unit_in_which_it_was_typed_and_no_other_field_i
 def test_parameters_of_the_selected_strategy_are_fields():
     """Their values are those that the start runs with; an empty field or `reset` is the default again."""
     session = Session(controllers=["direct", "ramp", "shaped"])
-    controls, screen = controls_of(session)
+    controls, frames = controls_of(session)
     session.select("ramp")
-    frame = screen.first()
+    frame = frames.main_frame()
     main, more = frame["strategy"]
     assert (main["title"], more["title"]) == ("parameters of ramp", "more parameters")
     assert [row["path"] for row in main["rows"] if row["scale"]] == [
         "strategy.initial", "strategy.time", "strategy.full_torque"
     ]  # fmt: skip
     default = session.result("ramp").run.controller.time
-    scales = {path: one.scale for path, one in screen.entries.items() if one.scale}
+    scales = {path: one.scale for path, one in frames.entries.items() if one.scale}
     shown = frame["fields"]["strategy.time"]
     ((mark, meaning),) = shown["marks"]
     assert (float(shown["text"]), shown["changed"]) == (pytest.approx(default, rel=1e-3), False)
     assert shown["position"] == mark == scales["strategy.time"].position(default)
     assert meaning.startswith("default: ")
-    assert "strategy" not in screen.first()  # the browser has these rows
+    assert "strategy" not in frames.main_frame()  # the browser has these rows
 
     controls.take({"what": "edit", "path": "strategy.time", "text": "200 ms"})
-    assert session.controllers["ramp"].time == 0.2
-    assert screen.first()["changed"] == ["ramp"]
+    assert session.inputs.controllers["ramp"].time == 0.2
+    assert frames.main_frame()["changed"] == ["ramp"]
     ramp = make_controller("ramp", {"time": 0.2})
-    assert session.result("ramp").k_dyn == simulate(session.machine, ramp).k_dyn
+    assert session.result("ramp").k_dyn == simulate(session.inputs.machine, ramp).k_dyn
     controls.take({"what": "slide", "path": "strategy.time", "position": 600})
-    assert session.controllers["ramp"].time == scales["strategy.time"].high
+    assert session.inputs.controllers["ramp"].time == scales["strategy.time"].high
     controls.take({"what": "edit", "path": "strategy.time", "text": " "})
-    assert session.controllers["ramp"].time is None
+    assert session.inputs.controllers["ramp"].time is None
     controls.take({"what": "edit", "path": "strategy.time", "text": "4 m"})
-    assert "length" in screen.mistakes["strategy.time"]
+    assert "length" in frames.mistakes["strategy.time"]
     controls.take({"what": "reset", "path": "strategy.time"})
-    assert not screen.mistakes
+    assert not frames.mistakes
     assert session.changed == ()
 
     session.select("shaped")
     controls.take({"what": "edit", "path": "strategy.shaper", "text": "zvd"})
-    assert session.controllers["shaped"].shaper == "zvd"
+    assert session.inputs.controllers["shaped"].shaper == "zvd"
     controls.take({"what": "edit", "path": "strategy.time", "text": "1"})  # that is one of the ramp's
-    assert "no such field" in screen.mistakes[""]
+    assert "no such field" in frames.mistakes[""]
 
 
 def test_what_is_assumed_or_can_hardly_be_is_told_at_rest():
     session = Session(controllers=["direct"])
-    controls, screen = controls_of(session)
+    controls, frames = controls_of(session)
     known = {"assumed": "efficiency 0.95; damping ratio 0.02", "gear_ratio": 31.5}
-    session.take(session.machine.replace(**known))
+    session.load(session.inputs.machine.replace(**known))
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 rad"})
-    figure = screen.first()["figure"]
+    figure = frames.main_frame()["figure"]
     assert figure["output_torque"] == pytest.approx(31.5 * figure["peak_torque"], rel=1e-12)
-    (remarks,) = [frame for frame in screen.at_rest() if frame and "plausibility_warnings" in frame]
-    assert remarks["assumed"] == session.machine.assumed.split("; ")
-    assert remarks["plausibility_warnings"] == plausibility_warnings(session.machine) != []
+    (remarks,) = [frame for frame in frames.idle_frames() if frame and "plausibility_warnings" in frame]
+    assert remarks["assumed"] == session.inputs.machine.assumed.split("; ")
+    assert remarks["plausibility_warnings"] == plausibility_warnings(session.inputs.machine) != []
 
 
 @pytest.mark.parametrize(
@@ -441,57 +445,58 @@ def test_what_is_assumed_or_can_hardly_be_is_told_at_rest():
 )
 def test_a_limit_is_given_and_taken_back_by_an_empty_field(machine, path, text):
     session = Session(machine, controllers=["direct"])
-    controls, screen = controls_of(session)
-    before = session.machine
+    controls, frames = controls_of(session)
+    before = session.inputs.machine
     controls.take({"what": "edit", "path": path, "text": text})
-    assert screen.first()["fields"][path]["text"] == text
-    assert session.machine.limits
-    again = Screen(session).first()  # as after a reload: a fold that has values is open
+    assert frames.main_frame()["fields"][path]["text"] == text
+    assert session.inputs.machine.limits
+    again = FrameBuilder(session).main_frame()  # as after a reload: a fold that has values is open
     assert [one["title"] for one in again["groups"] if path in [row["path"] for row in one["rows"]]] == again[
         "filled"
     ]
     controls.take({"what": "edit", "path": path, "text": ""})
-    assert not screen.mistakes
-    assert session.machine == before
-    assert not session.machine.limits
+    assert not frames.mistakes
+    assert session.inputs.machine == before
+    assert not session.inputs.machine.limits
 
 
 def test_fields_take_values_at_the_output_of_a_gear_and_its_permissible_torque():
     """Without a ratio that is one sentence beside the field; the line of the traces is M/i at the motor."""
     session = Session("crane-4amtkf", controllers=["direct"])
-    controls, screen = controls_of(session)
+    controls, frames = controls_of(session)
 
     def edit(path: str, text: str) -> None:
         controls.take({"what": "edit", "path": path, "text": text})
 
     edit("shaft.gap", "9 arcmin at output")
-    (said,) = screen.mistakes.values()
+    (said,) = frames.mistakes.values()
     assert "without gear.ratio" in said
-    assert session.machine == session.origin
+    assert session.inputs.machine == session.inputs.origin
     for path, text in (
         ("gear.ratio", "38.1"), ("gear.efficiency", "95 %"), ("shaft.gap", "9 arcmin at output"),
         ("limits.output_torque", "5 kN*m"),
     ):  # fmt: skip
         edit(path, text)
-    assert not screen.mistakes
-    assert session.machine.gap == pytest.approx(math.radians(9 / 60) * 38.1, rel=1e-14)
-    first = screen.first()
+    assert not frames.mistakes
+    assert session.inputs.machine.gap == pytest.approx(math.radians(9 / 60) * 38.1, rel=1e-14)
+    first = frames.main_frame()
     assert first["fields"]["shaft.gap"]["text"].startswith("9 arcmin")
     assert first["traces"]["direct"]["allowed"] == pytest.approx(5000 / 38.1, rel=1e-14)
     run = session.result("direct").run
     assert first["figure"]["output_torque"] == pytest.approx(38.1 * 0.95 * run.peak_torque, rel=1e-12)
-    grid = grid_of(session.machine, "4.5 arcmin at output, 1x", "290 kg*m^2 at output")
-    assert grid[0] == pytest.approx([session.machine.gap / 2, session.machine.gap], rel=1e-14)
+    grid = grid_of(session.inputs.machine, "4.5 arcmin at output, 1x", "290 kg*m^2 at output")
+    assert grid[0] == pytest.approx([session.inputs.machine.gap / 2, session.inputs.machine.gap], rel=1e-14)
     with pytest.raises(InputError, match="behind some of the values only"):
-        grid_of(session.machine, "4.5 arcmin, 9 arcmin at output", "1x")
+        grid_of(session.inputs.machine, "4.5 arcmin, 9 arcmin at output", "1x")
 
 
 WHATS = [
-    "slide", "edit", "reset", "jump", "select", "show", "keep", "remove", "undo", "redo", "hello", "window",
+    "slide", "edit", "reset", "jump", "select", "show", "fix", "remove", "undo", "redo", "hello", "window",
     "?",
 ]  # fmt: skip
 KEYS = [
-    "path", "text", "position", "gap", "inertia", "name", "visible", "kept", "link", "begin", "end", "stamp",
+    "path", "text", "position", "gap", "inertia", "name", "visible", "fixed", "on", "stored",
+    "link", "begin", "end", "stamp",
 ]  # fmt: skip
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
@@ -504,9 +509,9 @@ JSON = st.recursive(
 @given(st.fixed_dictionaries({"what": st.sampled_from(WHATS)}, optional=dict.fromkeys(KEYS, JSON)) | JSON)
 def test_no_message_whatever_kills_the_page(message):
     session = Session(controllers=["direct"])
-    controls, screen = controls_of(session)
+    controls, frames = controls_of(session)
     controls.take(message)
-    frame = screen.first()
+    frame = frames.main_frame()
     json.dumps(frame, allow_nan=False)
     assert frame["figure"]["k_dyn"] is not None
     assert "mistake in softstart" not in str(frame["mistakes"])

@@ -99,7 +99,7 @@ def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
     assert not late.mine
 
 
-def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
+def test_a_closed_tab_keeps_no_session(client: Any) -> None:
     """The web framework remembers the function of each upload's route."""
     from softstart.page.files_panel import DriveFiles
 
@@ -146,7 +146,7 @@ def test_a_data_sheet_without_stiffness_is_loaded_with_both_its_ends(client, mon
         panel = DataSheetPanel(session, "A")
         monkeypatch.setattr(panel, "sheet", lambda: DataSheet.from_toml(text))
         panel._use()
-        assert session.possible == ends
+        assert session.inputs.both_ends == ends
         tuning, checks = panels.TuningPanel(session, "A", Queue()), panels.ChecksPanel(session, "A", Queue())
         assert ends in tuning.question()
         assert ends in checks.question()
@@ -173,11 +173,11 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     session = Session(crane, controllers=["direct"])
     panel = OptimumPanel(session, "A", Jobs())
     panel._found = tasks.TaskResult("", controllers={"optimum": make_controller("ramp")})
-    session.take(Drive.load("hoist-15kw"))
+    session.load(Drive.load("hoist-15kw"))
     panel._stale.show_for(crane)
     with pytest.raises(InputError, match="another drive is loaded now: it is not added"):
         panel.add("optimum")
-    assert list(session.controllers) == ["direct"]
+    assert list(session.inputs.controllers) == ["direct"]
     session.undo()
     panel.add("optimum")
-    assert list(session.controllers) == ["direct", "optimum"]
+    assert list(session.inputs.controllers) == ["direct", "optimum"]

@@ -14,8 +14,8 @@ from softstart import DataSheet, Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.page import links
-from softstart.page.frames import Screen
-from softstart.page.links import bench_of, link_of
+from softstart.page.frames import FrameBuilder
+from softstart.page.links import inputs_of, link_of
 from softstart.page.session import MAX_STRATEGIES, Session
 from softstart.start.comparison import SOFT_END
 from softstart.start.recommendation import CASES
@@ -31,11 +31,11 @@ class Failing(PlainController):
 def test_all_figures_are_those_of_compare_to_the_bit():
     session = Session()
     session.set_all({"shaft.gap": "0.7 rad", "shaft.damping": 0.4})
-    for row, strategy in zip(compare(session.machine).rows, session.strategies, strict=True):
+    for row, strategy in zip(compare(session.inputs.machine).rows, session.strategies, strict=True):
         assert strategy.name == row.run.controller.name
         assert strategy.k_dyn == row.run.k_dyn
         assert strategy.start_time == row.run.start_time
-        list(session.judged(strategy.name))
+        list(session.compute_row(strategy.name))
         assert session.row(strategy.name).k_dyn_worn_gap == row.k_dyn_worn_gap
         assert session.time_lost(strategy) == row.time_lost
 
@@ -54,7 +54,7 @@ def test_a_drive_without_stiffness_is_shown_at_both_ends_as_compare_does():
 
     def agree(shown, ends):
         table, rows = compare(ends, names), {}
-        frames = (frame for frame in Screen(shown).at_rest() if frame)
+        frames = (frame for frame in FrameBuilder(shown).idle_frames() if frame)
         for frame in takewhile(lambda frame: "map" not in frame, frames):
             rows |= {row["name"]: row for row in frame.get("rows", [])}
             if "recommendation" in frame:
@@ -65,33 +65,39 @@ def test_a_drive_without_stiffness_is_shown_at_both_ends_as_compare_does():
         }
         assert [rows[row.name]["limits"] for row in table.rows] == [row.against_limits for row in table.rows]
 
-    stiff, soft = session.possible
+    stiff, soft = session.inputs.both_ends
     assert (stiff, soft) == DataSheet.from_settings(TROLLEY).possible
     agree(session, DataSheet.from_settings(TROLLEY))
     session.set("shaft.gap", "5 arcmin at output")
-    changed = UnknownStiffness(stiff.replace(gap=session.machine.gap), soft.replace(gap=session.machine.gap))
+    changed = UnknownStiffness(
+        stiff.replace(gap=session.inputs.machine.gap), soft.replace(gap=session.inputs.machine.gap)
+    )
     agree(session, changed)
     other = Session(controllers=names)
-    other.restore(bench_of(link_of(session), other.bench))
+    other.restore(inputs_of(link_of(session.inputs), other.inputs))
     agree(other, changed)
     session.set("shaft.damping", 0.0)
-    assert [one.damping for one in session.possible] == [0.0, 0.0]
+    assert [one.damping for one in session.inputs.both_ends] == [0.0, 0.0]
     session.set("shaft.stiffness", "35 kN*m/rad at output")  # it is known by now
-    assert session.soft is None
-    list(session.judged("direct"))
+    assert session.inputs.soft_drive is None
+    list(session.compute_row("direct"))
     assert session.row("direct").worst_case == CASES
     session.undo()
     session.undo()
-    assert session.soft == session.machine.replace(stiffness=soft.stiffness, damping=soft.damping)
-    session.take(Drive.load("crane-4amtkf"))
-    assert session.possible is session.machine  # of which nothing is unknown
+    assert session.inputs.soft_drive == session.inputs.machine.replace(
+        stiffness=soft.stiffness, damping=soft.damping
+    )
+    session.load(Drive.load("crane-4amtkf"))
+    assert session.inputs.both_ends is session.inputs.machine  # of which nothing is unknown
 
 
 def test_a_link_with_an_impossible_soft_end_is_refused():
-    content = unpacked(link_of(Session(DataSheet.from_settings(TROLLEY).possible, controllers=["direct"])))
+    content = unpacked(
+        link_of(Session(DataSheet.from_settings(TROLLEY).possible, controllers=["direct"]).inputs)
+    )
     for wrong in ({"stiffness": -1.0, "damping": 0.0}, {"stiffness": 1.0}, ["stiffness"], "soft", 7):
         with pytest.raises(InputError, match="the address after #"):
-            bench_of(packed(content | {"soft": wrong}), Session().bench)
+            inputs_of(packed(content | {"soft": wrong}), Session().inputs)
 
 
 @pytest.mark.parametrize(("time", "selected"), [("0.2 s", "ramp"), ("1 s", "direct")])
@@ -100,44 +106,44 @@ def test_the_gentlest_takes_no_more_than_twice_the_time_of_direct(time, selected
     session = Session(controllers=["direct", "ramp"])
     session.select("ramp")
     session.set_parameter("time", time)
-    session.select_gentlest()
-    assert session.selected == selected
+    session.select_lowest_k_dyn()
+    assert session.inputs.selected == selected
     assert session.result("ramp").k_dyn < session.result("direct").k_dyn
 
 
-def test_of_benches_that_are_kept_the_latest_stay(monkeypatch):
-    monkeypatch.setattr(links, "MOST_KEPT", 2)
-    monkeypatch.setattr(links, "_kept", OrderedDict())
+def test_of_stored_inputs_the_latest_stay(monkeypatch):
+    monkeypatch.setattr(links, "MAX_STORED", 2)
+    monkeypatch.setattr(links, "_stored", OrderedDict())
     first, second, third = (Session(controllers=["direct"]) for _ in range(3))
-    known = [links.keep(one) for one in (first, second, first, third)]
-    assert links.kept(*known[0]) is first.bench  # kept again after the second
-    assert links.kept(*known[1]) is None
-    assert links.kept(*known[3]) is third.bench
+    known = [links.store(one) for one in (first, second, first, third)]
+    assert links.stored(*known[0]) is first.inputs  # kept again after the second
+    assert links.stored(*known[1]) is None
+    assert links.stored(*known[3]) is third.inputs
 
 
 def test_undo_and_redo_go_through_every_change():
     session = Session(controllers=["direct", "ramp"])
-    seen = [session.bench]
+    seen = [session.inputs]
     for change in (
         lambda: session.set("shaft.gap", 1.0),
         lambda: session.select("ramp"),
         lambda: session.set_parameter("time", 0.2),
         lambda: session.add("mine", make_controller("s-curve")),
         lambda: session.remove("direct"),
-        lambda: session.take(Drive.load("servo-axis-small")),
+        lambda: session.load(Drive.load("servo-axis-small")),
     ):
         change()
-        seen.append(session.bench)
+        seen.append(session.inputs)
     assert session.steps == (6, 0)
-    for bench in reversed(seen[:-1]):
+    for inputs in reversed(seen[:-1]):
         session.undo()
-        assert session.bench is bench
+        assert session.inputs is inputs
     session.undo()  # nothing is left
-    assert session.bench is seen[0]
-    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
-    for bench in seen[1:]:
+    assert session.inputs is seen[0]
+    assert session.result("direct").k_dyn == simulate(session.inputs.machine, "direct").k_dyn
+    for inputs in seen[1:]:
         session.redo()
-        assert session.bench is bench
+        assert session.inputs is inputs
     session.undo()
     session.set("shaft.gap", 0.25)
     assert session.steps == (6, 0)  # a new change ends what could be redone
@@ -154,11 +160,11 @@ def test_a_drag_is_one_step_and_results_follow_undo(monkeypatch):
     assert session.steps == (3, 0)
     session.undo()
     session.undo()
-    assert session.machine.gap == 0.8
-    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
+    assert session.inputs.machine.gap == 0.8
+    assert session.result("direct").k_dyn == simulate(session.inputs.machine, "direct").k_dyn
     session.undo()
-    assert session.machine.gap == 0.5
-    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
+    assert session.inputs.machine.gap == 0.5
+    assert session.result("direct").k_dyn == simulate(session.inputs.machine, "direct").k_dyn
 
 
 def test_a_link_brings_back_drive_strategies_and_selection():
@@ -170,11 +176,11 @@ def test_a_link_brings_back_drive_strategies_and_selection():
     session.add("mine", make_controller("s-curve"))  # a label of the user's own stands for a file
     session.select("shaped")
     other = Session()
-    other.restore(bench_of(link_of(session), other.bench))
-    assert other.machine == session.machine
-    assert other.origin == session.origin
-    assert (other.selected, other.controllers["shaped"].shaper) == ("shaped", "zvd")
-    assert set(other.shown) == {*session.shown} - {"mine"}
+    other.restore(inputs_of(link_of(session.inputs), other.inputs))
+    assert other.inputs.machine == session.inputs.machine
+    assert other.inputs.origin == session.inputs.origin
+    assert (other.inputs.selected, other.inputs.controllers["shaped"].shaper) == ("shaped", "zvd")
+    assert set(other.inputs.drawn) == {*session.inputs.drawn} - {"mine"}
     assert other.result("shaped").k_dyn == session.result("shaped").k_dyn
 
 
@@ -182,20 +188,20 @@ def test_a_reference_stays_while_drive_and_strategies_change_and_travels_in_the_
     session = Session()
     session.select("ramp")
     session.set("shaft.gap", "4 deg")
-    kept = simulate(session.machine, "ramp").k_dyn
-    session.keep_reference()
+    kept = simulate(session.inputs.machine, "ramp").k_dyn
+    session.set_reference()
     session.set_parameter("time", "200 ms")
     session.set("shaft.gap", 1.0)
     assert session.reference().k_dyn == kept
     assert session.result("ramp").k_dyn != kept
     other = Session()
-    other.restore(bench_of(link_of(session), other.bench))
+    other.restore(inputs_of(link_of(session.inputs), other.inputs))
     assert other.reference().k_dyn == kept
-    session.take(Drive.load("servo-axis-small"))  # two drives
+    session.load(Drive.load("servo-axis-small"))  # two drives
     assert session.reference().k_dyn == kept
-    session.keep_reference(False)
+    session.set_reference(False)
     assert session.reference() is None
-    assert bench_of(link_of(session), other.bench).reference is None
+    assert inputs_of(link_of(session.inputs), other.inputs).reference is None
     session.undo()
     assert session.reference().k_dyn == kept
 
@@ -209,21 +215,21 @@ def unpacked(link):
     return json.loads(zlib.decompress(urlsafe_b64decode(link + "=" * (-len(link) % 4))))
 
 
-def test_a_link_that_holds_no_bench_is_refused_in_a_sentence_and_names_no_code():
+def test_a_link_that_is_not_one_is_refused_in_a_sentence_and_names_no_code():
     """Not even where it holds some of one; only strategies that the page has are given parameters."""
-    now = Session(controllers=["direct"]).bench
-    content = unpacked(link_of(Session(controllers=["direct"])))
+    now = Session(controllers=["direct"]).inputs
+    content = unpacked(link_of(Session(controllers=["direct"]).inputs))
     parts = [{"parameters": {"direct": [1]}}, {"parameters": 3}, {"drawn": 3}, {"drive": 3}, {"reference": 3},
              {"reference": {"label": "direct", "drive": 3, "parameters": {}}}]  # fmt: skip
     whole = ["x", "%%%", "A" * 20_000, "\u00e4", *map(packed, (b"[1]", b"[" * 60_000, b"[" * 5_000_000))]
     for link in (*whole, *(packed(content | one) for one in parts)):
         with pytest.raises(InputError, match="copy the whole link again"):
-            bench_of(link, now)
-    assert bench_of(packed(content | {"selected": [1]}), now).selected == "direct"
+            inputs_of(link, now)
+    assert inputs_of(packed(content | {"selected": [1]}), now).selected == "direct"
     evil = {"parameters": {"evil.py:Evil": {}, "gains.toml": {}}, "selected": "evil.py:Evil"}
-    bench = bench_of(packed(content | evil | {"drawn": ["gains.toml"]}), now)
-    assert dict(bench.controllers) == dict(now.controllers)
-    assert (bench.selected, bench.drawn) == ("direct", frozenset())
+    inputs = inputs_of(packed(content | evil | {"drawn": ["gains.toml"]}), now)
+    assert dict(inputs.controllers) == dict(now.controllers)
+    assert (inputs.selected, inputs.visible) == ("direct", frozenset())
 
 
 def test_a_failing_controller_is_a_sentence_in_its_row():
@@ -234,9 +240,9 @@ def test_a_failing_controller_is_a_sentence_in_its_row():
     assert "ZeroDivisionError" in found.status
     assert "Traceback" not in found.status
     assert found.k_dyn != found.k_dyn
-    assert session.selected == "mine"
+    assert session.inputs.selected == "mine"
     session.remove(label)
-    assert session.selected == "direct"
+    assert session.inputs.selected == "direct"
     with pytest.raises(InputError, match="last strategy"):
         session.remove("direct")
 
@@ -245,8 +251,8 @@ def test_an_added_controller_joins_with_its_own_figures():
     session = Session(controllers=["direct"])
     soft = make_controller("ramp", {"time": "300 ms"})
     assert session.add("  ramp  300 ms ", soft, select=False) == "ramp 300 ms"
-    assert session.result("ramp 300 ms").k_dyn == simulate(session.machine, soft).k_dyn
-    assert session.shown == ("direct", "ramp 300 ms")
+    assert session.result("ramp 300 ms").k_dyn == simulate(session.inputs.machine, soft).k_dyn
+    assert session.inputs.drawn == ("direct", "ramp 300 ms")
     for number in range(MAX_STRATEGIES - 2):
         session.add(f"more {number}", soft)
     with pytest.raises(InputError, match="remove one first"):
@@ -259,16 +265,20 @@ def test_what_was_computed_for_a_machine_does_not_survive_another_one():
     session.set_parameter("time", "200 ms")
     session.add("optimum 0.4 s", make_controller("s-curve"))
     session.set("gap", 1.0)
-    assert session.selected == "optimum 0.4 s"  # it stays while values of this machine change
-    link = link_of(Session("hoist-15kw"))
-    assert set(bench_of(link, session.bench).controllers) == {"direct", "ramp"}
-    session.take(Drive.load("hoist-15kw"))
-    assert (list(session.controllers), session.selected) == (["direct", "ramp"], "direct")
-    assert session.controllers["ramp"].time == 0.2
+    assert session.inputs.selected == "optimum 0.4 s"  # it stays while values of this machine change
+    link = link_of(Session("hoist-15kw").inputs)
+    assert set(inputs_of(link, session.inputs).controllers) == {"direct", "ramp"}
+    session.load(Drive.load("hoist-15kw"))
+    assert (list(session.inputs.controllers), session.inputs.selected) == (["direct", "ramp"], "direct")
+    assert session.inputs.controllers["ramp"].time == 0.2
     session.undo()
-    assert "optimum 0.4 s" in session.shown
+    assert "optimum 0.4 s" in session.inputs.drawn
     session.undo()
-    assert set(bench_of(link_of(session), session.bench).controllers) == {"direct", "ramp", "optimum 0.4 s"}
+    assert set(inputs_of(link_of(session.inputs), session.inputs).controllers) == {
+        "direct",
+        "ramp",
+        "optimum 0.4 s",
+    }
 
 
 def test_a_start_with_too_many_events_waits_for_rest():

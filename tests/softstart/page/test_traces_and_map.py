@@ -13,7 +13,7 @@ from softstart.chain import Chain
 from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
-from softstart.page.frames import Screen, channels_at, drawn, landmarks, traces_of
+from softstart.page.frames import FrameBuilder, channels_at, drawn, landmarks, traces_of
 from softstart.page.machines import STEPS, Scale, axes_about, k_dyn_row, with_typed_changes
 from softstart.page.session import Session
 from softstart.quantities import Units
@@ -63,17 +63,17 @@ def test_a_window_is_as_fine_as_a_screen(window):
 def test_the_limit_of_the_map_is_the_permissible_torque_over_the_mean_one(kept):
     drive = Drive.from_toml(CRANE.to_toml() + "\n[limits]\nshaft_torque = 130.0\n")
     session = Session(drive, controllers=["direct"])
-    screen = Screen(session)
-    screen.kept = kept
-    rows = [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+    frames = FrameBuilder(session)
+    frames.fixed = kept
+    rows = [frame for frame in frames.idle_frames() if frame and "map_row" in frame]
     for frame in rows[:3]:
         head, index = frame["map"], frame["map_row"]["index"]
         one = drive.replace(gap=head["gaps"][4], load_inertia=head["inertias"][index])
         run = simulate(drive if kept else one, "direct")
         assert head["limit"][index] == pytest.approx(130.0 / run.peak_torque * run.k_dyn, rel=1e-13)
     assert len({frame["map"]["of"] for frame in rows}) == 1
-    without = Screen(Session(controllers=["direct"]))
-    assert next(frame for frame in without.at_rest() if frame and "map" in frame)["map"]["limit"] is None
+    without = FrameBuilder(Session(controllers=["direct"]))
+    assert next(frame for frame in without.idle_frames() if frame and "map" in frame)["map"]["limit"] is None
 
 
 def test_packed_traces_come_back_to_single_precision():
@@ -113,30 +113,30 @@ def test_a_slider_stays_at_its_end_for_values_beyond():
     assert Scale(0.0, 1.0).position(7.0) == STEPS
 
 
-def screen_of(chain: Chain, *controllers: str) -> tuple[Session, Screen, Controls]:
+def frames_of(chain: Chain, *controllers: str) -> tuple[Session, FrameBuilder, Controls]:
     session = Session(chain, controllers=controllers or ["direct", "ramp"])
-    screen = Screen(session)
-    return session, screen, Controls(session, screen, lambda: None)
+    frames = FrameBuilder(session)
+    return session, frames, Controls(session, frames, lambda: None)
 
 
 def test_the_figures_of_a_chain_are_those_of_simulate():
-    session, screen, controls = screen_of(DAMPED, "direct", "ramp", "take-up")
-    assert screen.first()["figure"]["k_dyn"] == simulate(DAMPED, "direct").k_dyn
+    session, frames, controls = frames_of(DAMPED, "direct", "ramp", "take-up")
+    assert frames.main_frame()["figure"]["k_dyn"] == simulate(DAMPED, "direct").k_dyn
     controls.take({"what": "slide", "path": "shaft[2].gap", "position": 100})
     controls.take({"what": "edit", "path": "mass[4].inertia", "text": "50 kg*m^2"})
-    assert not screen.mistakes
-    now = session.machine
-    assert now.shafts[1].gap == screen.entries["shaft[2].gap"].scale.value(100)
+    assert not frames.mistakes
+    now = session.inputs.machine
+    assert now.shafts[1].gap == frames.entries["shaft[2].gap"].scale.value(100)
     assert now.masses[3].inertia == 50.0
     for name in ("direct", "ramp", "take-up"):
         assert session.result(name).k_dyn == simulate(now, name).k_dyn
-    rows = [row for frame in screen.at_rest() if frame for row in frame.get("rows", ())]
+    rows = [row for frame in frames.idle_frames() if frame for row in frame.get("rows", ())]
     worn = {row["name"]: row["worn"] for row in rows if "worn" in row}
     wide = simulate(now.scaled(gaps=4.0), "ramp", fitted_to=now, base=now).k_dyn
     assert worn["ramp"] == wide
     session.undo()
     session.undo()
-    assert session.machine is DAMPED
+    assert session.inputs.machine is DAMPED
 
 
 def test_traces_hold_each_shaft_and_body():
@@ -154,8 +154,8 @@ def test_traces_hold_each_shaft_and_body():
 @pytest.mark.parametrize("strategy", ["direct", "take-up"])
 def test_stages_of_a_gap_are_open_where_it_carries_nothing(strategy):
     """The kernel's events against the states: no torque in an open gap, no twist within a closed one."""
-    session, screen, _ = screen_of(DAMPED, strategy)
-    picture = screen.first()["traces"][strategy]
+    session, frames, _ = frames_of(DAMPED, strategy)
+    picture = frames.main_frame()["traces"][strategy]
     run = session.result(strategy).run
     halves = 0.5 * DAMPED.at_motor_shaft().gap
     for k, shaft in enumerate(picture["shafts"]):
@@ -172,35 +172,35 @@ def test_stages_of_a_gap_are_open_where_it_carries_nothing(strategy):
 
 
 def test_gaps_that_were_closed_on_the_map_open_again_as_they_were():
-    session, _, controls = screen_of(DAMPED)
+    session, _, controls = frames_of(DAMPED)
     controls.take({"what": "jump", "gap": 0.0, "inertia": 69.2})
-    assert [shaft.gap for shaft in session.machine.shafts] == [0.0, 0.0, 0.0]
+    assert [shaft.gap for shaft in session.inputs.machine.shafts] == [0.0, 0.0, 0.0]
     controls.take({"what": "jump", "gap": 0.5, "inertia": 69.2})
-    assert [shaft.gap for shaft in session.machine.shafts] == pytest.approx([0.1, 0.2, 0.01])
+    assert [shaft.gap for shaft in session.inputs.machine.shafts] == pytest.approx([0.1, 0.2, 0.01])
 
 
 def test_a_map_is_computed_again_for_another_stiffness_and_not_for_another_place_of_it():
-    session, screen, controls = screen_of(DAMPED, "direct")
-    screen.axes = axes_about(DAMPED, 3, 3)
-    assert [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+    session, frames, controls = frames_of(DAMPED, "direct")
+    frames.axes = axes_about(DAMPED, 3, 3)
+    assert [frame for frame in frames.idle_frames() if frame and "map_row" in frame]
     controls.take({"what": "jump", "gap": 0.31, "inertia": 44.4})
-    assert not screen.first()["map_is_old"]
+    assert not frames.main_frame()["map_is_old"]
     session.set("shaft[1].stiffness", 5000.0)
-    assert screen.first()["map_is_old"]
+    assert frames.main_frame()["map_is_old"]
     closed = with_typed_changes(CHAIN, {f"shaft[{i}].gap": "0" for i in (1, 2, 3)})
-    _, screen, _ = screen_of(closed, "direct")  # no gap, no map
-    assert not screen.first()["mapped"]
-    assert not [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+    _, frames, _ = frames_of(closed, "direct")  # no gap, no map
+    assert not frames.main_frame()["mapped"]
+    assert not [frame for frame in frames.idle_frames() if frame and "map_row" in frame]
 
 
 def test_a_link_brings_the_chain_back_and_a_drive_replaces_it():
-    session, screen, _ = screen_of(DAMPED)
+    session, frames, _ = frames_of(DAMPED)
     session.set("shaft[3].gap", "0.6 deg")
-    other = links.bench_of(links.link_of(session), Session(controllers=["direct"]).bench)
-    assert other.drive == session.machine
-    session.take(Drive.load("crane-4amtkf"))
-    assert "shaft.gap" in screen.first()["fields"]
+    other = links.inputs_of(links.link_of(session.inputs), Session(controllers=["direct"]).inputs)
+    assert other.machine == session.inputs.machine
+    session.load(Drive.load("crane-4amtkf"))
+    assert "shaft.gap" in frames.main_frame()["fields"]
     session.undo()
-    frame = screen.first()
+    frame = frames.main_frame()
     assert frame["fields"]["shaft[3].gap"]["text"] == "0.6 deg"
-    assert frame["figure"]["k_dyn"] == simulate(other.drive, "direct").k_dyn
+    assert frame["figure"]["k_dyn"] == simulate(other.machine, "direct").k_dyn

@@ -14,7 +14,7 @@ const FACTS = [
 export class Figure {
   constructor(place, say) {
     this.name = element("div", { class: "name" });
-    const keep = button("Keep as reference", "Keep this start drawn, as a wide grey line, while drive and strategies change", () => say({ what: "reference", kept: true }), { class: "keep", "aria-label": null });
+    const keep = button("Keep as reference", "Keep this start drawn, as a wide grey line, while drive and strategies change", () => say({ what: "reference", on: true }), { class: "keep", "aria-label": null });
     this.value = element("output", { class: "k-dyn", id: "k-dyn", "aria-live": "off" });
     this.status = element("div", { class: "status", role: "status" });
     this.facts = FACTS.map(([label, unit]) => element("div", {}, element("dt", {}, label), element("dd"), element("dd", { class: "unit" }, unit)));

@@ -10,7 +10,7 @@ import { Steps } from "./steps.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
 
-const KEPT = "softstart-bench";
+const KEY = "softstart-inputs";
 
 export class Instrument {
   constructor(root, send) {
@@ -37,15 +37,15 @@ export class Instrument {
 
   // a page is reloaded by its reader, or when the line was lost for long: it goes on with its drive
   hello() {
-    const hello = (kept) => this.say({ what: "hello", kept, link: location.hash.slice(1) });
-    hello(JSON.parse(stored("sessionStorage", KEPT)));
+    const hello = (inputs) => this.say({ what: "hello", stored: inputs, link: location.hash.slice(1) });
+    hello(JSON.parse(stored("sessionStorage", KEY)));
     window.addEventListener("hashchange", (this.followed = () => hello(null)));
   }
 
   // in this tab, and in its address: a copied address brings back the same drive, strategies and settings
-  keep(bench) {
-    history.replaceState(history.state, "", `#${bench.link}`);
-    stored("sessionStorage", KEPT, JSON.stringify(bench));
+  keep(inputs) {
+    history.replaceState(history.state, "", `#${inputs.link}`);
+    stored("sessionStorage", KEY, JSON.stringify(inputs));
   }
 
   // the stamp comes back with the first frame that knows of the message
@@ -66,7 +66,7 @@ export class Instrument {
       this.plotted = false;
     }
     if (figure) {
-      // a glance has shown it already, unless the start was too long for one
+      // a quick frame has shown it already, unless the start was too long for one
       if (this.version !== frame.version || !this.figure.figure.reached) this.figure.show(figure);
       Object.assign(this, { version: frame.version, stamp: frame.stamp });
     }
@@ -93,12 +93,12 @@ export class Instrument {
     }
     if (frame.keep) this.keep(frame.keep);
     this.map.take(frame);
-    if (!number) return; // a glance: the figure alone
+    if (!number) return; // a quick frame: the figure alone
     this.number = number;
     this.waiting ||= requestAnimationFrame(() => this.draw());
   }
 
-  // the plots read this instant: so stands the drive
+  // the cursor of the plots is at this instant: show the drive at it
   timed(t) {
     const [from, to] = this.plots.seen;
     this.scheme.show(this.state.traces.get(this.state.selected), t, to - from);

@@ -62,7 +62,7 @@ export class GapMap {
     });
     const box = (id, title, onchange, text) => element("label", { class: "keep", title }, element("input", { type: "checkbox", id, onchange }), text);
     const keep = box("map-keep", "Ticked: the controller stays as it is set up for the drive of the moment while gap and inertia change",
-      ({ target }) => say({ what: "keep", kept: target.checked }), "controller kept");
+      ({ target }) => say({ what: "fix", fixed: target.checked }), "controller kept");
     this.otherName = element("span", {}, "difference");
     const other = box("map-other", "Ticked: this map is kept, and that of the next strategy is shown as its difference to it", () => this.pin(), this.otherName);
     this.other = other.firstChild;

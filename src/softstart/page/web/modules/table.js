@@ -75,7 +75,7 @@ export class Table {
   foot() {
     this.name = element("span");
     this.compared = cells();
-    const out = button("\u00d7", "Clear the reference", () => this.say({ what: "reference", kept: false }), { class: "out", "aria-label": "clear the reference" });
+    const out = button("\u00d7", "Clear the reference", () => this.say({ what: "reference", on: false }), { class: "out", "aria-label": "clear the reference" });
     const title = element("td", { class: "title" }, element("div", {}, this.name, out));
     return (this.reference = element("tfoot", { hidden: true }, element("tr", {}, element("td"), title, ...this.compared, element("td"))));
   }
@@ -118,7 +118,7 @@ export class Table {
     };
     const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}`, onchange: () => (line.asked = this.say({ what: "show", name, visible: eye.checked })) });
     const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}`, onchange: select });
-    const flag = element("span", { class: "flag", title: "Whether it keeps the limits, by the least margin; why it is never recommended: slow, not settled, harder than direct start" });
+    const flag = element("span", { class: "flag", title: "Whether the limits are kept, with the smallest margin; why it is never recommended: slow, not settled, K_dyn above that of direct start" });
     const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
     const out = button("\u00d7", `Take ${name} out`, () => this.say({ what: "remove", name }), { class: "out", "aria-label": `take ${name} out`, hidden: true });
     const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
