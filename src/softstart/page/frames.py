@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Machine
 from softstart.controller.tuned import Tuned
+from softstart.drive import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.kernel import records as rec
 from softstart.page import links, machines
