@@ -29,28 +29,6 @@ from softstart.hints import nearest
 if TYPE_CHECKING:
     import pint
 
-__all__ = [
-    "OTHER_NOUNS",
-    "QUANTITIES",
-    "RefusedError",
-    "Units",
-    "Value",
-    "check_whole",
-    "doubtful_comma",
-    "multiplied",
-    "nearest",
-    "parse",
-    "read_multiple",
-    "read_unit",
-    "shortest",
-    "show",
-    "to_si",
-    "values_in",
-    "whole_number",
-    "with_points",
-    "without_powers",
-]  # fmt: skip
-
 Value = float | NDArray[np.float64]
 
 # ---- units ----------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from softstart.cli import main
 from softstart.drive import library
 from softstart.drive.data_sheet import DataSheet
 
-MOTOR = {"motor.power": "11 kW", "motor.speed": "1460 rpm", "motor.inertia": "0.055 kg*m^2"}
+MOTOR = {"motor.rated_power": "11 kW", "motor.rated_speed": "1460 rpm", "motor.inertia": "0.055 kg*m^2"}
 GEAR = {"gear.ratio": 25, "gear.stiffness": "1 kN*m/arcmin", "gear.backlash": "8 arcmin"}
 MASS = {"load.mass": "5400 kg", "load.radius": "0.25 m"}
 SHEETS = {

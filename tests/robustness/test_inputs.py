@@ -54,7 +54,7 @@ QUICK = {
     "balance": "balance",
     "report": "report --json --budget 0 --controllers direct,ramp",
     "serve": "serve nowhere.toml --no-browser",
-    "init": "init --set load.machine=rotor --set motor.speed=1430rpm --set load.inertia=1",
+    "init": "init --set load.machine=rotor --set motor.rated_speed=1430rpm --set load.inertia=1",
     "identify": f"identify nowhere.csv --drive {CRANE}",
     "wear": "wear found-2024 found-2026",
     "plan": f"plan {CRANE} --set load.kind=reactive --standard",

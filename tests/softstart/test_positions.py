@@ -54,15 +54,6 @@ def test_defaults() -> None:
     assert "start_position" in CRANE.given()
 
 
-def test_the_old_key_is_read_as_the_new_one() -> None:
-    text = CRANE.to_toml().replace('position = "mid-gap"', "")
-    old = text.replace("[shaft]\n", '[shaft]\nstart_position = "-0.1 rad"\n')
-    assert Drive.from_toml(old) == CRANE.replace(start_position=-0.1)
-    assert CRANE.with_settings(["shaft.start_position=-0.1"]) == CRANE.replace(start_position=-0.1)
-    with pytest.raises(InputError, match="start_position"):
-        Drive.from_toml(CRANE.to_toml().replace("[shaft]\n", "[shaft]\nstart_position = 0.1\n"))
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

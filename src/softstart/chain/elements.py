@@ -20,21 +20,6 @@ from softstart.input.parameter_set import (
 )
 from softstart.input.parameters import Parameter
 
-__all__ = [
-    "LIBRARY",
-    "MASS",
-    "MOTOR",
-    "SHAFT",
-    "START",
-    "TABLES",
-    "TOP",
-    "Mass",
-    "Motor",
-    "Quantity",
-    "Shaft",
-    "Side",
-]
-
 Quantity = float | str  # a number in SI, or a string with a unit
 Side = Literal["before", "after"]
 

@@ -39,11 +39,12 @@ from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, librar
 from softstart.drive.checks import wrong_units
 from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
+from softstart.hints import nearest
 from softstart.input.documents import DocumentTable, construct, document_text, read_document
 from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameters import Wording, read_values, sentences_of
-from softstart.quantities import RefusedError, nearest, show
+from softstart.quantities import RefusedError, show
 
 BRANCHES = (
     "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "

@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector, plain_fields
 from softstart.errors import InputError
 
-__all__ = ["PeriodicTorque"]
-
 
 @dataclass(frozen=True, eq=False)
 class PeriodicTorque:

@@ -105,7 +105,7 @@ def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
     if sheet is None:
         return Drive.load(name).with_settings(settings) if settings else Drive.load(name)
     # its own keys are those of the sheet, at their own parts
-    paths = {path for p in DataSheet.PARAMETERS.values() for path in (p.path, p.formerly)}
+    paths = {p.path for p in DataSheet.PARAMETERS.values()}
     own = [one for one in settings if one.partition("=")[0].strip() in paths]
     settings = [one for one in settings if one not in own]
     found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))

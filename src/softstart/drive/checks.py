@@ -11,8 +11,6 @@ import numpy as np
 from softstart.input.parameters import Parameter, Wording
 from softstart.quantities import RefusedError, Units, show
 
-__all__ = ["FRICTIONS", "GRAVITY", "contradictions", "elastic_frequency", "wrong_units"]
-
 BROADCAST: Final = "arrays of records must broadcast together; give them one length, or a single number"
 FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
 

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     from softstart.drive.model import Drive
 
-__all__ = ["contact_torque", "in_contact", "initial_state", "whole_drive"]
-
 
 # The smoothing of what sticks or slews, in elastic periods, and the speed below which a load is stuck, in
 # target speeds.

@@ -27,10 +27,8 @@ from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import file_text
 from softstart.input.gear import Gear
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
-from softstart.input.parameters import Mistake, Parameter, Wording, bare, without_unit
+from softstart.input.parameters import Mistake, Wording, bare, without_unit
 from softstart.quantities import Units, shortest
-
-__all__ = ["BAND", "DataSheet", "UnknownStiffness"]
 
 # elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
 # K_dyn is the higher one, and results are compared with those of the soft end
@@ -43,8 +41,6 @@ TWICE = {
     "rope_length": "how stiff the rope is", "radius": "how large the wheel or drum is",
     "rise": "how steep the track is",
 }  # fmt: skip
-# keywords of former versions
-FORMER = {"power": "rated_power", "speed": "rated_speed", "output_torque": "active_torque"}
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
 FORCES = {"load_torque", "load_friction"}
@@ -160,10 +156,9 @@ class DataSheet(ParameterSet):
     machine: Machine = parameter("load.machine", "", "kind of the machine", '"travel"',
         choices=get_args(Machine))
     rated_power: MaybeNumber = parameter("motor.rated_power", "W", "rated power", '"3 kW"', "above 0",
-        default=None, formerly="motor.power")
+        default=None)
     rated_torque: MaybeNumber = _maybe("motor.rated_torque", "N*m", "rated torque", '"20 N*m"')
-    rated_speed: Number = parameter("motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0",
-        formerly="motor.speed")
+    rated_speed: Number = parameter("motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0")
     motor_inertia: Number = parameter("motor.inertia", "kg*m^2", "inertia of the motor's own rotor",
         '"0.0119 kg*m^2"', "above 0")
     added_inertia: Number = _nothing("motor.added_inertia", "kg*m^2",
@@ -268,11 +263,7 @@ class DataSheet(ParameterSet):
         >>> DataSheet.describes({"load": {"machine": "hoist"}}), DataSheet.describes({"load": {"torque": 7}})
         (True, False)
         """
-
-        def paths(parameters: Mapping[str, Parameter]) -> set[str]:
-            return {path for p in parameters.values() for path in (p.path, p.formerly)}
-
-        own = paths(cls.PARAMETERS) - paths(Drive.PARAMETERS)
+        own = {p.path for p in cls.PARAMETERS.values()} - {p.path for p in Drive.PARAMETERS.values()}
         tables = {name: keys for name, keys in document.items() if isinstance(keys, dict)}
         of_drive = {"stiffness", "gap"} & tables.get("shaft", {}).keys()
         keys_of_a_sheet = any(f"{name}.{key}" in own for name, keys in tables.items() for key in keys)
@@ -297,13 +288,12 @@ class DataSheet(ParameterSet):
         self, given: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake], *known: Any
     ) -> None:
         """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
-        given = {FORMER.get(name, name): value for name, value in given.items()}
         toml = wording.style == "toml"
         wrong = [*mistakes, *(without_unit(given, self.PARAMETERS, USUAL, wording) if toml else ())]
         share = bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
-        given |= {name: converted(name, value) for name, value in given.items()}
+        given = {name: converted(name, value) for name, value in given.items()}
         given |= {"efficiency": f"{share} %"} if per_cent else {}
         try:
             super()._fill(given, wording, wrong, *known)

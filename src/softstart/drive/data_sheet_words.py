@@ -10,11 +10,6 @@ from typing import Literal
 from softstart.input.parameters import Parameter, bare, read_value
 from softstart.quantities import RefusedError
 
-__all__ = [
-    "ABOUT", "INSTEAD", "MACHINES", "NEEDED", "ROPE", "STIFFNESSES", "TYPICAL", "USUAL", "Machine",
-    "answered", "converted", "echo", "if_empty", "in_usual_unit", "typed",
-]  # fmt: skip
-
 Machine = Literal["hoist", "travel", "belt", "rotor"]
 MACHINES: Mapping[str, str] = {
     "hoist": "a load on ropes",

@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from softstart.input.parameters import Parameter, Wording
 
-__all__ = ["INFORMATIVE_TABLES", "Limits", "SNCurve", "contradicting_limits", "limits_of"]
-
 INFORMATIVE_TABLES = ("limits", "limits.fatigue", "gear")  # what stands there changes no start
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from softstart.chain.elements import Motor
     from softstart.drive.model import Drive
 
-__all__ = ["Machine"]
-
 
 class Machine(ABC):
     """A machine that can be started: a `Drive` of two masses, or a `Chain` of many.

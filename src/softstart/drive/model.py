@@ -31,8 +31,6 @@ from softstart.input.parameter_set import (
 from softstart.input.parameters import Parameter, ParameterValue, Wording, read_value
 from softstart.quantities import RefusedError, show
 
-__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
-
 LoadKind = Literal["active", "reactive"]
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
 Position = Literal["mid-gap", "driving-flank", "opposite-flank", "hanging", "unknown"]
@@ -178,7 +176,7 @@ class Drive(ParameterSet, Machine):
         '"880 rpm"', "above 0", default=None, follows="rated_speed", at_output="value")
     start_position: NumberOrWord = parameter("start.position", "rad",
         "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"', default="mid-gap",
-        choices=get_args(Position), symbol="theta", formerly="shaft.start_position", at_output="value")
+        choices=get_args(Position), symbol="theta", at_output="value")
     brake: Brake = parameter("start.brake", "", "brake that holds the motor until its release", '"motor"',
         default="none", choices=get_args(Brake))
     release: NumberOrWord = parameter("start.release", "s",
@@ -775,5 +773,5 @@ class Drive(ParameterSet, Machine):
 
 
 PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS
-BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
+BY_PATH = {p.path: p.name for p in PARAMETERS.values()}
 TABLES: tuple[str, ...] = tuple(table.name for table in Drive.TABLES if table.name)

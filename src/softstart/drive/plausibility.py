@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 from softstart.drive.checks import GRAVITY, elastic_frequency
 
-__all__ = ["TwoMasses", "motion_warnings", "plausibility_warnings"]
-
 # usual speeds of the load, m/min; lifts, which have a counterweight, are faster
 USUAL_SPEEDS = {"hoist": (0.5, 150.0), "travel": (1.0, 300.0), "belt": (1.0, 480.0)}
 LIFTS = 600.0

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.drive.model import PARAMETERS, Drive
 
-__all__ = ["Columns", "Records", "each_of"]
-
 
 class Columns(Drive):
     """A drive whose numbers may be arrays, which broadcast together: drives as columns of a table.

@@ -13,6 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
+from softstart.hints import nearest
 from softstart.input.columns import (
     CLOCK,
     SHARES,
@@ -25,7 +26,7 @@ from softstart.input.columns import (
     split_rows,
 )  # fmt: skip
 from softstart.input.files import read_text
-from softstart.quantities import RefusedError, nearest, parse, show
+from softstart.quantities import RefusedError, parse, show
 
 SIGNALS: Final = {
     "time": Wanted(("time", "t"), "s"),

@@ -12,10 +12,11 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
+from softstart.hints import nearest
 from softstart.identification.logs import Log
 from softstart.identification.model import FILTER, POSITION
 from softstart.identification.result import FRICTIONS, WIDEST
-from softstart.quantities import nearest, show
+from softstart.quantities import show
 
 USUAL: Final = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
 FREE: Final = (*USUAL, "load_torque", "torque_lag", "computing_delay", *FRICTIONS, FILTER)

@@ -27,18 +27,6 @@ _SPACED = re.compile(
     rf"{CLOCK.pattern}(?!\S)|\"[^\"]*\"|[^\s\[(\"][^\s\[(]*(?:\s*(?:{_BRACKETS}))*\S*|{_BRACKETS}|\S+"
 )
 
-__all__ = [
-    "CLOCK",
-    "Columns",
-    "Wanted",
-    "are_units",
-    "cells_of",
-    "read_columns",
-    "read_numbers",
-    "split_heading",
-    "split_rows",
-]  # fmt: skip
-
 Row = tuple[int, list[str]]  # the number of a line, and its cells
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softstart.errors import MOST, InputError
-from softstart.hints import did_you_mean, term
+from softstart.hints import did_you_mean, nearest, term
 from softstart.input.parameters import (
     Mistake,
     Parameter,
@@ -26,25 +26,13 @@ from softstart.input.parameters import (
     sentences_of,
     without_unit,
 )
-from softstart.quantities import doubtful_comma, nearest, shortest, show
+from softstart.quantities import doubtful_comma, shortest, show
 
 T = TypeVar("T")
 
 MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer than anyone waits
 # a key with this many dots takes memory by their square, and no table is nested like that
 _DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
-
-__all__ = [
-    "DocumentTable",
-    "apply_changes",
-    "construct",
-    "document_text",
-    "literal",
-    "parsed",
-    "placed",
-    "read_document",
-    "table_text",
-]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -197,9 +185,7 @@ def apply_changes(
     document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[DocumentTable], what: str
 ) -> Iterator[str]:
     """Put changes by path into the document; a sentence for each that cannot be."""
-    paths = {
-        path: (one, p) for one in tables for p in one.parameters for path in (p.formerly, p.path) if path
-    }
+    paths = {p.path: (one, p) for one in tables for p in one.parameters}
     for path, value in changes.items():
         plain = re.sub(r"\[.*\]", "", path)
         if plain not in paths:
@@ -230,9 +216,7 @@ def placed(
     """
     named = {"": DocumentTable("", ())} | {table.name: table for table in tables}
     everywhere = [p for table in tables for p in table.parameters]
-    former = {p.formerly: p for p in everywhere if p.formerly}
     given: dict[str, Any] = {}
-    renamed: list[tuple[Parameter, object]] = []
     mistakes: list[Mistake] = []
 
     def note(subject: str, reason: str, meant: Iterable[Parameter] = ()) -> None:
@@ -258,8 +242,6 @@ def placed(
                 take(named[path], value)
             elif key in table.by_key:
                 own[key] = value
-            elif path in former:
-                renamed.append((former[path], value))
             elif len(mistakes) > MOST:
                 note(key, "there is no such key")  # in short: it is counted, not shown
             elif not name and isinstance(value, dict) and not any(p.key == key for p in everywhere):
@@ -279,12 +261,6 @@ def placed(
         if rows is not None and len(rows) < table.least:
             needed = f"{what} file needs at least {table.least}, and there are {len(rows)}"
             note(table.bracket, f"{needed}; add {table.bracket} tables")
-    for p, value in renamed:
-        own = given.setdefault(p.table, {})
-        if p.key in own:
-            reason = f"it is now {p.place}, which is given as well; leave one out"
-            note(f"{p.formerly} = {wording.show(value)}", reason)
-        own.setdefault(p.key, value)
     return given, mistakes
 
 

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import IO, Any, TypeVar, cast
 
 from softstart.errors import InputError
-from softstart.quantities import RefusedError, nearest, show
+from softstart.hints import nearest
+from softstart.quantities import RefusedError, show
 from softstart.stopping import at_stop
-
-__all__ = ["ABSENT", "Library", "file_text", "object_of", "read_text", "refusal_of", "write_whole"]
 
 
 class Library:

@@ -10,8 +10,6 @@ import numpy as np
 
 from softstart.quantities import RefusedError
 
-__all__ = ["BEHIND", "NO_GEAR", "NO_OUTPUT", "OWN_SIDE", "Gear", "alike"]
-
 BEHIND = re.compile(r"(.*\S)\s+at\s+(?:the\s+)?output(?:\s+shaft)?\s*", re.IGNORECASE)  # "9 arcmin at output"
 _MULTIPLE = re.compile(r".*(x|J1)\s*", re.IGNORECASE)
 NO_GEAR = 'without gear.ratio nothing is "at output"; give it, or write the value at the motor shaft'

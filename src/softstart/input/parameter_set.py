@@ -33,17 +33,6 @@ from softstart.input.parameters import (
 )
 from softstart.quantities import show
 
-__all__ = [
-    "MaybeNumber",
-    "MaybeSeries",
-    "Number",
-    "NumberOrWord",
-    "ParameterSet",
-    "Series",
-    "like",
-    "parameter",
-]
-
 if TYPE_CHECKING:
     Read_co = TypeVar("Read_co", covariant=True)
 
@@ -284,7 +273,7 @@ def read_settings(
     >>> mistakes[0].sentence
     'gapp=1: there is no parameter "gapp"; did you mean shaft.gap?'
     """
-    parameters_by_path = {path: p for p in parameters.values() for path in (p.formerly, p.path) if path}
+    parameters_by_path = {p.path: p for p in parameters.values()}
     given: dict[str, object] = {}
     written: dict[str, str] = {}
     first: dict[str, str] = {}

@@ -11,25 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.hints import term
+from softstart.hints import nearest, term
 from softstart.input.gear import BEHIND, NO_GEAR, OWN_SIDE, Gear, alike
-from softstart.quantities import RefusedError, Value, nearest, parse, show, values_in, without_powers
-
-__all__ = [
-    "REQUIRED",
-    "Limit",
-    "Mistake",
-    "Parameter",
-    "ParameterValue",
-    "Wording",
-    "at_motor",
-    "bare",
-    "meant_by",
-    "read_value",
-    "read_values",
-    "sentences_of",
-    "without_unit",
-]  # fmt: skip
+from softstart.quantities import RefusedError, Value, parse, show, values_in, without_powers
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
 LEAST, MOST = 1e-30, 1e30
@@ -72,7 +56,7 @@ class Parameter:
     value in SI, or None for "not given"; one that `follows` another parameter takes its value. One with a
     unit and `choices` is a quantity or one of these words. A `many` parameter is a list of numbers, an
     `infinite` one may be infinity. `example` is what to type. `table` is that of the file, "" above the first
-    one; `name` is the keyword in Python, by default the key; `formerly` is an older path, read as well.
+    one; `name` is the keyword in Python, by default the key.
     `at_output` says whether the value may be written "at output" of the gear: as one that losses change
     ("value"), as a limit, which is brought over without losses, or as one that is "here" anyway; one with a
     "side" has the gear beside it.
@@ -91,7 +75,6 @@ class Parameter:
     follows: str = ""
     table: str = ""
     name: str = ""
-    formerly: str = ""
     positional: bool = False
     at_output: Literal["", "value", "limit", "here", "side"] = ""
 

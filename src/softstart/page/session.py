@@ -20,9 +20,10 @@ from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
+from softstart.hints import nearest
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
-from softstart.quantities import Units, nearest
+from softstart.quantities import Units
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, SOFT_END, as_far_as_known, changed_case
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import simulate

@@ -10,10 +10,10 @@ from typing import Self
 
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, Mistakes
+from softstart.hints import nearest
 from softstart.input.documents import DocumentTable, read_document
 from softstart.input.files import file_text
 from softstart.input.parameters import REQUIRED, Parameter
-from softstart.quantities import nearest
 
 LOGOS = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml"}
 MOST_LOGO = 500_000  # bytes: a report is sent by mail

@@ -9,7 +9,8 @@ from typing import Self
 
 from softstart.drive import Drive
 from softstart.errors import InputError, Mistakes
-from softstart.quantities import nearest, to_si
+from softstart.hints import nearest
+from softstart.quantities import to_si
 from softstart.views.numbers import RPM, decimals_of
 
 EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"

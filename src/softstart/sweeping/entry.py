@@ -20,8 +20,9 @@ from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
+from softstart.hints import nearest
 from softstart.parallel import Pool, checked_workers, sharing
-from softstart.quantities import check_whole, nearest, show
+from softstart.quantities import check_whole, show
 from softstart.start.batch import figure_columns, has_margin
 from softstart.start.engine import check_limits
 from softstart.sweeping.compute import SweepSettings, Task, check_corners, compute, first_start

@@ -19,9 +19,10 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
+from softstart.hints import nearest
 from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, meant_by, read_value
-from softstart.quantities import RefusedError, multiplied, nearest, show
+from softstart.quantities import RefusedError, multiplied, show
 
 if TYPE_CHECKING:
     from xarray import DataArray, Variable

@@ -19,9 +19,10 @@ from softstart.drive import Drive
 from softstart.drive.machine import Machine
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes
+from softstart.hints import nearest
 from softstart.input.parameters import ParameterValue
 from softstart.optimal.problem import StartTime
-from softstart.quantities import multiplied, nearest, to_si
+from softstart.quantities import multiplied, to_si
 from softstart.tuning.ranges import Range
 from softstart.tuning.search import latin
 

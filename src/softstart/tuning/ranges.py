@@ -11,7 +11,8 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
 from softstart.errors import InputError, Mistakes
-from softstart.quantities import nearest, number_in, read_multiple
+from softstart.hints import nearest
+from softstart.quantities import number_in, read_multiple
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 

@@ -19,8 +19,8 @@ from softstart.arrays import Indices, Vector
 from softstart.chain.machines import varied
 from softstart.controller import CompiledController, make_controller
 from softstart.errors import InputError
+from softstart.hints import nearest
 from softstart.parallel import Pool
-from softstart.quantities import nearest
 from softstart.start.batch import Batch, prepared
 from softstart.tuning.question import MARGIN, TuningProblem
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from softstart.clutch import LAWS, Clutch, Engagement, engage
 from softstart.errors import InputError
-from softstart.quantities import nearest, show
+from softstart.hints import nearest
+from softstart.quantities import show
 from softstart.results import Result
 from softstart.study import Table
 from softstart.views.clutches import clutch_lines
