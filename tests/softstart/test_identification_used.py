@@ -183,7 +183,7 @@ def test_gains_are_tuned_over_the_drives_that_are_left(
     assert tuned.question.cells == ((found.drive.gap, found.drive.load_inertia),)
     assert tuned.robust is not None
     # K_dyn over the mean torque of the drive found, as tolerances have it
-    gains: Any = {"parameters": tuned.robust.gains, "fitted_to": found.drive, "base": found.drive}
+    gains: Any = {"parameters": tuned.robust.parameters, "fitted_to": found.drive, "base": found.drive}
     runs = [simulate(one, "ramp", **gains) for one in (found.drive, *found.draws(20).elements())]
     assert max(run.k_dyn for run in runs) == pytest.approx(tuned.robust.worst, rel=1e-12)
 

@@ -191,6 +191,7 @@ def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
     left = np.arange(len(costs))
     before = trials.cost(left, trials.default)
     allowed = np.maximum(costs, np.minimum(before, (1.0 + ROUNDED) * costs))
+    latest = np.maximum(trials.latest(left, judged), 1.0)  # `cost` lets a start be late by what rounding makes
     for digits in DIGITS:
         tried = {
             name: np.array([float(f"{one:.{digits}g}") for one in value[left]])
@@ -198,7 +199,7 @@ def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
         }
         reached = trials.judged(left, tried, to_the_end=True)
         cost = trials.cost(left, reached)
-        good = cost <= allowed[left]
+        good = (cost <= allowed[left]) & ~(trials.latest(left, reached) > latest[left])
         for part, new in zip(
             (*values.values(), *judged, costs), (*tried.values(), *reached, cost), strict=True
         ):

@@ -110,6 +110,10 @@ class Trials:
         """The cost of what candidates reach."""
         return cost(judged.metric, judged.start_time, self.bound[jobs], self.question.quantile)
 
+    def latest(self, jobs: Indices, judged: Judged) -> Vector:
+        """Start time over its bound, at the quantile over the starts of each job."""
+        return np.asarray(upper(judged.start_time / self.bound[jobs], self.question.quantile))
+
     def judged(self, jobs: Indices, values: Values, to_the_end: bool = False) -> Judged:
         """What candidates reach, each for a job of its own; NaN where the controller refuses its values.
 
