@@ -191,7 +191,8 @@ def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
     left = np.arange(len(costs))
     before = trials.cost(left, trials.default)
     allowed = np.maximum(costs, np.minimum(before, (1.0 + ROUNDED) * costs))
-    latest = np.maximum(trials.latest(left, judged), 1.0)  # `cost` lets a start be late by what rounding makes
+    # strictly: `cost` lets a start be late by the rounding of its instants, which gains must not use up
+    latest = np.maximum(trials.latest(left, judged), 1.0)
     for digits in DIGITS:
         tried = {
             name: np.array([float(f"{one:.{digits}g}") for one in value[left]])
