@@ -21,8 +21,8 @@ from softstart_controllers.sampled import (
     encoder_count,
     full_torque_parameter,
     mean_torque,
-    patience_parameter,
     period_parameter,
+    timeout_parameter,
 )
 
 LONGEST_WINDOW = 30  # samples kept of half a window
@@ -104,6 +104,11 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     y.realised = u
 
 
+def contact_drop(drive: Drive, p: Any) -> float:
+    """A drop that is seen early, and that the load behind the shaft brings about."""
+    return min(max(0.5 * mean_under(drive, p.torque) / p.torque, SMALLEST_DROP), DROP)
+
+
 @dataclass(frozen=True)
 class AccelerationDelay(CompiledController):
     """Torque reduced until the acceleration of the motor drops, then for a delay, then Ms.
@@ -154,33 +159,23 @@ class AccelerationDelay(CompiledController):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
+    # fmt: off
     torque: float | None = reduced_torque_parameter("reduced torque", "above 0")
     full_torque: float | None = full_torque_parameter("torque after the delay", "0 or more")
-    delay: float | None = parameter(
-        "s",
-        "how long the torque stays reduced after contact",
-        "until the torque peak of stage 2, [G](14), or its end, [G](15)",
-        value=lambda drive, p: delay_of(drive, p.torque, p.raise_at),
-        rule="0 or more",
-        multiples=(0.2, 3.0),
-    )
-    drop: float | None = parameter(
-        "1",
-        "drop of the acceleration that means contact, as a share of torque/J1",
+    delay: float | None = parameter("s", "time from contact to full torque",
+        lambda drive, p: delay_of(drive, p.torque, p.raise_at),
+        "until the torque peak of stage 2, [G](14), or its end, [G](15)", "0 or more", multiples=(0.2, 3.0))
+    drop: float | None = parameter("1",
+        "drop of the acceleration that means contact, as a share of torque/J1", contact_drop,
         "0.3, or half the share that a closed drive takes on the mean where that is less, at least 0.05",
-        value=lambda drive, p: min(max(0.5 * mean_under(drive, p.torque) / p.torque, SMALLEST_DROP), DROP),
-        rule="above 0",
-    )
-    latency: float | None = parameter(
-        "s",
-        "time from contact until it is seen",
-        "from the window and the shaft torque of [G](11)",
-        value=lambda drive, p: detection_latency(drive, p.torque, p.drop, p.period),
-        rule="0 or more",
-    )
-    contact_timeout: float | None = patience_parameter("longest wait for contact")
+        "above 0")
+    latency: float | None = parameter("s", "time from contact to its detection",
+        lambda drive, p: detection_latency(drive, p.torque, p.drop, p.period),
+        "from the window and the shaft torque of [G](11)", "0 or more")
+    contact_timeout: float | None = timeout_parameter("longest wait for contact")
     period: float | None = period_parameter()
     raise_at: str | None = raise_parameter()
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """The window, and the wait from when the contact is seen."""

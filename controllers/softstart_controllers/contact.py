@@ -502,27 +502,16 @@ def predicted_state(p: Parameters, m: State, u: float) -> tuple[float, float, fl
     return w1, z, w2, u
 
 
-def certainty_parameter() -> Any:
+def threshold_parameter() -> Any:
     """`detection_threshold` as a field of a controller."""
-    return parameter(
-        "1",
-        "standard deviations of the motor's angle that mean contact",
-        "7",
-        value=7.0,
-        rule="above 0",
-        between=(4.0, 12.0),
-    )
+    meaning = "detection threshold of the contact, in standard deviations of the motor angle"
+    return parameter("1", meaning, 7.0, limit="above 0", between=(4.0, 12.0))
 
 
 def uncertainty_parameter() -> Any:
     """`uncertainty` as a field of a controller."""
     return parameter(
-        "1",
-        "unknown part of the twist in each sample",
-        "0.15",
-        value=0.15,
-        rule="0 or more",
-        between=(0.01, 0.5),
+        "1", "unknown part of the twist in each sample", 0.15, limit="0 or more", between=(0.01, 0.5)
     )
 
 

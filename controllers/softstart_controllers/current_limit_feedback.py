@@ -101,31 +101,15 @@ class CurrentLimitFeedback(Landing):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
+    # fmt: off
     low_torque: float | None = reduced_torque_parameter("torque limit while the gap is open", "0 or more")
-    approach_speed: float | None = parameter(
-        "rad/s",
-        "speed at which the gap is closed",
-        "c dw12/Omega = 0.85 of the mean shaft torque under the full torque",
-        value=landing.approach_speed,
-        rule="above 0",
-        multiples=(0.3, 3.0),
-    )
-    rise: float | None = parameter(
-        "s",
-        "time in which the limit rises after contact",
-        "one elastic period",
-        value=lambda drive, p: drive.elastic_period,
-        rule="0 or more",
-        multiples=(0.2, 5.0),
-    )
-    damping_ratio: float | None = parameter(
-        "1",
-        "damping ratio added by the feedback",
-        "0.7 less that of the shaft, or what the delays allow, down to 0",
-        value=lambda drive, p: feedback_damping(drive, p.period),
-        rule="0 or more",
-        between=(0.0, 1.5),
-    )
+    approach_speed: float | None = landing.approach_parameter("0.85")
+    rise: float | None = parameter("s", "rise time of the limit after contact",
+        lambda drive, p: drive.elastic_period, "one elastic period", "0 or more", multiples=(0.2, 5.0))
+    damping_ratio: float | None = parameter("1", "damping ratio added by the feedback",
+        lambda drive, p: feedback_damping(drive, p.period),
+        "0.7 less that of the shaft, or what the delays allow, down to 0", "0 or more", between=(0.0, 1.5))
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Landing, feedback, and the rise in a sample."""

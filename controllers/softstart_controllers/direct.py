@@ -45,6 +45,4 @@ class Direct(CompiledController):
     kernel: ClassVar[Any] = step
     record: ClassVar[Any] = PARAMETERS
 
-    torque: float | None = parameter(
-        "N*m", "motor torque", "starting torque Ms", value=lambda drive, p: drive.Ms
-    )
+    torque: float | None = parameter("N*m", "motor torque", lambda drive, p: drive.Ms, "starting torque Ms")

@@ -22,9 +22,9 @@ from softstart_controllers import contact
 from softstart_controllers.reduced import load_drift
 from softstart_controllers.sampled import (
     full_torque_parameter,
-    patience_parameter,
     period_parameter,
     pulling_load,
+    timeout_parameter,
 )
 
 COARSE = 0.1  # of Ms/c: with larger counts the contact is over before it is seen
@@ -106,6 +106,13 @@ def approach_speed(drive: Drive, p: Any) -> float:
     return drive.Omega * p.impact * shaft_torque_under(drive, p.full_torque) / drive.c
 
 
+def approach_parameter(impact: str) -> Any:
+    """`approach_speed` as a field of a controller; `impact` in words."""
+    text = f"c dw12/Omega = {impact} of the mean shaft torque under the full torque"
+    meaning = "speed relative to the load at which the gap is closed"
+    return parameter("rad/s", meaning, approach_speed, text, "above 0", multiples=(0.3, 3.0))
+
+
 @dataclass(frozen=True)
 class Landing(CompiledController):
     """A strategy that lands softly. `impact` is c dw12/Omega over the shaft torque under the full torque."""
@@ -113,27 +120,16 @@ class Landing(CompiledController):
     effort: ClassVar[Effort | None] = Effort.ENCODER
     impact: ClassVar[float] = 0.7
 
-    low_torque: float | None = parameter(
-        "N*m",
-        "torque limit while the gap is open",
-        "load torque plus half the accelerating torque",
-        value=low_torque,
-        rule="above 0",
-        multiples=(0.3, 2.0),
-    )
-    approach_speed: float | None = parameter(
-        "rad/s",
-        "speed at which the gap is closed",
-        "c dw12/Omega = 0.7 of the mean shaft torque under the full torque",
-        value=approach_speed,
-        rule="above 0",
-        multiples=(0.3, 3.0),
-    )
+    # fmt: off
+    low_torque: float | None = parameter("N*m", "torque limit while the gap is open", low_torque,
+        "load torque plus half the accelerating torque", "above 0", multiples=(0.3, 2.0))
+    approach_speed: float | None = approach_parameter("0.7")
     full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
-    detection_threshold: float | None = contact.certainty_parameter()
+    detection_threshold: float | None = contact.threshold_parameter()
     uncertainty: float | None = contact.uncertainty_parameter()
-    contact_timeout: float | None = patience_parameter()
+    contact_timeout: float | None = timeout_parameter()
     period: float | None = period_parameter()
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """The numbers of `Parameters` as `landing`."""

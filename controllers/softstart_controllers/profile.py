@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -129,15 +128,18 @@ class Profile(CompiledController):
     state_size: ClassVar[int] = size(STATE)
     needs: ClassVar[tuple[str, ...]] = ("file", "profile")
 
-    file: str | None = parameter(
-        "", "path of the profile, CSV or TOML", "none: this or profile is needed", "text"
-    )
-    profile: TorqueProfile | None = parameter(  # noqa: RUF009  a field, as the others
-        "", "the profile itself, a TorqueProfile; from Python only", "none: this or file is needed", "object"
-    )
-    period: float | None = parameter("s", "sample period", "0: the profile as it is, without sampling")
+    # fmt: off
+    file: str | None = parameter("", "path of the profile (CSV or TOML)",
+        default_text="none: this or profile is needed")
+    profile: TorqueProfile | None = parameter("",  # noqa: RUF009  a field, as the others
+        "the profile itself, a TorqueProfile; from Python only",
+        default_text="none: this or file is needed", python_only=True)
+    period: float | None = parameter("s", "sample period", 0.0, "0: the profile as it is, without sampling",
+        "0 or more")
+    # fmt: on
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if (self.file is None) == (self.profile is None):
             both = "both were given" if self.file is not None else "it has none"
             raise InputError(
@@ -148,11 +150,6 @@ class Profile(CompiledController):
             raise InputError(
                 f"profile = {self.profile!r}: this is no TorqueProfile; name a file with --param file=PATH, "
                 "or give profile=TorqueProfile(...) in Python."
-            )
-        if self.period is not None and not (isinstance(self.period, Real) and 0.0 <= self.period < math.inf):
-            raise InputError(
-                f"period = {self.period}: the parameter of the controller profile must be one finite number, "
-                "0 or more."
             )
         if self.played.after_contact is None:
             object.__setattr__(self, "sensors", Sensor.NONE)  # what it need not see it does not ask for
@@ -171,10 +168,6 @@ class Profile(CompiledController):
         if self.file is None:
             about = {"profile": {"knots": int(self.played.time.size), "end": self.played.end}}
         return {**about, "period": self.period}
-
-    def defaults(self, drive: Drive) -> dict[str, Any]:
-        """No sampling."""
-        return {"period": 0.0}
 
     def vector(self, drive: Drive) -> Vector:
         """(period, knots, knots after contact, room, times, torques, times, torques)."""

@@ -21,7 +21,7 @@ from softstart_controllers.contact import (
     send,
     torque_delay,
 )
-from softstart_controllers.sampled import patience_parameter, period_parameter
+from softstart_controllers.sampled import period_parameter, timeout_parameter
 from softstart_controllers.shaft_filter import predicted_motion
 
 SHARE_REACTIVE, SHARE_ACTIVE = 0.8, 0.7  # of the speed that makes the stuck load's shaft carry Ms
@@ -205,6 +205,12 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     m.phase = phase
 
 
+def coast_speed(drive: Drive, p: Any) -> float:
+    """The share of the speed at which the impact on a stuck load makes the shaft carry Ms."""
+    share = SHARE_REACTIVE if drive.rests else SHARE_ACTIVE
+    return share * drive.Ms / math.sqrt(drive.c * drive.J1)
+
+
 @dataclass(frozen=True)
 class PulseCoastHold(CompiledController):
     """The gentlest start, pulse, coast, hold (`softstart.optimal.pulse_coast_hold`), as feedback.
@@ -265,42 +271,24 @@ class PulseCoastHold(CompiledController):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    coast_speed: float | None = parameter(
-        "rad/s",
-        "speed relative to the load to which the pulse brings the motor",
-        "0.8 Ms/sqrt(c J1) with a load that friction holds at rest, else 0.7 Ms/sqrt(c J1)",
-        value=lambda drive, p: (
-            (SHARE_REACTIVE if drive.rests else SHARE_ACTIVE) * drive.Ms / math.sqrt(drive.c * drive.J1)
-        ),
-        rule="above 0",
-        multiples=(0.4, 1.6),
-    )
-    hold_share: float | None = parameter(
-        "1",
-        "share of M12avg to which the shaft torque is raised after the peak",
-        "0.98",
-        value=0.98,
-        rule="0 or more",
-        between=(0.6, 1.0),
-    )
-    damping_ratio: float | None = parameter(
-        "1", "damping ratio of the hold", "0.9", value=0.9, rule="0 or more", between=(0.2, 1.5)
-    )
-    stiffening: float | None = parameter(
-        "1",
-        "motor torque per missing shaft torque in the hold",
-        "0.5",
-        value=0.5,
-        rule="0 or more",
-        between=(0.0, 2.0),
-    )
-    inertia_ratio: float | None = parameter(
-        "1", "J2/J1 as first guessed at contact", "3", value=3.0, rule="above 0", multiples=(0.3, 4.0)
-    )
-    detection_threshold: float | None = contact.certainty_parameter()
+    # fmt: off
+    coast_speed: float | None = parameter("rad/s", "motor speed relative to the load at the end of the pulse",
+        coast_speed, "0.8 Ms/sqrt(c J1) with a load that friction holds at rest, else 0.7 Ms/sqrt(c J1)",
+        "above 0", multiples=(0.4, 1.6))
+    hold_share: float | None = parameter("1",
+        "share of M12avg to which the shaft torque is raised after the peak", 0.98, limit="0 or more",
+        between=(0.6, 1.0))
+    damping_ratio: float | None = parameter("1", "damping ratio of the hold", 0.9, limit="0 or more",
+        between=(0.2, 1.5))
+    stiffening: float | None = parameter("1", "motor torque per missing shaft torque in the hold", 0.5,
+        limit="0 or more", between=(0.0, 2.0))
+    inertia_ratio: float | None = parameter("1", "initial guess of J2/J1 at contact", 3.0, limit="above 0",
+        multiples=(0.3, 4.0))
+    detection_threshold: float | None = contact.threshold_parameter()
     uncertainty: float | None = contact.uncertainty_parameter()
-    contact_timeout: float | None = patience_parameter()
+    contact_timeout: float | None = timeout_parameter()
     period: float | None = period_parameter()
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Estimator, delay of the torque, rise, and whether the contact can be seen in time at all."""

@@ -84,24 +84,14 @@ class Ramp(CompiledController):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    initial: float | None = parameter(
-        "N*m",
-        "torque at the start",
-        "load torque, 0 where it does not brake",
-        value=lambda drive, p: pulling_load(drive),
-        rule="finite",
-        multiples=(0.3, 4.0),
-    )
-    time: float | None = parameter(
-        "s",
-        "duration of the rise",
-        "two elastic periods",
-        value=lambda drive, p: 2.0 * drive.elastic_period,
-        rule="0 or more",
-        multiples=(0.1, 10.0),
-    )
+    # fmt: off
+    initial: float | None = parameter("N*m", "torque at the start", lambda drive, p: pulling_load(drive),
+        "load torque, 0 where it does not brake", multiples=(0.3, 4.0))
+    time: float | None = parameter("s", "duration of the rise", lambda drive, p: 2.0 * drive.elastic_period,
+        "two elastic periods", "0 or more", multiples=(0.1, 10.0))
     full_torque: float | None = full_torque_parameter("torque after the rise")
     period: float | None = period_parameter()
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Straight from end to end."""

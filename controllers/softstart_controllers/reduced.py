@@ -14,9 +14,9 @@ from typing import Any
 
 from softstart import formulas
 from softstart.controller import compiled_step, parameter
-from softstart.controller.base import Rule
 from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, record
 from softstart.drive import Drive
+from softstart.input.parameters import Limit
 from softstart_controllers.sampled import pulling_load
 
 SHARE = 0.15
@@ -67,28 +67,18 @@ def reduced_torque(drive: Drive) -> float:
     return held + SHARE * (drive.Ms - held)
 
 
-def reduced_torque_parameter(meaning: str, rule: Rule = "finite") -> Any:
+def reduced_torque_parameter(meaning: str, limit: Limit = "any") -> Any:
     """The reduced torque as a field of a controller."""
+    text = "load torque plus 15 % of the accelerating torque"
     return parameter(
-        "N*m",
-        meaning,
-        "load torque plus 15 % of the accelerating torque",
-        value=lambda drive, p: reduced_torque(drive),
-        rule=rule,
-        multiples=(0.3, 4.0),
+        "N*m", meaning, lambda drive, p: reduced_torque(drive), text, limit, multiples=(0.3, 4.0)
     )
 
 
 def raise_parameter() -> Any:
     """`raise_at` as a field of a controller."""
-    return parameter(
-        "",
-        "instant of stage 2 at which the torque is raised: its torque peak, [G](14), or its end, [G](15)",
-        "peak",
-        "text",
-        value="peak",
-        choices=INSTANTS,
-    )
+    meaning = "instant of stage 2 at which the torque is raised, its torque peak [G](14) or its end [G](15)"
+    return parameter("", meaning, "peak", choices=INSTANTS)
 
 
 def delay_of(drive: Drive, torque: Any, raise_at: str) -> float:

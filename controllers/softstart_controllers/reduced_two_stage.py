@@ -52,12 +52,9 @@ class ReducedTwoStage(CompiledController):
     torque: float | None = reduced_torque_parameter("reduced torque of stages 1 and 2")
     full_torque: float | None = full_torque_parameter("torque from stage 3 on")
     contact_timeout: float | None = parameter(
-        "s",
-        "longest wait after contact",
+        "s", "longest wait after contact", lambda drive, p: 2.0 * drive.elastic_period,
         "two elastic periods; an undamped stage 2 lasts less than one",
-        value=lambda drive, p: 2.0 * drive.elastic_period,
-        rule="finite",
-    )
+    )  # fmt: skip
     raise_at: str | None = raise_parameter()
 
     def numbers(self, drive: Drive) -> dict[str, Any]:

@@ -37,14 +37,10 @@ class SCurve(Ramp):
     name: ClassVar[str] = "s-curve"
     summary: ClassVar[str] = "torque rises in an S from the load torque to the starting torque"
 
-    rounding: float | None = parameter(
-        "1",
-        "share of the time spent in the rounded ends, 0 to 1",
-        "1",
-        value=1.0,
-        rule="0 to 1",
-        between=(0.0, 1.0),
-    )
+    # fmt: off
+    rounding: float | None = parameter("1", "share of the time spent in the rounded ends", 1.0,
+        limit="from 0 to 1", between=(0.0, 1.0))
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """None beside the parameters."""

@@ -8,8 +8,8 @@ from typing import Any
 from numba import njit
 
 from softstart.controller import parameter
-from softstart.controller.base import Rule
 from softstart.drive import Drive
+from softstart.input.parameters import Limit
 from softstart.kernel.motor import COUNTS_PER_LINE
 
 LONGEST_PERIOD = 1e-3  # s
@@ -29,37 +29,23 @@ def sample_period(drive: Drive) -> float:
 
 def period_parameter() -> Any:
     """`period` as a field of a controller."""
-    return parameter(
-        "s",
-        "sample period",
-        "1 ms, or 1/32 of the elastic period where that is shorter",
-        value=lambda drive, p: sample_period(drive),
-        rule="above 0",
-    )
+    text = "1 ms, or 1/32 of the elastic period where that is shorter"
+    return parameter("s", "sample period", lambda drive, p: sample_period(drive), text, "above 0")
 
 
-def patience_parameter(meaning: str = "latest instant for the feedback to act") -> Any:
+def timeout_parameter(meaning: str = "latest instant for the feedback to act") -> Any:
     """`contact_timeout` as a field of a controller."""
-    return parameter(
-        "s",
-        meaning,
+    text = (
         "50 elastic periods and the time a drive without gap needs to its target speed on 15 % of its "
-        "accelerating torque",
-        value=lambda drive, p: contact_timeout(drive),
-        rule="0 or more",
+        "accelerating torque"
     )
+    return parameter("s", meaning, lambda drive, p: contact_timeout(drive), text, "0 or more")
 
 
-def full_torque_parameter(meaning: str, rule: Rule = "finite") -> Any:
+def full_torque_parameter(meaning: str, limit: Limit = "any") -> Any:
     """`full_torque` as a field of a controller."""
-    return parameter(
-        "N*m",
-        meaning,
-        "starting torque Ms",
-        value=lambda drive, p: drive.Ms,
-        rule=rule,
-        multiples=(0.4, 1.0),
-    )
+    default = "starting torque Ms"
+    return parameter("N*m", meaning, lambda drive, p: drive.Ms, default, limit, multiples=(0.4, 1.0))
 
 
 def encoder_count(drive: Drive) -> float:

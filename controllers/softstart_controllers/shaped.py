@@ -158,23 +158,12 @@ class Shaped(Landing):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    shaper: str | None = parameter("", "zv or zvd", "zv", "text", value="zv", choices=tuple(SHAPERS))
-    approach_speed: float | None = parameter(
-        "rad/s",
-        "speed at which the gap is closed",
-        "c dw12/Omega = 0.7 (zv) or 0.3 (zvd) of the mean shaft torque under the full torque",
-        value=landing.approach_speed,
-        rule="above 0",
-        multiples=(0.3, 3.0),
-    )
-    frequency: float | None = parameter(
-        "rad/s",
-        "undamped elastic frequency of the model",
-        "Omega",
-        value=lambda drive, p: drive.Omega,
-        rule="above 0",
-        multiples=(0.7, 1.4),
-    )
+    # fmt: off
+    shaper: str | None = parameter("", "shaper", "zv", choices=tuple(SHAPERS))
+    approach_speed: float | None = landing.approach_parameter("0.7 (zv) or 0.3 (zvd)")
+    frequency: float | None = parameter("rad/s", "undamped elastic frequency of the model",
+        lambda drive, p: drive.Omega, "Omega", "above 0", multiples=(0.7, 1.4))
+    # fmt: on
 
     @property
     def impact(self) -> float:  # type: ignore[override]

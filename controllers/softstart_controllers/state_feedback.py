@@ -128,30 +128,17 @@ class StateFeedback(Landing):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    rise: float | None = parameter(
-        "s",
-        "time in which the reference rises after contact",
-        "three quarters of the elastic period",
-        value=lambda drive, p: 0.75 * drive.elastic_period,
-        rule="0 or more",
-        multiples=(0.2, 5.0),
-    )
-    torque_weight: float | None = parameter(
-        "1",
-        "weight of the error of T, that of the mean torque under the motor being 1",
-        "3",
-        value=3.0,
-        rule="above 0",
-        multiples=(0.03, 30.0),
-    )
-    rate_weight: float | None = parameter(
-        "1",
-        "weight of T'/Omega, that of the mean torque under the motor being 1",
-        "4",
-        value=4.0,
-        rule="above 0",
-        multiples=(0.03, 30.0),
-    )
+    # fmt: off
+    rise: float | None = parameter("s", "rise time of the reference after contact",
+        lambda drive, p: 0.75 * drive.elastic_period, "three quarters of the elastic period", "0 or more",
+        multiples=(0.2, 5.0))
+    torque_weight: float | None = parameter("1",
+        "weight of the error of T, that of the mean torque under the motor being 1", 3.0, limit="above 0",
+        multiples=(0.03, 30.0))
+    rate_weight: float | None = parameter("1",
+        "weight of T'/Omega, that of the mean torque under the motor being 1", 4.0, limit="above 0",
+        multiples=(0.03, 30.0))
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Landing, rise, and gains."""

@@ -12,8 +12,8 @@ from softstart.drive import Drive
 from softstart_controllers.sampled import (
     full_torque_parameter,
     mean_torque,
-    patience_parameter,
     period_parameter,
+    timeout_parameter,
 )
 from softstart_controllers.shaft_observer import GAINS, Gains, observer, predict
 
@@ -157,6 +157,11 @@ def contact_share(drive: Drive, p: Any) -> float:
     return max(CONTACT_SHARE, feigned)
 
 
+def contact_time(drive: Drive, p: Any) -> float:
+    """Several times as long as the speed loop needs for the impulse, so that a load is always noticed."""
+    return max(0.16 * drive.elastic_period, HELD * p.contact_share * drive.J1 / p.speed_gain)
+
+
 def loop_damping(drive: Drive, p: Any) -> float:
     """0.28 where the torque is quick, at most a loop gain of one at 1 rad of phase lag, 0 if later still."""
     phase = drive.Omega * delay(drive, p)
@@ -219,91 +224,41 @@ class TakeUp(CompiledController):
     state_size: ClassVar[int] = size(STATE)
     record: ClassVar[Any] = PARAMETERS
 
-    take_up_speed: float | None = parameter(
-        "rad/s",
-        "motor speed, over that of the load at first, at which the gaps are taken up",
-        "0.16 Ms/sqrt(c J1)",
-        value=lambda drive, p: 0.16 * drive.Ms / math.sqrt(drive.c * drive.J1),
-        rule="above 0",
-        multiples=(0.3, 3.0),
-    )
-    slowing: float | None = parameter(
-        "1",
-        "how far that speed is lowered, as a multiple of the speed at which an active load falls back",
-        "2",
-        value=2.0,
-        rule="0 or more",
-        between=(0.0, 8.0),
-    )
-    speed_gain: float | None = parameter(
-        "N*m*s/rad",
-        "motor torque per missing speed while the gaps are taken up",
-        "2.4 sqrt(c J1), at most J1 over the delay",
-        value=lambda drive, p: min(2.4 * math.sqrt(drive.c * drive.J1), drive.J1 / delay(drive, p)),
-        rule="above 0",
-        multiples=(0.3, 4.0),
-    )
-    contact_share: float | None = parameter(
-        "1",
-        "impulse of the shaft that means the load, as a share of J1 take_up_speed",
-        "0.56, more for a coarse encoder",
-        value=contact_share,
-        rule="above 0",
-        between=(0.1, 1.5),
-    )
-    contact_time: float | None = parameter(
-        "s",
-        "time in which that impulse is forgotten",
-        "0.16 elastic periods, or longer, see the text",
-        value=lambda drive, p: max(
-            0.16 * drive.elastic_period, HELD * p.contact_share * drive.J1 / p.speed_gain
-        ),
-        rule="above 0",
-        multiples=(0.2, 5.0),
-    )
+    # fmt: off
+    take_up_speed: float | None = parameter("rad/s",
+        "motor speed relative to the initial load speed while the gaps are taken up",
+        lambda drive, p: 0.16 * drive.Ms / math.sqrt(drive.c * drive.J1), "0.16 Ms/sqrt(c J1)", "above 0",
+        multiples=(0.3, 3.0))
+    slowing: float | None = parameter("1",
+        "reduction of that speed, as a multiple of the speed at which an active load falls back", 2.0,
+        limit="0 or more", between=(0.0, 8.0))
+    speed_gain: float | None = parameter("N*m*s/rad", "gain of the speed loop while the gaps are taken up",
+        lambda drive, p: min(2.4 * math.sqrt(drive.c * drive.J1), drive.J1 / delay(drive, p)),
+        "2.4 sqrt(c J1), at most J1 over the delay", "above 0", multiples=(0.3, 4.0))
+    contact_share: float | None = parameter("1",
+        "impulse of the shaft that means the load, as a share of J1 take_up_speed", contact_share,
+        "0.56, more for a coarse encoder", "above 0", between=(0.1, 1.5))
+    contact_time: float | None = parameter("s", "memory of that impulse", contact_time,
+        "0.16 elastic periods, at least 4 contact_share J1/speed_gain", "above 0", multiples=(0.2, 5.0))
     full_torque: float | None = full_torque_parameter("torque after the rise", "above 0")
-    rise: float | None = parameter(
-        "s",
-        "time in which the torque rises once the load is met",
-        "0.72 elastic periods, 1.5 for a late torque",
-        value=lambda drive, p: (LATE_RISE + (0.72 - LATE_RISE) * share_left(drive, p)) * drive.elastic_period,
-        rule="0 or more",
-        multiples=(0.3, 5.0),
-    )
-    damping_ratio: float | None = parameter(
-        "1",
-        "damping ratio added by w1 less the estimated speed of the load",
-        "0.28, less for a late torque",
-        value=loop_damping,
-        rule="0 or more",
-        between=(0.0, 1.5),
-    )
-    rate_damping_ratio: float | None = parameter(
-        "1",
-        "damping ratio added by the estimated T'",
-        "0.23, down to 0 for a late torque",
-        value=lambda drive, p: 0.23 * share_left(drive, p),
-        rule="0 or more",
-        between=(0.0, 1.5),
-    )
-    corner: float | None = parameter(
-        "rad/s",
+    rise: float | None = parameter("s", "rise time of the torque once the load is met",
+        lambda drive, p: (LATE_RISE + (0.72 - LATE_RISE) * share_left(drive, p)) * drive.elastic_period,
+        "0.72 elastic periods, 1.5 for a late torque", "0 or more", multiples=(0.3, 5.0))
+    damping_ratio: float | None = parameter("1",
+        "damping ratio added by w1 less the estimated speed of the load", loop_damping,
+        "0.28, less for a late torque", "0 or more", between=(0.0, 1.5))
+    rate_damping_ratio: float | None = parameter("1", "damping ratio added by the estimated T'",
+        lambda drive, p: 0.23 * share_left(drive, p), "0.23, down to 0 for a late torque", "0 or more",
+        between=(0.0, 1.5))
+    corner: float | None = parameter("rad/s",
         "bandwidth at which the estimated speed of the load follows the motor",
-        "0.073 Omega",
-        value=lambda drive, p: 0.073 * drive.Omega,
-        rule="0 or more",
-        multiples=(0.2, 5.0),
-    )
-    uncertainty: float | None = parameter(
-        "1",
-        "unknown part of T'' that the observer reckons with, as a share of Omega^2 Ms",
-        "0.18",
-        value=0.18,
-        rule="above 0",
-        multiples=(0.1, 10.0),
-    )
-    contact_timeout: float | None = patience_parameter()
+        lambda drive, p: 0.073 * drive.Omega, "0.073 Omega", "0 or more", multiples=(0.2, 5.0))
+    uncertainty: float | None = parameter("1",
+        "unknown part of T'' in the observer's model, as a share of Omega^2 Ms", 0.18, limit="above 0",
+        multiples=(0.1, 10.0))
+    contact_timeout: float | None = timeout_parameter()
     period: float | None = period_parameter()
+    # fmt: on
 
     def numbers(self, drive: Drive) -> dict[str, Any]:
         """Gains and thresholds; neither gap nor start position enter."""

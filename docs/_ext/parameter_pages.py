@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
 from typing import Any
 
 from command_pages import cell, prose
@@ -12,7 +11,7 @@ from command_pages import cell, prose
 from softstart.balancing.engine import TABLES as ENGINE
 from softstart.chain.elements import TABLES as CHAIN
 from softstart.clutch.model import Clutch
-from softstart.controller import controller_class, controller_names
+from softstart.controller import controller_class, controller_names, declared_parameters
 from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS
 from softstart.input.documents import DocumentTable
@@ -121,15 +120,14 @@ def controllers() -> str:
         cls = controller_class(name)
         lines += [f"## {name}", "", f"{prose(cls.summary[:1].upper() + cls.summary[1:])}.", ""]
         lines += [f"Measures {', '.join(_measured(cls))}. Source: {prose(cls.source) or 'own design'}.", ""]
-        if not fields(cls):
+        if not declared_parameters(cls):
             lines += ["It has no parameters.", ""]
             continue
         lines += ["| parameter | unit | meaning | default | range for `tune` |", "|---|---|---|---|---|"]
-        for field in fields(cls):
-            meta = field.metadata
+        for key, one in declared_parameters(cls).items():
             lines.append(
-                f"| `{field.name}` | {_unit(meta['unit']) if meta['kind'] == 'quantity' else meta['kind']} "
-                f"| {prose(meta['meaning'])} | {prose(meta['default']) or '-'} | {_searched(meta)} |"
+                f"| `{key}` | {_unit(one.unit) if one.unit else one.kind} "
+                f"| {prose(one.meaning)} | {prose(one.default_text) or '-'} | {_searched(one)} |"
             )
         lines.append("")
     return "\n".join(lines)
@@ -140,12 +138,12 @@ def _measured(cls: Any) -> Iterator[str]:
     yield from (str(s.name).lower().replace("_", " ") for s in Sensor if s and s in cls.sensors)
 
 
-def _searched(meta: Any) -> str:
+def _searched(one: Any) -> str:
     parts = []
-    if meta["multiples"]:
-        parts.append("{:g} to {:g} times the default".format(*meta["multiples"]))
-    if meta["between"]:
-        parts.append("{:g} to {:g}".format(*meta["between"]))
+    if one.multiples:
+        parts.append("{:g} to {:g} times the default".format(*one.multiples))
+    if one.between:
+        parts.append("{:g} to {:g}".format(*one.between))
     return ", within ".join(parts) or "-"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -12,7 +11,7 @@ from tests import twin
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.controller import CompiledController, make_controller
+from softstart.controller import CompiledController, declared_parameters, make_controller
 from softstart.drive import library
 from softstart.kernel.records import NOTES
 
@@ -28,7 +27,7 @@ DRIVES = [Drive.load(name) for name in library.names()]
 def test_defaults_are_numbers_and_a_twin_in_plain_python_gives_the_same_bits(name: str) -> None:
     controller = make_controller(name)
     assert isinstance(controller, CompiledController)
-    texts = {f.name for f in dataclasses.fields(controller) if f.metadata["kind"] == "text"}
+    texts = {name for name, one in declared_parameters(controller).items() if one.kind == "text"}
     for drive in DRIVES:
         values = controller.fitted(drive).parameters
         assert all(isinstance(values.pop(text), str) for text in texts)

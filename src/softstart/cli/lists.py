@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +76,8 @@ def controllers_command(*, name: str | None) -> Answer:
 
 
 def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
+    from softstart.controller import declared_parameters
+
     also = [str(s.name).lower().replace("_", " ") for s in type(cls.sensors) if s in cls.sensors and s]
     return {
         "name": name,
@@ -84,8 +85,8 @@ def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
         "sensors": ["encoder", "motor torque", *also],
         "source": cls.source,
         "parameters": [
-            {"name": one.name, **{key: one.metadata.get(key, "") for key in ("unit", "meaning", "default")}}
-            for one in fields(cls)
+            {"name": key, "unit": one.unit, "meaning": one.meaning, "default": one.default_text}
+            for key, one in declared_parameters(cls).items()
         ],
     }
 

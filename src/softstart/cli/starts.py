@@ -86,7 +86,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
 @click.command("simulate")
 @options.controller_option(
     "--controller", "NAME",
-    "A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).", required=True,
+    "A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).", required=True,
 )  # fmt: skip
 @options.param_option("Set a parameter of the strategy, for example time='200 ms'. May be repeated.")
 @options.fitted_to_option

@@ -9,7 +9,6 @@ from softstart.controller.base import (
     Measured,
     PlainController,
     Sensor,
-    parameter,
     stack,
 )
 from softstart.controller.compiled import compiled_step
@@ -19,6 +18,7 @@ from softstart.controller.finding import (
     make_controller,
     ready_controller_names,
 )
+from softstart.controller.parameters import declared_parameters, parameter
 
 __all__ = [
     "NEVER",
@@ -32,6 +32,7 @@ __all__ = [
     "compiled_step",
     "controller_class",
     "controller_names",
+    "declared_parameters",
     "make_controller",
     "parameter",
     "ready_controller_names",

@@ -10,30 +10,20 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from enum import Enum, IntFlag
 from itertools import repeat
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
+from softstart.controller.parameters import ParameterValues, declared_parameters
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 from softstart.quantities import show
-
-Kind = Literal["quantity", "text", "object"]
-Rule = Literal["finite", "above 0", "0 or more", "0 to 1"]
-Derived = Callable[[Drive, Any], Any]  # the value of a parameter, from the drive and the other parameters
-
-RULES: dict[str, Callable[[float], bool]] = {
-    "finite": math.isfinite,
-    "above 0": lambda value: 0.0 < value < math.inf,
-    "0 or more": lambda value: 0.0 <= value < math.inf,
-    "0 to 1": lambda value: 0.0 <= value <= 1.0,
-}
 
 
 class Sensor(IntFlag):
@@ -180,39 +170,6 @@ class Command(NamedTuple):
     slope: float = 0.0
 
 
-def parameter(
-    unit: str,
-    meaning: str,
-    default: str = "",
-    kind: Kind = "quantity",
-    *,
-    value: Derived | float | str | None = None,
-    rule: Rule | None = None,
-    multiples: tuple[float, float] | None = None,
-    between: tuple[float, float] | None = None,
-    choices: tuple[str, ...] = (),
-) -> Any:
-    """A parameter of a controller, for use as a dataclass field: all that there is to say about it.
-
-    `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
-    the drive when none is given. `value` is that default: a constant, or a function of the drive and of the
-    other parameters, which it may name in any order. A `kind` other than a quantity is handed over as it is:
-    a text (the path of a file, say), or an object, which only Python can give. A text may be one of `choices`
-    only, and a number must obey the `rule`.
-
-    Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
-    the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first.
-    A parameter with neither is left at its default unless the user names a range.
-    """
-    return field(
-        default=None,
-        metadata={
-            "unit": unit, "meaning": meaning, "default": default, "kind": kind, "value": value,
-            "rule": rule, "multiples": multiples, "between": between, "choices": choices,
-        },
-    )  # fmt: skip
-
-
 # what a class says of itself: its type, and how it is written
 DECLARED: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("name", "summary", "source"), (str, "a text in quotes")),
@@ -266,31 +223,24 @@ class Controller:
             for name, (kind, form) in DECLARED.items()
             if not isinstance(value := getattr(self, name), kind)
         ]
-        for one in fields(self):
-            value, rule, choices = (
-                getattr(self, one.name),
-                one.metadata.get("rule"),
-                one.metadata.get("choices"),
-            )
-            if isinstance(value, str):
-                if choices and value not in choices:
-                    wrong.append(f"{one.name} = {show(value)}: write {' or '.join(map(show, choices))}.")
-            elif isinstance(value, float | int) and rule and not RULES[rule](value):
-                wrong.append(
-                    f"{one.name} = {value:g}: the parameter of the controller {self.name} must be {rule}."
-                )
+        for name, declaration in declared_parameters(self).items():
+            if declaration.declared and (value := getattr(self, name)) is not None:
+                try:
+                    if (read := declaration.read(value)) is not value:
+                        object.__setattr__(self, name, read)
+                except InputError as error:
+                    wrong += error.sentences
         if wrong:
             raise InputError(wrong)
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Values of the parameters that were not given, derived from the drive (never from the answer)."""
-        values = Values(self, drive)
-        return {one.name: values.derived(one) for one in fields(self) if "value" in one.metadata}
+        values, declared = ParameterValues(self, drive), declared_parameters(self)
+        return {name: values.derived(one) for name, one in declared.items() if one.declared}
 
     def fitted(self, drive: Drive) -> Self:
         """The same controller with every parameter a number."""
-        given = {f.name: getattr(self, f.name) for f in fields(self)}
-        missing = [name for name, value in given.items() if value is None]
+        missing = [f.name for f in fields(self) if getattr(self, f.name) is None]
         if not missing:
             return self
         derived = self.defaults(drive.design_drive)
@@ -314,10 +264,9 @@ class Controller:
     def _arrays(self) -> dict[str, Any]:
         """The parameters that are arrays: one value for each of many starts."""
         return {
-            f.name: value
-            for f in fields(self)
-            if isinstance(value := getattr(self, f.name), np.ndarray)
-            and f.metadata.get("kind", "quantity") == "quantity"
+            name: value
+            for name, declaration in declared_parameters(self).items()
+            if isinstance(value := getattr(self, name), np.ndarray) and declaration.kind == "quantity"
         }
 
     def set_ups(self, drives: Any) -> Iterator[SetUp]:
@@ -353,25 +302,6 @@ class Controller:
     def parameters(self) -> dict[str, Any]:
         """Parameter names and values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-class Values:
-    """The parameters of a controller as attributes: as given, or derived when they are first asked for."""
-
-    def __init__(self, controller: Controller, drive: Drive) -> None:
-        self._controller, self._drive = controller, drive
-
-    def __getattr__(self, name: str) -> Any:
-        value = getattr(self._controller, name)
-        if value is None:
-            value = self.derived(type(self._controller).__dataclass_fields__[name])
-        setattr(self, name, value)
-        return value
-
-    def derived(self, field: Field[Any]) -> Any:
-        """The default of a parameter."""
-        value = field.metadata["value"]
-        return value(self._drive, self) if callable(value) else value
 
 
 SetUp = tuple[Controller, Drive]  # a controller with every parameter a number, the drive of its numbers

@@ -12,13 +12,21 @@ from pathlib import Path
 from typing import Any
 
 from softstart.controller.base import Controller
+from softstart.controller.parameters import declared_parameters
+from softstart.controller.tuned import (
+    RobustFile,
+    RobustGains,
+    Tuned,
+    is_gain_file,
+    read_gain_file,
+    refused_file,
+    scheduled,
+)  # fmt: skip
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.files import refusal_of
 from softstart.plugins import CONTROLLERS, load, registered
-from softstart.quantities import show, to_si
-
-GAIN_FILES = (".toml", ".csv")  # endings of files of tuned gains
+from softstart.quantities import show
 
 
 def controller_names() -> tuple[str, ...]:
@@ -65,15 +73,13 @@ def make_controller(
 ) -> Controller:
     """A controller from its name and parameters (bare SI numbers or strings with a unit).
 
-    A name that ends in .toml or .csv is a file of tuned gains (see `softstart.controller.tuned`). Such a file
-    may name an installed controller; one that names a Python file of its own would run it, and is refused
+    A name that ends in .toml is a file of tuned gains (see `softstart.controller.tuned`). Such a file may
+    name an installed controller; one that names a Python file of its own would run it, and is refused
     without `allow_code`.
 
     >>> make_controller("ramp", {"time": "120 ms"}).time
     0.12
     """
-    from softstart.controller import tuned
-
     if isinstance(name, Controller):
         if parameters:
             raise InputError(
@@ -86,8 +92,8 @@ def make_controller(
             f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, "
             "or a Controller object."
         )
-    if name.lower().endswith(GAIN_FILES):
-        return tuned.load_gains(name, parameters, allow_code=allow_code)
+    if is_gain_file(name):
+        return _tuned(Path(name), parameters, allow_code)
     cls = controller_class(name)
     values, wrong = _values(cls, name, parameters or {})
     missing = [
@@ -105,6 +111,32 @@ def make_controller(
         lacking = ", ".join(sorted(getattr(cls, "__abstractmethods__", ())))
         raise InputError(f'controller = "{name}": the class {cls.__name__} still lacks {lacking}.')
     return cls(**values)
+
+
+def _tuned(path: Path, parameters: Mapping[str, object] | None, allow_code: bool) -> Tuned:
+    """The controller with the gains of a file."""
+    saved = read_gain_file(path)
+    if is_gain_file(saved.controller):
+        raise refused_file(
+            path, f"controller = {show(saved.controller)}: gains are those of a controller, not of a file"
+        )
+    if ".py" in saved.controller and not allow_code:
+        raise refused_file(
+            path,
+            f"it names the Python file {saved.controller[:300]}, which would run; if you trust it, add "
+            "--allow-code (in Python: make_controller(file, allow_code=True))",
+        )
+    if parameters:
+        raise InputError(
+            f'parameters {sorted(parameters)} were given beside the tuned gains of "{path}"; '
+            "change them in the file, or give them to the controller itself."
+        )
+    try:
+        if isinstance(saved, RobustFile):
+            return RobustGains(path.stem, make_controller(saved.controller, saved.parameters), saved.drive)
+        return scheduled(saved, path.stem, make_controller(saved.controller, saved.fixed))
+    except InputError as error:
+        raise InputError([f'controller = "{path}": {sentence}' for sentence in error.sentences]) from None
 
 
 def changed_controller(controller: Controller, changes: Mapping[str, object]) -> Controller:
@@ -127,9 +159,7 @@ def _values(
     cls: type[Controller], name: str, parameters: Mapping[str, object]
 ) -> tuple[dict[str, Any], list[str]]:
     """Parameters of a controller as its class takes them, and a sentence for each that is wrong."""
-    known = {f.name: f for f in fields(cls)}
-    values: dict[str, Any] = {}
-    wrong: list[str] = []
+    known, values, wrong = declared_parameters(cls), dict[str, Any](), list[str]()
     for key, value in parameters.items():
         if key not in known:
             hint = did_you_mean(
@@ -139,51 +169,11 @@ def _values(
                 hint = "its class names it, but is not a @dataclass(frozen=True)."
             wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
             continue
-        kind = known[key].metadata.get("kind", "quantity")
-        if kind == "object":
-            values[key] = value
-            continue
         try:
-            unit = known[key].metadata.get("unit", "")
-            choices = known[key].metadata.get("choices", ())
-            values[key] = (
-                parameter_value(key, value, unit) if kind == "quantity" else _text(key, value, choices)
-            )
+            values[key] = known[key].read(value)
         except InputError as error:
             wrong.extend(error.sentences)
     return values, wrong
-
-
-def parameter_value(key: str, value: object, unit: str) -> Any:
-    """A parameter in SI; one that is a plain dataclass field has no unit, and is a bare number.
-
-    >>> parameter_value("rise", "20 ms", "s"), parameter_value("rise", "0.02", "")
-    (0.02, 0.02)
-    >>> parameter_value("rise", "20 ms", "")
-    Traceback (most recent call last):
-    softstart.errors.InputError: rise = "20 ms": this parameter has no unit; give a bare number, as 0.02, or
-    declare it in its class with parameter(unit, meaning).
-    """
-    try:
-        return to_si(value, unit or "1", name=key)
-    except InputError:
-        if unit:
-            raise
-    raise InputError(
-        f"{key} = {show(value)}: this parameter has no unit; give a bare number, as 0.02, or declare it in "
-        "its class with parameter(unit, meaning)."
-    )
-
-
-def _text(key: str, value: object, choices: tuple[str, ...] = ()) -> str:
-    """A parameter that is a text, one of the choices if there are any."""
-    if choices and value not in choices:
-        raise InputError(f"{key} = {show(value)}: write {' or '.join(map(show, choices))}.")
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, str) and value:
-        return value
-    raise InputError(f"{key} = {value!r}: this parameter is a text; give it in quotes.")
 
 
 def _from_file(text: str) -> type[Controller]:

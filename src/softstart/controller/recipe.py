@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from softstart.controller.base import Controller, label_of
-from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
+from softstart.controller.finding import controller_class, make_controller
+from softstart.controller.tuned import is_gain_file
 from softstart.drive.machine import Machine
 from softstart.plugins import CONTROLLERS, registered
 
@@ -41,7 +42,7 @@ class Recipe:
     def class_of(self, name: str = "") -> type[Controller]:
         """The class of the controller; `name` where it is from an axis."""
         given = name or self.given
-        if isinstance(given, str) and not given.lower().endswith(GAIN_FILES):
+        if isinstance(given, str) and not is_gain_file(given):
             return controller_class(given)
         return type(make_controller(given, allow_code=self.allow_code))
 
@@ -85,7 +86,7 @@ def about_name(name: str) -> dict[str, str]:
 
 def _split(name: str) -> tuple[Path | None, str]:
     """The file that a name begins with, and what follows."""
-    if name.lower().endswith(GAIN_FILES):
+    if is_gain_file(name):
         return Path(name), ""
     end = name.index(".py") + 3 if ".py" in name else 0
     return (Path(name[:end]), name[end:]) if end else (None, name)

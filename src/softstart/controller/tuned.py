@@ -1,16 +1,15 @@
 """Tuned gains: controllers with one robust set or with a schedule over gap and load inertia, and their files.
 
-A robust set is a TOML file, a schedule TOML or CSV; both are read back to the last bit.
+Both are TOML files, read back to the last bit.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -20,20 +19,23 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, Effort, Sensor, SetUp, label_of
-from softstart.controller.finding import GAIN_FILES, make_controller
+from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.input.columns import Wanted, read_columns
 from softstart.input.documents import literal, parsed
 from softstart.input.files import ABSENT, read_text
 from softstart.input.parameters import Wording
-from softstart.quantities import RefusedError, show
+from softstart.quantities import RefusedError
 
 Scale = Literal["linear", "logarithmic"]
 
 ROBUST, SCHEDULE = "robust set", "gain schedule"
-CSV_TITLE = "# softstart gain schedule"
 AXES = ("gap", "load_inertia")
+
+
+def is_gain_file(name: str) -> bool:
+    """Whether the name of a controller is that of a file of tuned gains."""
+    return name.lower().endswith(".toml")
 
 
 class Gain(NamedTuple):
@@ -96,6 +98,7 @@ class RobustGains(Tuned):
     """One set of gains for all: the controller as it was set up for the nominal drive, whatever drive starts.
 
     >>> from softstart import simulate
+    >>> from softstart.controller import make_controller
     >>> crane = Drive.load("crane-4amtkf")
     >>> gains = RobustGains("robust", make_controller("ramp", {"time": 0.12}), crane)
     >>> worn = crane.replace(gap=2)
@@ -131,6 +134,7 @@ class GainSchedule(Tuned):
 
     `gains` holds name, scale and values (a row per gap, a column per load inertia).
 
+    >>> from softstart.controller import make_controller
     >>> gains = (("time", "linear", np.array([[0.1], [0.2]])),)
     >>> schedule = GainSchedule("schedule", make_controller("ramp"), (0.5, 1.0), (0.175,), gains)
     >>> crane = Drive.load("crane-4amtkf")
@@ -191,38 +195,8 @@ def display_name(controller: Controller, label: str) -> str:
     return f"{label_of(controller)} ({label})"
 
 
-def load_gains(
-    name: str, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
-) -> Tuned:
-    """The controller with the gains of a file. Raises InputError, also for code without `allow_code`."""
-    path = Path(name)
-    saved = read_gain_file(path)
-    if saved.controller.lower().endswith(GAIN_FILES):
-        raise _wrong(
-            path, f"controller = {show(saved.controller)}: gains are those of a controller, not of a file"
-        )
-    if ".py" in saved.controller and not allow_code:
-        raise _wrong(
-            path,
-            f"it names the Python file {saved.controller[:300]}, which would run; if you trust it, add "
-            "--allow-code (in Python: make_controller(file, allow_code=True))",
-        )
-    if parameters:
-        raise InputError(
-            f'parameters {sorted(parameters)} were given beside the tuned gains of "{path}"; '
-            "change them in the file, or give them to the controller itself."
-        )
-    try:
-        if isinstance(saved, RobustFile):
-            return RobustGains(path.stem, make_controller(saved.controller, saved.parameters), saved.drive)
-        return scheduled(saved, path.stem)
-    except InputError as error:
-        raise InputError([f'controller = "{path}": {sentence}' for sentence in error.sentences]) from None
-
-
-def scheduled(saved: ScheduleFile, label: str, controller: Controller | None = None) -> GainSchedule:
-    """The controller with a schedule; made from its name if it is not given."""
-    controller = make_controller(saved.controller, saved.fixed) if controller is None else controller
+def scheduled(saved: ScheduleFile, label: str, controller: Controller) -> GainSchedule:
+    """The controller with a schedule."""
     known = [f.name for f in fields(controller)]
     unknown = [name for name in saved.gains if name not in known]
     if unknown:
@@ -247,39 +221,34 @@ def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
         text = read_text(path)
     except RefusedError as refusal:
         remedy = "; softstart tune --out DIR writes robust.toml and schedule.toml"
-        raise _wrong(path, refusal.reason + (remedy if refusal.reason == ABSENT else "")) from None
+        raise refused_file(path, refusal.reason + (remedy if refusal.reason == ABSENT else "")) from None
     return read_gains(text, path)
 
 
 def read_gains(text: str, path: Path) -> RobustFile | ScheduleFile:
-    """Tuned gains from text; the name of `path` tells TOML from CSV."""
-    if path.suffix.lower() == ".csv":
-        return _read_csv(text, path)
+    """Tuned gains from the text of the file `path`."""
     document = parsed(text, Wording(f'controller = "{path}"', style="toml"), "a gain")
     kind = document.get("kind")
     if kind == ROBUST:
         return _read_robust(document, path)
     if kind == SCHEDULE:
         return _read_schedule(document, path)
-    raise _foreign(path)
-
-
-def _foreign(path: Path) -> InputError:
-    return _wrong(
+    raise refused_file(
         path,
         "this file holds no tuned gains; give one that softstart tune has written, or play a torque profile "
         "with --controller profile --param file=PATH",
     )
 
 
-def _wrong(path: Path, reason: str) -> InputError:
+def refused_file(path: Path, reason: str) -> InputError:
+    """The error for a file of gains."""
     return InputError(f'controller = "{path}": {reason}.')
 
 
 def _name(document: Mapping[str, Any], path: Path) -> str:
     name = document.get("controller")
     if not isinstance(name, str) or not name:
-        raise _wrong(
+        raise refused_file(
             path, 'the key controller is missing; write the controller\'s name, as controller = "ramp"'
         )
     return name
@@ -288,7 +257,7 @@ def _name(document: Mapping[str, Any], path: Path) -> str:
 def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
     found = document.get(key, None if needed else {})
     if not isinstance(found, dict):
-        raise _wrong(path, f"the table [{key}] is missing; write the file again with softstart tune")
+        raise refused_file(path, f"the table [{key}] is missing; write the file again with softstart tune")
     return found
 
 
@@ -321,7 +290,7 @@ def _axis(values: Any, name: str, path: Path) -> tuple[float, ...]:
         numbers = np.zeros(0)
     good = numbers.ndim == 1 and numbers.size > 0 and bool(np.all(np.isfinite(numbers)))
     if not good or bool(np.any(np.diff(numbers) <= 0.0)) or numbers[0] < 0.0:
-        raise _wrong(path, f"{name} = {values}: give a list of numbers that rise, 0 or more")
+        raise refused_file(path, f"{name} = {values}: give a list of numbers that rise, 0 or more")
     return tuple(numbers.tolist())
 
 
@@ -330,7 +299,7 @@ def _scale(scale: Any, name: str, path: Path) -> Scale:
         return "linear"
     if scale == "logarithmic":
         return "logarithmic"
-    raise _wrong(path, f'[gains.{name}] scale = {scale!r}: write "linear" or "logarithmic"')
+    raise refused_file(path, f'[gains.{name}] scale = {scale!r}: write "linear" or "logarithmic"')
 
 
 def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArray[np.float64]:
@@ -339,7 +308,7 @@ def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArr
     except (TypeError, ValueError):
         table = np.zeros(0)
     if table.shape != shape or not np.all(np.isfinite(table)):
-        raise _wrong(
+        raise refused_file(
             path,
             f"[gains.{name}] values: give {shape[0]} rows, one a gap, of {shape[1]} numbers, one an inertia",
         )
@@ -349,57 +318,10 @@ def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArr
 def _positive(gains: dict[str, Gain], path: Path) -> dict[str, Gain]:
     for name, gain in gains.items():
         if gain.scale == "logarithmic" and not np.all(gain.values > 0.0):
-            raise _wrong(path, f'the gain {name} is 0 or less in a cell; its scale must be "linear"')
+            raise refused_file(path, f'the gain {name} is 0 or less in a cell; its scale must be "linear"')
     if not gains:
-        raise _wrong(path, "it has no gains; write the file again with softstart tune")
+        raise refused_file(path, "it has no gains; write the file again with softstart tune")
     return gains
-
-
-def _read_csv(text: str, path: Path) -> ScheduleFile:
-    lines = text.splitlines()
-    if not lines or lines[0].strip() != CSV_TITLE:
-        raise _foreign(path)
-    notes = {}
-    for line in lines[1:]:
-        if line.startswith("#"):
-            key, _, value = line[1:].partition(":")
-            notes[key.strip()] = value.strip()
-    scales, fixed = _note(notes, "gains", path), _note(notes, "fixed", path)
-    wanted = [Wanted(("gap",), "rad"), Wanted(("load_inertia",), "kg*m^2")]
-    wanted += [Wanted((name,), "1") for name in scales]
-    columns = read_columns(text, f'controller = "{path}"', wanted, headed="names").values
-    cells = [dict(zip((*AXES, *scales), row, strict=True)) for row in np.column_stack(columns).tolist()]
-    gaps = tuple(sorted({cell["gap"] for cell in cells}))
-    inertias = tuple(sorted({cell["load_inertia"] for cell in cells}))
-    if len(cells) != len(gaps) * len(inertias) or len({(c["gap"], c["load_inertia"]) for c in cells}) < len(
-        cells
-    ):
-        raise _wrong(path, "give one row for each combination of gap and load inertia, no more and no fewer")
-    document = {
-        "controller": notes.get("controller"),
-        "gaps": gaps,
-        "load_inertias": inertias,
-        "gains": {name: {"scale": scale, "values": _grid(cells, name)} for name, scale in scales.items()},
-        "fixed": fixed,
-    }
-    return _read_schedule(document, path)
-
-
-def _note(notes: Mapping[str, str], key: str, path: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(notes.get(key, "{}"))
-    except ValueError:
-        found = None
-    if not isinstance(found, dict):
-        raise _wrong(path, f'the comment line "# {key}: ..." is no JSON object, as {{"time": "linear"}}')
-    return found
-
-
-def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
-    ordered = sorted(cells, key=lambda cell: (cell["gap"], cell["load_inertia"]))
-    width = len({cell["load_inertia"] for cell in cells})
-    values = [cell[name] for cell in ordered]
-    return [values[k : k + width] for k in range(0, len(values), width)]
 
 
 # ---- writing --------------------------------------------------------------------------------------------
@@ -408,16 +330,13 @@ def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
 def meanings_of(controller: Controller) -> dict[str, str]:
     """What each parameter of a controller is, with its unit, as a comment.
 
+    >>> from softstart.controller import make_controller
     >>> meanings_of(make_controller("ramp"))["time"]
     's: duration of the rise'
     """
-    about = {one.name: one.metadata for one in fields(controller)}
-    units = {name: one.get("unit", "") for name, one in about.items()}
-    return {
-        name: f"{units[name]}: {one['meaning']}" if units[name] not in ("", "1") else one["meaning"]
-        for name, one in about.items()
-        if "meaning" in one
-    }
+    declared = {name: one for name, one in declared_parameters(controller).items() if one.declared}
+    units = {name: f"{one.unit}: " if one.unit not in ("", "1") else "" for name, one in declared.items()}
+    return {name: units[name] + one.meaning for name, one in declared.items()}
 
 
 def robust_text(
@@ -462,14 +381,8 @@ def schedule_text(
 
 
 def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:
-    """The CSV text of a schedule: comment lines that say what it is, then one row per cell.
-
-    `columns` are further figures of each cell, of six digits; they are not read back.
-    """
+    """A schedule as a table, one row per cell; `columns` are further figures of the cells."""
     stream = io.StringIO()
-    stream.write(f"{CSV_TITLE}\n# controller: {saved.controller}\n")
-    stream.write(f"# gains: {json.dumps({name: gain.scale for name, gain in saved.gains.items()})}\n")
-    stream.write(f"# fixed: {json.dumps(saved.fixed)}\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*AXES, *saved.gains, *(columns or {})])
     for i, gap in enumerate(saved.gaps):

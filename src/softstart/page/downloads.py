@@ -7,7 +7,6 @@ import shlex
 import tempfile
 import unicodedata
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from softstart.chain.elements import LIBRARY
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
+from softstart.controller.parameters import declared_parameters
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
 from softstart.drive.machine import Machine
@@ -93,9 +93,9 @@ def command_text(
         elif label in controller_names():
             names.append(label)
             params += [
-                f"{label}.{one.name}={_literal(value, one.metadata.get('unit', ''))}"
-                for one in fields(controller)
-                if (value := getattr(controller, one.name)) is not None
+                f"{label}.{name}={_literal(value, one.unit)}"
+                for name, one in declared_parameters(controller).items()
+                if (value := getattr(controller, name)) is not None
             ]
     profiles = [param for param in params if param.startswith("profile.")]
     if profiles or names != list(ready_controller_names()):

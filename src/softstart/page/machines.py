@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import Field, dataclass, fields
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from softstart.arrays import Vector
 from softstart.chain.machines import Values, varied
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
+from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
@@ -218,7 +219,7 @@ def _scale(word: str, value: Any, origin: Machine, lever_rule_model: TwoMasses, 
     return None
 
 
-def page_parameters(controller: Controller) -> list[Field[Any]]:
+def page_parameters(controller: Controller) -> list[ControllerParameter]:
     """The parameters that the page can change: quantities, and texts with a choice.
 
     None of tuned gains and profiles, which come from files.
@@ -227,8 +228,8 @@ def page_parameters(controller: Controller) -> list[Field[Any]]:
     >>> [one.name for one in page_parameters(make_controller("ramp"))]
     ['initial', 'time', 'full_torque', 'period']
     """
-    given = () if isinstance(controller, Tuned) else fields(controller)
-    return [one for one in given if one.metadata.get("choices") or one.metadata.get("kind") == "quantity"]
+    declared = {} if isinstance(controller, Tuned) else declared_parameters(controller)
+    return [one for one in declared.values() if one.declared and (one.choices or one.unit)]
 
 
 def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, Entry]:
@@ -246,14 +247,13 @@ def strategy_entries(controller: Controller, origin: Machine, label: str) -> Map
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
         if low < high:
             scales[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
-    main = [one for one in own if one.name in scales or one.metadata["choices"]] or own
+    main = [one for one in own if one.name in scales or one.choices] or own
     return {
         STRATEGY + one.name: Entry(
             STRATEGY + one.name, f"parameters of {label}" if one in main else MORE,
-            one.name.replace("_", " "), "", one.metadata["unit"],
-            f"{one.metadata['meaning']}; default: {one.metadata['default'] or 'fixed'}",
-            "a value, or nothing for the default", tuple(one.metadata["choices"]), (), True,
-            scales.get(one.name),
+            one.name.replace("_", " "), "", one.unit,
+            f"{one.meaning}; default: {one.default_text or 'fixed'}",
+            "a value, or nothing for the default", one.choices, (), True, scales.get(one.name),
         )
         for one in [*main, *(one for one in own if one not in main)]
     }  # fmt: skip

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 from nicegui import ui
 
 from softstart.controller.finding import controller_class, controller_names
+from softstart.controller.parameters import declared_parameters
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
@@ -132,10 +132,10 @@ def tunable_controllers() -> list[str]:
     found = []
     for name in controller_names():
         try:
-            metadata = [text_field.metadata for text_field in fields(controller_class(name))]
+            declared = declared_parameters(controller_class(name)).values()
         except InputError:  # somebody's broken plug-in
             continue
-        if any(one.get("multiples") or one.get("between") for one in metadata):
+        if any(one.multiples or one.between for one in declared):
             found.append(name)
     return found
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
+from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError
@@ -262,24 +263,23 @@ def make_sheet(
 
 def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> tuple[Setting, ...]:
     rated, found = rated_torque(drive)[0], []
-    for field in fields(ready):
-        value, about = getattr(ready, field.name), field.metadata
-        unit, meaning = str(about.get("unit", "")), str(about.get("meaning", ""))
-        if value is None or about.get("kind", "quantity") == "object":
+    for name, declared in declared_parameters(ready).items():
+        value, unit, meaning = getattr(ready, name), declared.unit, declared.meaning
+        if value is None or declared.python_only:
             continue
         if not isinstance(value, int | float) or isinstance(value, bool):
-            found.append(Setting(field.name, meaning, unit, str(value), str(value), None))
+            found.append(Setting(name, meaning, unit, str(value), str(value), None))
             continue
         number = float(value)
-        step = None if field.name in KEPT else resolution.step(field.name, unit, rated)
+        step = None if name in KEPT else resolution.step(name, unit, rated)
         if step is None or not math.isfinite(number):
-            found.append(Setting(field.name, meaning, unit, number, number, None))
+            found.append(Setting(name, meaning, unit, number, number, None))
             continue
-        least, most = about.get("between") or (-math.inf if number < 0.0 else 0.0, math.inf)
+        least, most = declared.between or (-math.inf if number < 0.0 else 0.0, math.inf)
         most = float(drive.maximum_torque) if unit == "N*m" else float(most)
         rounded = nearest_step(number, step, max(most, 0.0))
         least = min(float(least), rounded)
-        found.append(Setting(field.name, meaning, unit, number, rounded, step, least, most))
+        found.append(Setting(name, meaning, unit, number, rounded, step, least, most))
     return tuple(found)
 
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import Field, dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.controller.finding import parameter_value
+from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
@@ -65,19 +65,22 @@ class Subject:
     controllers: tuple[str, ...] = ()
 
     @cached_property
-    def parameters(self) -> dict[str, Field[Any]]:
+    def parameters(self) -> Mapping[str, ControllerParameter]:
         """The parameters that all controllers have, alike in unit and kind."""
-        wrong, tables = Mistakes(), list[dict[str, Field[Any]]]()
+        wrong, tables = Mistakes(), list[Mapping[str, ControllerParameter]]()
         for name in self.controllers or ("",):
             with wrong.collect():
                 found = self.recipe.class_of(name) if name or self.recipe.given else Tuned
                 # the fields of tuned gains are what stands in their file
-                tables.append({} if issubclass(found, Tuned) else {f.name: f for f in fields(found)})
+                tables.append({} if issubclass(found, Tuned) else declared_parameters(found))
         wrong.raise_if_any()
         return {
             name: one
             for name, one in tables[0].items()
-            if all(name in other and _kind(other[name]) == _kind(one) for other in tables)
+            if all(
+                name in other and other[name].unit == one.unit and other[name].kind == one.kind
+                for other in tables
+            )
         }
 
     def name_of(self, key: str) -> str:
@@ -128,13 +131,13 @@ class Subject:
             raise InputError(f"{key}: {lacking} parameter; {hint}")
         if name in self.recipe.values:
             raise InputError(f"{key}: the parameter {name} has one value already; leave one of the two out.")
-        unit, kind = _kind(self.parameters[name])
-        if kind == "object":
+        declared = self.parameters[name]
+        if declared.python_only:
             raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
-        meaning = self.parameters[name].metadata.get("meaning") or name
         listed = list(values)
-        read = _texts(key, listed) if kind == "text" else np.float64(parameter_value(key, listed, unit))
-        return read, unit, meaning
+        named = replace(declared, name=key)
+        read = _texts(key, listed) if declared.kind == "text" else np.float64(named.read(listed))
+        return read, declared.unit, declared.meaning or name
 
     def _of_machine(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
         found = self.machine.parameter_value(name)
@@ -159,8 +162,9 @@ class Subject:
         return read, parameter.unit, parameter.meaning
 
 
-def _kind(field: Field[Any]) -> tuple[str, str]:
-    return field.metadata.get("unit", ""), field.metadata.get("kind", "quantity")
+def _same_kind(one: ControllerParameter, other: ControllerParameter) -> bool:
+    """Whether the same value may be given to both."""
+    return (one.unit, one.kind) == (other.unit, other.kind)
 
 
 def _texts(key: str, values: Any) -> tuple[str, ...]:

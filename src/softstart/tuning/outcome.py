@@ -206,7 +206,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the schedule as CSV, with the figures of each cell beside the gains; it can be played too."""
+        """Write the schedule as CSV, as a table with the figures of each cell; it is not read back."""
         saved = self._schedule_file()
         assert self.schedule is not None
         columns = {

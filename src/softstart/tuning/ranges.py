@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import Field, dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
+from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
 from softstart.quantities import number_in, read_multiple
@@ -88,7 +89,7 @@ def tunable_parameters(controller: Controller) -> tuple[str, ...]:
     >>> "time" in tunable_parameters(make_controller("ramp")), tunable_parameters(make_controller("direct"))
     (True, ())
     """
-    return tuple(f.name for f in fields(controller) if _declared(f) is not None)
+    return tuple(name for name, one in declared_parameters(controller).items() if _declared(one))
 
 
 def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
@@ -102,14 +103,14 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     >>> [one.text() for one in ranges_of(make_controller("ramp"), {"time": ("50 ms", "0.3 s")})]
     ['0.05 to 0.3 s']
     """
-    known, what = {f.name: f for f in fields(controller)}, f"the controller {label_of(controller)}"
+    known, what = declared_parameters(controller), f"the controller {label_of(controller)}"
     if free is None:
         free = [name for name in tunable_parameters(controller) if getattr(controller, name) is None]
     asked = (
         {free: None} if isinstance(free, str) else free if isinstance(free, Mapping) else dict.fromkeys(free)
     )
     if not asked:
-        example = next((name for name, f in known.items() if _quantity(f)), "NAME")
+        example = next((name for name, one in known.items() if one.kind == "quantity"), "NAME")
         raise InputError(
             f"free: {what} has no parameter to tune by itself; name one with its range, as "
             f'free={{"{example}": ("0.5x", "2x")}}.'
@@ -121,7 +122,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
                 near = nearest(name, known)
                 hint = f"did you mean {near}?" if near else f"it has {', '.join(known) or 'none'}."
                 raise InputError(f"{what} has no parameter {name}; {hint}")
-            if not _quantity(known[name]):
+            if known[name].kind != "quantity":
                 raise InputError(f"{name} of {what} is not a quantity; it cannot be tuned.")
             own = _declared(known[name]) if ends is None else _named(known[name], ends)
             if own is None:
@@ -134,25 +135,19 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     return tuple(found)
 
 
-def _quantity(field: Field[Any]) -> bool:
-    return bool(field.metadata.get("kind", "quantity") == "quantity")
-
-
-def _declared(field: Field[Any]) -> Range | None:
-    """The range that a controller's own lines give a parameter."""
-    multiples, between = field.metadata.get("multiples"), field.metadata.get("between")
-    if multiples is None and between is None:
+def _declared(p: ControllerParameter) -> Range | None:
+    """The range that a controller declares for a parameter."""
+    if p.multiples is None and p.between is None:
         return None
-    unit = field.metadata.get("unit", "")
-    return Range(field.name, unit, multiples, between, logarithmic=multiples is not None)
+    return Range(p.name, p.unit, p.multiples, p.between, logarithmic=p.multiples is not None)
 
 
-def _named(field: Field[Any], ends: Any) -> Range:
+def _named(p: ControllerParameter, ends: Any) -> Range:
     """The user's own range."""
-    name, unit = field.name, field.metadata.get("unit", "")
+    name, unit = p.name, p.unit
     both = [] if isinstance(ends, str) or not isinstance(ends, Iterable) else list(ends)
     multiples = [found[0] for end in both if (found := read_multiple(end, name))]
-    values = multiples or [number_in(unit or "1", end, name) for end in both]
+    values = multiples or [number_in(unit, end, name) for end in both]
     if len(both) != 2 or len(values) != 2 or not values[0] < values[1] or (multiples and values[0] <= 0.0):
         raise InputError(
             f"{name} = {ends!r}: give its lowest and highest value in this order, or both as multiples "

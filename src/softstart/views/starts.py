@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.drive.data_sheet import BAND
 from softstart.drive.plausibility import plausibility_warnings
@@ -310,7 +310,8 @@ def parameters_of(run: Run, text: Callable[[float], str] = short) -> str:
     'initial = 7.16 N m, time = 0.111803 s, full_torque = 62 N m, period = 0.001 s'
     """
     assert run.controller is not None
-    units = {one.name: label("", one.metadata.get("unit", "1"), " ") for one in fields(run.controller)}
+    declared = declared_parameters(run.controller)
+    units = {name: label("", one.unit, " ") for name, one in declared.items()}
     return ", ".join(
         f"{key} = {text(value) if isinstance(value, float) else value}{units.get(key, '')}"
         for key, value in run.controller.parameters.items()

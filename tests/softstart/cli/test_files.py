@@ -221,10 +221,10 @@ def test_tuned_gains_play(place, as_json):
         "price.csv", "tuning.sqlite", "drive.toml", *pictures("gains", "metric", "robust", "price"),
     }  # fmt: skip
     cell = ("--set", "gap=2", "--set", "load.inertia=0.07")
-    for file, table in (("schedule.csv", found.schedule), ("robust.toml", found.robust.cells)):
+    for file, table in (("schedule.toml", found.schedule), ("robust.toml", found.robust.cells)):
         told = as_json("simulate", "crane-4amtkf", "--controller", f"tuned/{file}", *SIXTY, *cell)
         assert told["k_dyn"] == float(table.k_dyn.sel(gap=2.0, load_inertia=0.07))
-    told = as_json("compare", *SIXTY, "--controllers", "ramp,tuned/robust.toml,tuned/schedule.csv")
+    told = as_json("compare", *SIXTY, "--controllers", "ramp,tuned/robust.toml,tuned/schedule.toml")
     names = [row["controller"] for row in told["strategies"]]
     assert names == ["ramp", "ramp (robust)", "ramp (schedule)"]
 

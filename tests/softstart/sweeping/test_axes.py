@@ -91,7 +91,7 @@ IMPOSSIBLE = {
     "a kind": ({"load.kind": ["active", "reactive"], "load.torque": [1, -1]}, "load_torque = -1 N"),
     "samples": ({"sample": {"starting_torque": [10, 60], "load_torque": [3, 60], "maximum_torque": [70, 71]}},
                 r"starting_torque\[1\] = 60"),
-    "a controller's": ({"controller.time": [0.1, -0.1]}, "time = -0.1"),
+    "a controller's": ({"controller.time": [0.1, -0.1]}, r"time\[1\] = -0.1"),
 }  # fmt: skip
 
 
