@@ -153,7 +153,7 @@ def test_a_setting_is_told_at_both_shafts(as_json):
         (["tune", "crane-4-mass", "--controller", "ramp", "--gaps", "9 arcmin at output"],
          "the gears of a chain are in its shafts"),
         (["simulate", "crane-4amtkf", "--controller", "ramp", "--param", "time=1 s at output"],
-         '"at output" does not apply here'),
+         'does not take "at output"'),
         (["simulate", "crane-4amtkf", "--controller", "ramp", "--until", "1 s at output"],
          '"at output" does not apply here'),
     ],
