@@ -45,7 +45,7 @@ def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
 
 def raised_at(run: Run) -> float:
     """First instant at which the demand is the starting torque, s."""
-    spans = run.recorded.spans
+    spans = run.trajectory.spans
     full = spans[:, S_REF] >= 0.999 * float(run.drive.Ms)
     return float(spans[full, S_START][0]) if full.any() else math.nan
 

@@ -33,7 +33,7 @@ def test_defaults_are_numbers_and_a_twin_in_plain_python_gives_the_same_bits(nam
         assert all(isinstance(values.pop(text), str) for text in texts)
         assert all(isinstance(value, float) and math.isfinite(value) for value in values.values()), values
         both = controller, twin.plain(controller, drive)
-        one, two = (simulate(drive, played).recorded for played in both)
+        one, two = (simulate(drive, played).trajectory for played in both)
         assert all(np.array_equal(one.notes[name], two.notes[name], equal_nan=True) for name in NOTES.names)
         assert np.array_equal(one.states, two.states)
         assert np.array_equal(one.events, two.events)
@@ -81,7 +81,7 @@ def test_gives_up_waiting(name: str) -> None:
 @pytest.mark.parametrize("name", SAMPLED)
 def test_asks_at_whole_sample_periods_only(name: str) -> None:
     run, trace = traced(CRANE, make_controller(name, {"period": 0.0007}))
-    asked = np.setdiff1d(trace[:, 0], run.recorded.events["time"])
+    asked = np.setdiff1d(trace[:, 0], run.trajectory.events["time"])
     assert np.abs(asked / 0.0007 - np.rint(asked / 0.0007)).max() < 1e-9
 
 

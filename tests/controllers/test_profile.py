@@ -49,7 +49,7 @@ def test_twin_and_batch_agree(profile: TorqueProfile, period: float, late: float
     plain = simulate(drive, twin.plain(controller, drive), until=0.3)
     many = simulate(records(drive, maximum_torque=[62.0, 70.0]), controller, until=0.3)
     assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
-    assert plain.recorded.states.tobytes() == run.recorded.states.tobytes()
+    assert plain.trajectory.states.tobytes() == run.trajectory.states.tobytes()
 
 
 def test_after_the_contact_the_second_profile_runs_on_its_own_clock() -> None:

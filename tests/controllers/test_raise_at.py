@@ -43,7 +43,7 @@ def test_the_crane(name: str) -> None:
 
 def test_the_torque_is_raised_at_the_located_peak() -> None:
     run = simulate(CRANE, ReducedTwoStage(torque=15.5, raise_at="peak"))
-    spans = run.recorded.spans
+    spans = run.trajectory.spans
     raised = spans[spans[:, S_REF] == 62.0][0, S_START]
     assert float(run.at(raised)["v"]) == pytest.approx(0.0, abs=1e-9)  # T' = c v
 

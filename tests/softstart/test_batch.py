@@ -20,11 +20,11 @@ CRANE = Drive.load("crane-4amtkf")
 
 def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     many, ramp = records(CRANE, gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
-    whole = prepared(many).notes(ramp.set_ups(many))
+    whole = prepared(many).results(ramp.set_ups(many))
     monkeypatch.setattr(
-        "softstart.start.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
+        "softstart.start.results._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
     )
-    parts = prepared(many).notes(ramp.set_ups(many))
+    parts = prepared(many).results(ramp.set_ups(many))
     assert parts.starts.tobytes() == whole.starts.tobytes()
     assert parts.shafts.tobytes() == whole.shafts.tobytes()
 

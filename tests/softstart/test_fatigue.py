@@ -65,7 +65,7 @@ def test_a_repeated_history_may_begin_anywhere() -> None:
 
 def dense(run: Run, points: int) -> Any:
     """Reversals of T of a trace of so many points and of both sides of every event."""
-    edges = np.concatenate([run.recorded.spans[:, 0], np.nextafter(run.recorded.spans[1:, 0], 0.0)])
+    edges = np.concatenate([run.trajectory.spans[:, 0], np.nextafter(run.trajectory.spans[1:, 0], 0.0)])
     t = np.unique(np.concatenate([np.linspace(0.0, run.end_time, points), edges, [run.end_time]]))
     T = run.at(t)["T"]
     steps = np.diff(T)

@@ -215,7 +215,7 @@ def test_each_figure_of_an_unknown_position_has_its_rule(seed: int) -> None:
             np.testing.assert_equal(float(batch[name]), getattr(run, name), err_msg=name)
         for name in ("first_contact", "torque_at_contact", "contacts", "end_time"):
             np.testing.assert_equal(float(batch[name]), getattr(hardest, name), err_msg=name)
-        stage_2_end = hardest.recorded.notes["stage_2_end"]
+        stage_2_end = hardest.trajectory.notes["stage_2_end"]
         np.testing.assert_equal(float(batch["stage_2_end"]), float(stage_2_end), err_msg="of the same start")
 
 

@@ -19,8 +19,8 @@ from softstart.identification.logs import Log
 from softstart.kernel.records import ENDED, MACHINE
 from softstart.profile import TorqueProfile
 from softstart.start.engine import run_one
-from softstart.start.recorded import StartRecorder, Trajectory
-from softstart.start.rows import Rows, kernel_input
+from softstart.start.kernel_input import KernelInput, kernel_input
+from softstart.start.trajectory import StartRecorder, Trajectory
 
 POSITION: Final = "position"  # where in the gap a log begins, from -1 (opposite flank) to 1 (driving flank)
 DEAD_TIME: Final = "computing_delay"
@@ -115,7 +115,7 @@ class LogModel:
         out = np.empty((len(values), self.times.size))
         for i, (row, motion) in enumerate(zip(values, self.motions(values, error), strict=True)):
             if self.log.kind == "angle":
-                out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts(0)[0, 0]
+                out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts("twist")[0, 0]
             elif lag := row.get(FILTER, 0.0):
                 out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
             else:
@@ -151,7 +151,7 @@ class LogModel:
                 raise SimulationError(f"The start of the log could not be computed (status {reason}).")
             yield recorder.finished()
 
-    def _plants(self, values: Sequence[Mapping[str, float]]) -> list[Rows]:
+    def _plants(self, values: Sequence[Mapping[str, float]]) -> list[KernelInput]:
         """The rows of the kernel for each set of values."""
         names = {name for row in values for name in row} - {POSITION, DEAD_TIME, FILTER}
         changes = {name: np.array([row[name] for row in values]) for name in names}
@@ -166,7 +166,7 @@ class LogModel:
         rows = kernel_input(drive)
         named = rows.machines.view(MACHINE)[:, 0]
         named["longest"], named["time_limit"] = math.inf, 1e9 + float(self.times[-1])
-        return [rows.taken(slice(i, i + 1)) for i in range(len(values))]
+        return [rows.take(slice(i, i + 1)) for i in range(len(values))]
 
     def _player(self, values: Mapping[str, float], error: Vector | None) -> Controller:
         """What plays the torque of the log."""

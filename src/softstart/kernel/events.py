@@ -19,7 +19,7 @@ from softstart.kernel.records import (
     MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
     SWITCH, TURNED, UNSOLVED, UPPER, WORK_TYPE, Record,
 )  # fmt: skip
-from softstart.kernel.series import grip
+from softstart.kernel.series import gear_friction
 
 _I, _F = types.int64, types.float64
 NONE = -1.0
@@ -147,6 +147,14 @@ def first_root(s: Record, n: int, end: float, zeros: int, noise: float, faint: f
     return crossing(s, low, n, 0.0, end)
 
 
+@inner
+def event_at(x: float, kind: int, event: int, end: float) -> tuple[int, float]:
+    """The first event and its instant: `kind` at the root x if there is one, else `event` at `end`."""
+    if event == UNSOLVED or x < NONE:
+        return UNSOLVED, 0.0
+    return (kind, x) if x >= 0.0 else (event, end)
+
+
 # events of shafts -----------------------------------------------------------------------------------
 
 ROUNDING = 4.0 * EPS
@@ -180,13 +188,13 @@ def set_line(f: Vector, series: Vector, n: int, constant: float, factor: float) 
 @inner
 def rounding_of_torque(s: Record, k: int) -> float:
     """Rounding errors of c times the overlap."""
-    return ROUNDING * s.c[k] * (abs(s.theta[k]) + s.half[k])
+    return ROUNDING * s.c[k] * (abs(s.theta[k]) + s.half_gap[k])
 
 
 @inner
 def influence(s: Record, i: int) -> float:
     """The torques on the body of mass i over its inertia."""
-    return s.scale[s.first[i]] / s.body_J[s.first[i]]
+    return s.torque_scale[s.body[i]] / s.body_J[s.body[i]]
 
 
 @inner
@@ -209,31 +217,27 @@ def faint_torque(s: Record, k: int, h: float, noise: float) -> float:
 @inner
 def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The flank of an open gap that is reached first, or the end of impacts that pile up on one."""
-    half, theta = s.half[k], s.theta[k]
+    half_gap, theta = s.half_gap[k], s.theta[k]
     twist = s.twist[k]
-    if deviation_bound(twist, n) < half - abs(theta):
+    if deviation_bound(twist, n) < half_gap - abs(theta):
         return NO_EVENT, end
     faint = rounding_of_twist(s, k, h)
-    if s.rigid[k] != 0.0 and s.zeros[k] == 0 and abs(theta) == half and half > 0.0:
+    if s.rigid[k] != 0.0 and s.leading_zeros[k] == 0 and abs(theta) == half_gap and half_gap > 0.0:
         side = math.copysign(1.0, theta)
         rebound = -side * twist[1]
         press = side * twist[2]
         e = s.restitution[k]
         if press > faint and rebound >= 0.0:
-            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * FLAT * half
+            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * FLAT * half_gap
             if flat or rebound <= PILED_UP * (1.0 - e) * press:
                 return SETTLE, 0.0
     event = NO_EVENT
     for which in range(2):
         side = 1.0 - 2.0 * which
-        zeros = s.zeros[k] if s.side[k] == side else 0
-        set_line(s.f, twist, n, half, -side)
-        x = first_root(s, n, end, zeros, ROUNDING * half, faint)
-        if x < NONE:
-            return UNSOLVED, 0.0
-        if x >= 0.0:
-            event = UPPER if which == 0 else LOWER
-            end = x
+        zeros = s.leading_zeros[k] if s.side[k] == side else 0
+        set_line(s.f, twist, n, half_gap, -side)
+        x = first_root(s, n, end, zeros, ROUNDING * half_gap, faint)
+        event, end = event_at(x, UPPER if which == 0 else LOWER, event, end)
     return event, end
 
 
@@ -242,7 +246,7 @@ def set_damping_excess(s: Record, k: int, n: int, sign: float) -> None:
     """F = sign (c z - d z') of a contact, which says where `modelica` caps the damping."""
     for o in range(n + 1):
         s.f[o] = sign * (s.c[k] * s.twist[k, o] - s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
-    s.f[0] -= sign * s.c[k] * s.slack[k]
+    s.f[0] -= sign * s.c[k] * s.spring_zero[k]
 
 
 @inner
@@ -250,18 +254,14 @@ def parting(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
     """The instant at which flanks in contact part, or at which the damping regime changes."""
     side = s.side[k]
     event = NO_EVENT
-    rejoined = s.zeros[k] == REJOINED
+    rejoined = s.leading_zeros[k] == REJOINED
     zeros = 1 if rejoined else 0
     noise = rounding_of_torque(s, k)
     if s.law[k] == MODELICA and s.d[k] > 0.0:
         doubled = s.mode[k] == DOUBLED
         set_damping_excess(s, k, n, -side if doubled else side)
-        x = first_root(s, n, end, 0 if rejoined else s.zeros[k], noise, faint_torque(s, k, h, noise))
-        if x < NONE:
-            return UNSOLVED, 0.0
-        if x >= 0.0:
-            event = SWITCH
-            end = x
+        x = first_root(s, n, end, 0 if rejoined else s.leading_zeros[k], noise, faint_torque(s, k, h, noise))
+        event, end = event_at(x, SWITCH, event, end)
         if doubled:
             return event, end
         set_line(s.f, s.torque[k], n, 0.0, side)
@@ -272,14 +272,11 @@ def parting(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
         set_line(s.f, s.torque[k], n, 0.0, side)
         faint = faint_torque(s, k, h, noise)
     else:
-        if deviation_bound(s.twist[k], n) < side * s.theta[k] - s.half[k]:
+        if deviation_bound(s.twist[k], n) < side * s.theta[k] - s.half_gap[k]:
             return NO_EVENT, end
-        set_line(s.f, s.twist[k], n, -s.half[k], side)
-        noise, faint = ROUNDING * s.half[k], rounding_of_twist(s, k, h)
-    x = first_root(s, n, end, zeros, noise, faint)
-    if x < NONE:
-        return UNSOLVED, 0.0
-    return (EXIT, x) if x >= 0.0 else (event, end)
+        set_line(s.f, s.twist[k], n, -s.half_gap[k], side)
+        noise, faint = ROUNDING * s.half_gap[k], rounding_of_twist(s, k, h)
+    return event_at(first_root(s, n, end, zeros, noise, faint), EXIT, event, end)
 
 
 @inner
@@ -288,20 +285,13 @@ def returning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, flo
     side = s.side[k]
     for o in range(n + 1):
         s.f[o] = -side * (s.c[k] * s.twist[k, o] + s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
-    s.f[0] += s.c[k] * s.half[k]
-    event = NO_EVENT
+    s.f[0] += s.c[k] * s.half_gap[k]
     noise = rounding_of_torque(s, k)
-    x = first_root(s, n, end, s.zeros[k], noise, faint_torque(s, k, h, noise))
-    if x < NONE:
-        return UNSOLVED, 0.0
-    if x >= 0.0:
-        event = REJOIN
-        end = x
-    set_line(s.f, s.twist[k], n, -s.half[k], side)
-    x = first_root(s, n, end, 0, ROUNDING * s.half[k], rounding_of_twist(s, k, h))
-    if x < NONE:
-        return UNSOLVED, 0.0
-    return (BACK, x) if x >= 0.0 else (event, end)
+    x = first_root(s, n, end, s.leading_zeros[k], noise, faint_torque(s, k, h, noise))
+    event, end = event_at(x, REJOIN, NO_EVENT, end)
+    set_line(s.f, s.twist[k], n, -s.half_gap[k], side)
+    x = first_root(s, n, end, 0, ROUNDING * s.half_gap[k], rounding_of_twist(s, k, h))
+    return event_at(x, BACK, event, end)
 
 
 @inner
@@ -310,11 +300,8 @@ def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     if deviation_bound(s.torque[k], n) < s.side[k] * s.torque[k, 0]:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.side[k])
-    noise = 1e-14 * s.scale[s.first[k]]
-    x = first_root(s, n, end, 0, noise, noise)
-    if x < NONE:
-        return UNSOLVED, 0.0
-    return (RELEASE, x) if x >= 0.0 else (NO_EVENT, end)
+    noise = 1e-14 * s.torque_scale[s.body[k]]
+    return event_at(first_root(s, n, end, 0, noise, noise), RELEASE, NO_EVENT, end)
 
 
 @inner
@@ -324,12 +311,11 @@ def turning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
     if not pulls and s.mode[k] != JOINED:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.sign[k])
-    noise = s.c[k] * (abs(s.theta[k]) + s.half[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
-    noise = ROUNDING * (noise + s.scale[s.first[k]])  # a twist near 0 has the rounding of those before it
-    x = first_root(s, n, end, s.zeros[k], noise, faint_torque(s, k, h, noise))
-    if x < NONE:
-        return UNSOLVED, 0.0
-    return (TURNED, x) if x >= 0.0 else (NO_EVENT, end)
+    noise = s.c[k] * (abs(s.theta[k]) + s.half_gap[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
+    # a twist near 0 has the rounding of those before it
+    noise = ROUNDING * (noise + s.torque_scale[s.body[k]])
+    x = first_root(s, n, end, s.leading_zeros[k], noise, faint_torque(s, k, h, noise))
+    return event_at(x, TURNED, NO_EVENT, end)
 
 
 # friction, brake, the target speed, and the first of all --------------------------------------------
@@ -338,40 +324,34 @@ def turning(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float
 @inner
 def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """Breakaway or stop of the body that begins with mass i, or that its torque lets the brake go."""
-    noise = ROUNDING * (s.scale[i] + s.hold[i])
+    noise = ROUNDING * (s.torque_scale[i] + s.friction_limit[i])
     event = NO_EVENT
-    if s.braked != 0.0 and s.first[s.at_motor] == i:
+    if s.braked != 0.0 and s.body[s.at_motor] == i:
         if s.release_at < math.inf:  # released by time
             return event, end
-        if s.held[i, 0] >= -noise:  # a torque that just holds the load is proved
+        if s.net_torque[i, 0] >= -noise:  # a torque that just holds the load is proved
             return LET_GO, 0.0
-        set_line(s.f, s.held[i], n, 0.0, -1.0)
-        x = first_root(s, n, end, 0, noise, noise)
-        if x < NONE:
-            return UNSOLVED, 0.0
-        return (LET_GO, x) if x >= 0.0 else (event, end)
-    if s.rubbing[i] == 0:
+        set_line(s.f, s.net_torque[i], n, 0.0, -1.0)
+        return event_at(first_root(s, n, end, 0, noise, noise), LET_GO, event, end)
+    if s.friction_count[i] == 0:
         return event, end
     if s.stuck[i] != 0:
-        if s.gears[i] == 0 and deviation_bound(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
+        room = s.friction_limit[i] - abs(s.net_torque[i, 0])
+        if s.lossy_gears[i] == 0 and deviation_bound(s.net_torque[i], n) < room:
             return event, end
         for which in range(2):
-            set_line(s.f, s.held[i], n, s.hold[i], -1.0 + 2.0 * which)
-            if s.gears[i] != 0:
+            set_line(s.f, s.net_torque[i], n, s.friction_limit[i], -1.0 + 2.0 * which)
+            if s.lossy_gears[i] != 0:
                 for o in range(n + 1):
-                    s.f[o] += grip(s, i, 1.0 - 2.0 * which, o)
+                    s.f[o] += gear_friction(s, i, 1.0 - 2.0 * which, o)
             # an excess that `first_root` would pass over in the speed of the body, once let go, is none
             if s.f[0] < 0.0 and s.f[0] >= -FAINT * deviation_bound(s.f, n):
                 s.f[0] = 0.0
             x = first_root(s, n, end, 0, noise, noise)
-            if x < NONE:
-                return UNSOLVED, 0.0
-            if x >= 0.0:
-                event = BREAK_FORWARD if which == 0 else BREAK_BACK
-                end = x
+            event, end = event_at(x, BREAK_FORWARD if which == 0 else BREAK_BACK, event, end)
         return event, end
     j = i
-    while s.rubs[j] == 0.0:
+    while s.has_friction[j] == 0.0:
         j += 1
     reach = deviation_bound(s.speed[i], n)
     if reach < s.direction[j] * s.w[i]:
@@ -379,18 +359,15 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
     if abs(s.f[0]) <= LOST_IN * reach:  # of a body let go within rounding: what follows decides
         s.f[0] = 0.0
-    faint = 1e-14 * h * (s.scale[i] + s.hold[i]) / s.body_J[i]
-    x = first_root(s, n, end, 0, 0.0, faint)
-    if x < NONE:
-        return UNSOLVED, 0.0
-    return (STOP, x) if x >= 0.0 else (event, end)
+    faint = 1e-14 * h * (s.torque_scale[i] + s.friction_limit[i]) / s.body_J[i]
+    return event_at(first_root(s, n, end, 0, 0.0, faint), STOP, event, end)
 
 
 @inner
 def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
     angular = s.by_angle[i] != 0.0
-    course = s.turned[i] if angular else s.speed[i]
+    series = s.rotation[i] if angular else s.speed[i]
     faint = 1e-14 * h * influence(s, i) * (h if angular else 1.0)
     event = NO_EVENT
     for which in range(2):
@@ -399,16 +376,12 @@ def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, fl
         if piece < 0 or piece >= s.points[i]:
             continue
         point = s.at[i, piece]
-        set_line(s.f, course, n, sign * point, -sign)
+        set_line(s.f, series, n, sign * point, -sign)
         zeros = 1 if s.passed[i] == -sign else 0
         if zeros == 0 and deviation_bound(s.f, n) < s.f[0]:
             continue
         x = first_root(s, n, end, zeros, ROUNDING * abs(point), faint)
-        if x < NONE:
-            return UNSOLVED, 0.0
-        if x >= 0.0:
-            event = POINT_ABOVE if which == 0 else POINT_BELOW
-            end = x
+        event, end = event_at(x, POINT_ABOVE if which == 0 else POINT_BELOW, event, end)
     return event, end
 
 
@@ -434,37 +407,36 @@ def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int
 
 @separately_compiled(types.int64(WORK_TYPE, _F, _I))
 def next_event(s: Record, h: float, n: int) -> int:
-    """The first event of the span; `s.where` is its shaft or mass, `s.share` the share of the span."""
+    """The first event of the span, at the shaft or mass `s.event_place` and its share `s.event_share`."""
     first = NO_EVENT
-    s.where, s.share = 0, 1.0
+    s.event_place, s.event_share = 0, 1.0
     for k in range(s.n - 1):
-        event, x = event_of_shaft(s, k, h, n, s.share)
+        event, x = event_of_shaft(s, k, h, n, s.event_share)
         if event != NO_EVENT:
-            first, s.where, s.share = event, k, x
+            first, s.event_place, s.event_share = event, k, x
         if event == UNSOLVED:
             return first
     for i in range(s.n):
-        if s.first[i] == i and (s.rubbing[i] != 0 or s.braked != 0.0):
-            event, x = friction(s, i, h, n, s.share)
+        if s.body[i] == i and (s.friction_count[i] != 0 or s.braked != 0.0):
+            event, x = friction(s, i, h, n, s.event_share)
             # the friction of a gear goes with the sign of its torque: at one instant that turns first
-            if event != NO_EVENT and (event == UNSOLVED or first != TURNED or x < s.share):
-                first, s.where, s.share = event, i, x
+            if event != NO_EVENT and (event == UNSOLVED or first != TURNED or x < s.event_share):
+                first, s.event_place, s.event_share = event, i, x
             if event == UNSOLVED:
                 return first
         if s.points[i] > 0:
-            event, x = next_point(s, i, h, n, s.share)
+            event, x = next_point(s, i, h, n, s.event_share)
             if event != NO_EVENT:
-                first, s.where, s.share = event, i, x
+                first, s.event_place, s.event_share = event, i, x
             if event == UNSOLVED:
                 return first
     load = s.at_load
     if math.isnan(s.start_time) and deviation_bound(s.speed[load], n) >= s.target - s.w[load]:
         set_line(s.f, s.speed[load], n, s.target, -1.0)
-        x = first_root(s, n, s.share, 0, ROUNDING * s.target, 0.0)
-        if x < NONE:
-            return UNSOLVED
-        if x >= 0.0:
-            first, s.where, s.share = REACHED, load, x
+        x = first_root(s, n, s.event_share, 0, ROUNDING * s.target, 0.0)
+        first, s.event_share = event_at(x, REACHED, first, s.event_share)
+        if first == REACHED:
+            s.event_place = load
     return first
 
 

@@ -62,7 +62,7 @@ def engage_spring(s: Record, k: int, side: float) -> None:
     """The spring begins to act, in its damping regime."""
     s.side[k] = side
     s.mode[k] = CONTACT
-    z = side * s.theta[k] - s.half[k]
+    z = side * s.theta[k] - s.half_gap[k]
     v = side * (s.w[k] - s.w[k + 1])
     if s.law[k] == MODELICA and s.d[k] * v > s.c[k] * z:
         s.mode[k] = DOUBLED
@@ -75,29 +75,29 @@ def begin_modes(s: Record) -> None:
     """The modes at t = 0."""
     for i in range(s.n):
         s.w[i] = s.w0[i]
-        s.direction[i] = np.sign(s.w[i]) if s.rubs[i] != 0.0 else 1.0
+        s.direction[i] = np.sign(s.w[i]) if s.has_friction[i] != 0.0 else 1.0
     for k in range(s.n - 1):
-        theta, half = s.theta0[k], s.half[k]
-        torque = s.c[k] * (abs(theta) - half)
+        theta, half_gap = s.theta0[k], s.half_gap[k]
+        torque = s.c[k] * (abs(theta) - half_gap)
         torque += s.d[k] * math.copysign(1.0, theta) * (s.w[k] - s.w[k + 1])
         s.theta[k] = theta
-        s.zeros[k] = 0
+        s.leading_zeros[k] = 0
         s.side[k] = 0.0
         s.sign[k] = 1.0
         s.peak[k] = 0.0
         s.peak_time[k] = 0.0
         s.impulse[k] = 0.0
         s.first_peak[k] = 0.0
-        s.struck[k] = -1.0
-        s.blows[k] = 0.0
+        s.last_impact_time[k] = -1.0
+        s.impacts_at_instant[k] = 0.0
         s.mode[k] = OPEN
         if s.rigid[k] != 0.0:
-            if half == 0.0:
+            if half_gap == 0.0:
                 s.mode[k] = WELDED
-        elif half == 0.0:
+        elif half_gap == 0.0:
             s.mode[k] = JOINED
             s.sign[k] = math.copysign(1.0, theta) if torque >= 0.0 else -math.copysign(1.0, theta)
-        elif abs(theta) > half:
+        elif abs(theta) > half_gap:
             if s.law[k] != DEAD_ZONE and torque < 0.0:
                 s.mode[k] = BEYOND
                 s.side[k] = math.copysign(1.0, theta)
@@ -106,7 +106,7 @@ def begin_modes(s: Record) -> None:
 
 
 @inner
-def goes_with(s: Record, k: int, side: float, kind: int) -> bool:
+def moves_with(s: Record, k: int, side: float, kind: int) -> bool:
     """Whether joint k takes the mass behind it along when a flank `side` beside it is struck.
 
     Where impacts have piled up no impulse is left that could part flanks: their torque decides.
@@ -128,10 +128,10 @@ def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> Non
     b = k + 1
     J_a = s.J[a]
     J_b = s.J[b]
-    while a > 0 and goes_with(s, a - 1, side, kind):
+    while a > 0 and moves_with(s, a - 1, side, kind):
         a -= 1
         J_a += s.J[a]
-    while b + 1 < s.n and goes_with(s, b, side, kind):
+    while b + 1 < s.n and moves_with(s, b, side, kind):
         b += 1
         J_b += s.J[b]
     if s.braked != 0.0 and a <= s.at_motor <= b:
@@ -160,13 +160,13 @@ def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> Non
         if s.points[i] > 0 and s.by_angle[i] == 0.0:
             find_piece(s, i)
         direction = np.sign(s.w[i])
-        if s.rubs[i] != 0.0 and direction != s.direction[i]:
+        if s.has_friction[i] != 0.0 and direction != s.direction[i]:
             if s.direction[i] != 0.0:
                 turn_mass(s, i, 0.0)
             if direction != 0.0:
                 turn_mass(s, i, direction)
     for j in range(max(a - 1, 0), min(b + 1, s.n - 1)):
-        s.zeros[j] = 0  # speeds have jumped: nothing is zero by its nature any more
+        s.leading_zeros[j] = 0  # speeds have jumped: nothing is zero by its nature any more
     for edge in range(2):
         j = a - 1 if edge == 0 else b
         if 0 <= j < s.n - 1 and s.mode[j] == PRESSED:
@@ -188,23 +188,23 @@ def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
     Where v and `press` are 0 it is reached by what follows in the series, and that is a contact.
     """
     v = side * (s.w[k] - s.w[k + 1])
-    s.theta[k] = side * s.half[k]
+    s.theta[k] = side * s.half_gap[k]
     s.side[k] = side
     if s.rigid[k] != 0.0:
         e = s.restitution[k]
-        at_once = s.time - s.struck[k] <= 1e-15 * s.time
-        s.blows[k] = s.blows[k] + 1.0 if at_once else 0.0
-        s.struck[k] = s.time
-        if v <= SLOW * abs(press) * h or (s.blows[k] > COLLAPSE and e < 1.0):
+        at_once = s.time - s.last_impact_time[k] <= 1e-15 * s.time
+        s.impacts_at_instant[k] = s.impacts_at_instant[k] + 1.0 if at_once else 0.0
+        s.last_impact_time[k] = s.time
+        if v <= SLOW * abs(press) * h or (s.impacts_at_instant[k] > COLLAPSE and e < 1.0):
             rest = 0.0
             if press > 0.0 and e < 1.0:
                 rest = 2.0 * max(e * v, -v) / (press * (1.0 - e))
             settle(s, k, rest)
         else:
             strike(s, k, e, IMPACT, s.time)
-    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half[k]:
+    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half_gap[k]:
         s.events += 1.0
-        s.zeros[k] = 2
+        s.leading_zeros[k] = 2
     else:
         note(s, s.time, CLOSED, k, side, 0.0)
         engage_spring(s, k, side)
@@ -214,21 +214,21 @@ def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
 def part(s: Record, k: int) -> None:
     """The flanks of shaft k cease to act."""
     note(s, s.time, OPENED, k, s.side[k], 0.0)
-    if s.law[k] != DEAD_ZONE and s.d[k] > 0.0 and s.side[k] * s.theta[k] > s.half[k]:
+    if s.law[k] != DEAD_ZONE and s.d[k] > 0.0 and s.side[k] * s.theta[k] > s.half_gap[k]:
         s.mode[k] = BEYOND
-        s.zeros[k] = 1
+        s.leading_zeros[k] = 1
     else:
         s.mode[k] = OPEN
-        s.theta[k] = s.side[k] * s.half[k]
+        s.theta[k] = s.side[k] * s.half_gap[k]
 
 
 @inner
 def set_friction_state(s: Record, i: int, direction: float) -> None:
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
     for j in range(i, s.n):
-        if s.first[j] != i:
+        if s.body[j] != i:
             break
-        if s.rubs[j] != 0.0:
+        if s.has_friction[j] != 0.0:
             turn_mass(s, j, direction)
         if direction == 0.0:
             s.w[j] = 0.0
@@ -239,7 +239,7 @@ def release(s: Record) -> None:
     """The brake lets the motor go; its friction may still hold it."""
     s.braked = 0.0
     s.release_time = s.time
-    s.changed = 1.0
+    s.modes_changed = 1.0
     note(s, s.time, RELEASED, s.at_motor, s.u, 0.0)
 
 
@@ -266,20 +266,20 @@ def change(s: Record, event: int, k: int, rest: float) -> None:
     elif event == REJOIN:
         note(s, s.time, CLOSED, k, s.side[k], 0.0)
         engage_spring(s, k, s.side[k])
-        s.zeros[k] = REJOINED
+        s.leading_zeros[k] = REJOINED
     elif event == EXIT:
         part(s, k)
     elif event == RELEASE:
         note(s, s.time, OPENED, k, s.side[k], 0.0)
         s.mode[k] = OPEN
-        s.zeros[k] = 2
+        s.leading_zeros[k] = 2
     else:
         s.events += 1.0
-        s.zeros[k] = 1
+        s.leading_zeros[k] = 1
         if event == BACK:
-            s.theta[k] = s.side[k] * s.half[k]
+            s.theta[k] = s.side[k] * s.half_gap[k]
             s.mode[k] = OPEN
-            s.zeros[k] = 0
+            s.leading_zeros[k] = 0
         elif event == SWITCH:
             s.mode[k] = CONTACT if s.mode[k] == DOUBLED else DOUBLED
         elif event == TURNED:
@@ -292,12 +292,13 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
     was = path_closed(s, -1)
     bounced = False
     speed = 0.0
-    s.changed = 1.0
+    s.modes_changed = 1.0
     if event in (UPPER, LOWER):
         side = 1.0 if event == UPPER else -1.0
         speed = side * (s.w[k] - s.w[k + 1])
         meet(s, k, side, press, h)
-        bounced = s.rigid[k] != 0.0 and s.path <= k < s.path_end and s.mode[k] == OPEN and s.zeros[k] == 0
+        rebounds = s.mode[k] == OPEN and s.leading_zeros[k] == 0
+        bounced = rebounds and s.rigid[k] != 0.0 and s.path <= k < s.path_end
     elif event == STOP:
         set_friction_state(s, k, 0.0)
     elif event in (BREAK_FORWARD, BREAK_BACK):
@@ -310,7 +311,7 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         set_piece(s, k, s.piece[k] + s.passed[k])
     elif event == REACHED:
         s.start_time = s.time
-        s.changed = 0.0
+        s.modes_changed = 0.0
         note(s, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
         if s.t_end == math.inf:
             s.t_end = s.time + s.period

@@ -80,10 +80,10 @@ def encoder_count(lines: Any) -> Any:
 @inner
 def take_demand(s: Record, demand: float, slope: float) -> None:
     """From now on the demand is this line."""
-    if s.demand_slope != 0.0 and s.ref == s.demand:
+    if s.demand_slope != 0.0 and s.u_ref == s.demand:
         rounding = SLOPE_ROUNDING * (abs(demand) + abs(s.demand_slope) * s.time)
-        if abs(demand - s.ref) <= rounding:
-            s.ref = demand
+        if abs(demand - s.u_ref) <= rounding:
+            s.u_ref = demand
     s.demand = demand
     s.demand_slope = slope
 
@@ -131,34 +131,34 @@ def put_cut(s: Record, torque: float, slope: float, end: float, until: float) ->
     excess = max(abs(torque - demand), abs(end - within))
     if excess < math.inf and excess <= LIMIT_ROUNDING * max(abs(torque), abs(end)):
         return put(s, begin, demand, (within - demand) / length if slope != 0.0 else 0.0)
-    s.over = 1.0
-    s.over_since = s.time
-    s.over_torque = torque
-    s.over_slope = slope
+    s.beyond_limits = 1.0
+    s.beyond_since = s.time
+    s.beyond_torque = torque
+    s.beyond_slope = slope
     if slope == 0.0:
         return put(s, begin, demand, 0.0)
-    near, far = (s.u_min, s.u_max) if slope > 0.0 else (s.u_max, s.u_min)
-    enters, leaves = (near - torque) / slope, (far - torque) / slope
-    if enters >= length or leaves <= 0.0:
+    first, last = (s.u_min, s.u_max) if slope > 0.0 else (s.u_max, s.u_min)  # limits that the line crosses
+    entry_time, exit_time = (first - torque) / slope, (last - torque) / slope
+    if entry_time >= length or exit_time <= 0.0:
         return put(s, begin, demand, 0.0)
-    room = put(s, begin, demand, slope if enters <= 0.0 else 0.0)
-    if enters > 0.0:
-        room = room and put(s, begin + enters, near, slope)
-    if leaves < length:
-        room = room and put(s, begin + leaves, far, 0.0)
+    room = put(s, begin, demand, slope if entry_time <= 0.0 else 0.0)
+    if entry_time > 0.0:
+        room = room and put(s, begin + entry_time, first, slope)
+    if exit_time < length:
+        room = room and put(s, begin + exit_time, last, 0.0)
     return room
 
 
 @inner
 def note_excess(s: Record) -> None:
     """Note how far and how long the last answer lay beyond the torque limits, up to now."""
-    if s.over == 0.0:
+    if s.beyond_limits == 0.0:
         return
-    s.over = 0.0
-    length = s.time - s.over_since
+    s.beyond_limits = 0.0
+    length = s.time - s.beyond_since
     if length <= 0.0:
         return
-    torque, slope = s.over_torque, s.over_slope
+    torque, slope = s.beyond_torque, s.beyond_slope
     end = torque if slope == 0.0 else torque + slope * length
     s.excess = max(s.excess, torque - s.u_max, s.u_min - torque, end - s.u_max, s.u_min - end)
     if slope != 0.0:
@@ -200,7 +200,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
 def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken.
 
-    An answer is none if it is not a number, names a past instant, or has a slope without end.
+    A reply is refused if it is not a number, names a past instant, or has a slope without an end.
     The demand is the straight line from `torque` now to torque + slope (ask_again - now) then, cut off at the
     machine's limits. ask_again = -inf (NEVER) also ends the asking at gap events. With a
     dead time the answer waits in the queue until it takes effect; the asking does not.
@@ -234,18 +234,18 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
 @inner
 def along_line(s: Record) -> None:
     """Whether the realised torque is a line, and there the torque itself to the last digit."""
-    s.follows = 1.0
+    s.on_line = 1.0
     if s.lag == 0.0:
-        s.u = s.ref
+        s.u = s.u_ref
         return
-    line = s.ref - s.slope * s.lag
+    line = s.u_ref - s.slope * s.lag
     if abs(s.u - line) > DIED_AWAY * (abs(line) + abs(s.u)):
-        s.follows = 0.0
+        s.on_line = 0.0
 
 
 @separately_compiled(types.void(WORK_TYPE))
 def begin_torque(s: Record) -> None:
-    """The course of the torque from now on: ref' = slope up to `slew_end`, u' = (ref - u)/lag.
+    """The torque from now on: ref' = slope up to `slew_end`, u' = (ref - u)/lag.
 
     The demand is a line. A slew limiter that is not on it runs towards it at its rate and meets it at
     `slew_end`; one that is on it follows, unless the line is too steep. Where the exponential of the lag has
@@ -254,9 +254,9 @@ def begin_torque(s: Record) -> None:
     demand = s.demand
     slope = s.demand_slope
     s.slew_end = math.inf
-    if s.ref != demand:
+    if s.u_ref != demand:
         if s.rate < math.inf:
-            away = demand - s.ref
+            away = demand - s.u_ref
             line = slope
             slope = math.copysign(s.rate, away)
             if line == 0.0:
@@ -264,7 +264,7 @@ def begin_torque(s: Record) -> None:
             elif (slope - line) * away > 0.0:
                 s.slew_end = away / (slope - line)
         else:
-            s.ref = demand
+            s.u_ref = demand
     elif abs(slope) > s.rate:
         slope = math.copysign(s.rate, slope)
     s.slope = slope
@@ -276,13 +276,13 @@ def expand_torque(s: Record, h: float, n: int) -> None:
     """The Taylor coefficients of the motor torque."""
     u = s.torque_u
     u[0] = s.u
-    if s.follows != 0.0:
+    if s.on_line != 0.0:
         u[1] = s.slope * h
         for o in range(2, n + 1):
             u[o] = 0.0
         return
     share = h / s.lag
-    term = (s.ref - s.u) * share
+    term = (s.u_ref - s.u) * share
     u[1] = term
     term = 0.5 * (s.slope * h - term) * share
     u[2] = term
@@ -296,4 +296,4 @@ def move_demand(s: Record, time: float) -> None:
     """Demand and slew limiter after so many seconds."""
     if s.demand_slope != 0.0:
         s.demand += s.demand_slope * time
-    s.ref = s.demand if time >= s.slew_end else s.ref + s.slope * time
+    s.u_ref = s.demand if time >= s.slew_end else s.u_ref + s.slope * time

@@ -95,7 +95,7 @@ class ShaftRecord:
 
     c: float
     d: float
-    half: float  # half the gap
+    half_gap: float  # half the gap
     rigid: float
     restitution: float
     law: float  # one of the contact laws below
@@ -174,17 +174,17 @@ class OfMasses:
     w: float
     direction: float  # 0 held by friction, else the sign of the speed that it opposes; 1 without friction
     angle: float  # with a load curve
-    rubs: float  # 1 where friction acts: reactive load, motor, a gear with losses
-    push: float  # torque from outside that is constant within the span
+    has_friction: float  # 1 where friction acts: reactive load, motor, a gear with losses
+    constant_torque: float  # torque from outside that is constant within the span
     # masses that move as one are a body: the index of its first mass, under which its other numbers stand
-    first: float
-    inverse: float  # one over its inertia; 0 while it is held
+    body: float
+    inverse_J: float  # one over its inertia; 0 while it is held
     body_J: float
-    hold: float  # how much its friction can hold
+    friction_limit: float  # how much its friction can hold
     stuck: float
-    rubbing: float  # how many of its masses rub
-    gears: float  # how many of its gears have losses
-    scale: float  # sum of the absolute torques: the scale of rounding
+    friction_count: float  # how many of its masses rub
+    lossy_gears: float  # how many of its gears have losses
+    torque_scale: float  # sum of the absolute torques: the scale of rounding
     # its load curve over the speed or the angle: `points` and the torques there, and the straight piece
     points: float  # 0 without a load curve
     by_angle: float
@@ -207,14 +207,14 @@ class OfShafts:
     peak_time: float
     impulse: float
     first_peak: float
-    struck: float  # time of the last impact
-    blows: float  # impacts at that very instant
-    zeros: float  # how many leading coefficients of the event just fired are zero by its nature
+    last_impact_time: float  # time of the last impact
+    impacts_at_instant: float  # impacts at that very instant
+    leading_zeros: float  # how many leading coefficients of the event just fired are zero by its nature
     stiff: float  # stiffness and damping that act
     damp: float
-    slack: float  # twist at which the spring is slack
-    before: float  # share of the torque that acts on the mass before; not 1 at a gear with losses
-    after: float
+    spring_zero: float  # twist at which the spring is slack
+    share_before: float  # share of the torque that acts on the mass before; not 1 at a gear with losses
+    share_after: float
 
 
 class OfSpan:
@@ -223,9 +223,9 @@ class OfSpan:
     speed: float
     twist: float
     torque: float
-    outside: float  # exciting torques
-    held: float  # torque on a mass without that of rigid joints; under the first mass, torque on the body
-    turned: float  # angles with a load curve
+    exciting_torque: float
+    net_torque: float  # on a mass without that of rigid joints; under its first mass, on the body
+    rotation: float  # angle of a mass with a load curve by angle
 
 
 class StartState:
@@ -234,35 +234,35 @@ class StartState:
     t_end: float
     phi: float  # angle of the load
     u: float  # its realised torque
-    ref: float  # the demand after the slew limiter
+    u_ref: float  # the demand after the slew limiter
     demand: float
     demand_slope: float
     slope: float  # of the slew limiter's output in this span
     slew_end: float  # when, in this span, it has come to the demand; inf if it does not
-    follows: float  # 1 where the lag's exponential has died away: u is a line
+    on_line: float  # 1 where the lag's exponential has died away: u is a line
     ask_at: float
     ask_on_gap: float
     sample_angle: float
     sample_time: float
     pending: float  # how many demands wait: for the computing delay, or for the corner of a cut line
-    over: float  # 1 while the last answer lies beyond the torque limits: the line from `over_since` on
-    over_since: float
-    over_torque: float
-    over_slope: float
+    beyond_limits: float  # 1 while the last reply lies beyond the torque limits, on this line:
+    beyond_since: float
+    beyond_torque: float
+    beyond_slope: float
     due_time: float  # when each of them takes effect, and what it is
     due_demand: float
     due_slope: float
-    changed: float  # 1 where what follows from the modes is to be computed again
+    modes_changed: float  # 1 where what follows from the modes is to be computed again
     bodies: float  # 1 where masses move as one
-    fastest: float  # upper bound of the machine's rates in the present modes, 1/s
+    rate_bound: float  # upper bound of the machine's rates in the present modes, 1/s
     tones: float  # how many harmonics the exciting torques have
     tone_rate: float  # and the fastest of them
     curves: float  # how many masses have a load curve
     torque_u: float  # Taylor coefficients of the motor torque and of the load's angle
     angle_u: float
     f: float  # scratch: an event function
-    where: float  # of the event that ends the span: on which shaft or mass, and at which share of the span
-    share: float
+    event_place: float  # shaft or mass of the event that ends the span
+    event_share: float  # and when, as a share of the span
     noted: float  # events that are not yet recorded, how many and which
     note_time: float
     note_kind: float
@@ -302,8 +302,8 @@ class Reply:
 
 
 _WHOLE = (  # numbers that are counted
-    "n at_motor at_load path path_end motor_shaft first stuck rubbing gears points piece passed mode zeros "
-    "where noted"
+    "n at_motor at_load path path_end motor_shaft body stuck friction_count lossy_gears points piece passed "
+    "mode leading_zeros event_place noted"
 )
 
 
@@ -343,6 +343,11 @@ WORK_TYPE: Any = from_dtype(WORK)
 MEASURED_TYPE: Any = from_dtype(MEASURED)
 TONE_TYPE: Any = from_dtype(TONE)
 N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
+# In the work of a start the fields of MassRecord, ShaftRecord, ShaftNotes and EventRow are arrays, one behind
+# the other in the same order; these are the places of the first ones
+AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, AT_EVENTS = (
+    int(WORK.fields[name][1]) // 8 for name in ("lag", "J", "c", "peak", "note_time")
+)
 
 # a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and
 # sign of each shaft

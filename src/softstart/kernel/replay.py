@@ -31,7 +31,7 @@ def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
     span = spans[row]
     s.time = span[S_START]
     s.u = span[S_U]
-    s.ref = span[S_REF]
+    s.u_ref = span[S_REF]
     s.slope = span[S_SLOPE]
     s.phi = span[S_PHI]
     s.braked = span[S_BRAKED]
@@ -49,7 +49,7 @@ def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
         s.mode[k] = int(span[at + 1])
         s.side[k] = span[at + 2]
         s.sign[k] = span[at + 3]
-    s.changed = 1.0
+    s.modes_changed = 1.0
     along_line(s)
     h = span[S_END] - span[S_START]
     n = min(orders(rate_of(s) * h), ORDERS - 2)
@@ -99,8 +99,7 @@ def states_of_each(  # type: ignore[no-untyped-def]
     for r in range(parameters.shape[0]):
         state[:] = 0.0
         begin(work, machine, masses, shafts, curves, tones, until, on_gap)
-        own = parameters[r]
-        reason = run_start(step, own, sees, work, tones, spans, events, measured, state, command)
+        reason = run_start(step, parameters[r], sees, work, tones, spans, events, measured, state, command)
         if reason == BUFFER_FULL:
             return BUFFER_FULL
         row, last = 0, int(s.n_spans) - 1
@@ -138,7 +137,7 @@ def spring_energy(s: Record) -> float:
     total = 0.0
     for k in range(s.n - 1):
         if s.mode[k] == CONTACT or s.mode[k] == DOUBLED or s.mode[k] == JOINED:
-            z = s.theta[k] - s.side[k] * s.half[k]
+            z = s.theta[k] - s.side[k] * s.half_gap[k]
             total += 0.5 * s.c[k] * z * z
     return total
 
@@ -156,7 +155,7 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
     rows = spans.shape[0] - 1
     restore(s, tones, spans, rows)
     stored = spring_energy(s)  # at the end
-    f, g, scratch = s.f, s.held[0], s.held[1]
+    f, g, scratch = s.f, s.net_torque[0], s.net_torque[1]
     after = stored
     elastic = stored
     for row in range(rows - 1, -1, -1):
@@ -169,12 +168,12 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
             for o in range(1, n + 1):
                 turned += speed[o] / (o + 1.0)
             if s.tones != 0.0:
-                into[1] += h * product(s.outside[i], speed, n, scratch)
+                into[1] += h * product(s.exciting_torque[i], speed, n, scratch)
             into[1] += h * s.mean[i] * turned
             into[2] += h * (s.direction[i] * s.Mc[i] + s.active[i]) * turned
             if s.points[i] > 0:
-                course = s.turned[i] if s.by_angle[i] != 0.0 else speed
-                into[2] += h * (s.offset[i] * turned + s.incline[i] * product(course, speed, n, scratch))
+                series = s.rotation[i] if s.by_angle[i] != 0.0 else speed
+                into[2] += h * (s.offset[i] * turned + s.incline[i] * product(series, speed, n, scratch))
             into[3] += h * s.direction[i] * s.friction[i] * turned
             if s.ground[i] != 0.0:
                 into[3] += h * s.ground[i] * product(speed, speed, n, scratch)
@@ -185,12 +184,12 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
             for o in range(n + 1):
                 f[o] = s.torque[k, o] - s.c[k] * s.twist[k, o]
                 g[o] = s.speed[k, o] - s.speed[k + 1, o]
-            f[0] += s.c[k] * s.slack[k]
+            f[0] += s.c[k] * s.spring_zero[k]
             into[4] += h * product(f, g, n, scratch)
-            if s.before[k] != 1.0:
-                into[5] += h * (s.before[k] - 1.0) * product(s.torque[k], s.speed[k], n, scratch)
-            if s.after[k] != 1.0:
-                into[5] += h * (1.0 - s.after[k]) * product(s.torque[k], s.speed[k + 1], n, scratch)
+            if s.share_before[k] != 1.0:
+                into[5] += h * (s.share_before[k] - 1.0) * product(s.torque[k], s.speed[k], n, scratch)
+            if s.share_after[k] != 1.0:
+                into[5] += h * (1.0 - s.share_after[k]) * product(s.torque[k], s.speed[k + 1], n, scratch)
             s.theta[k] = value(s.twist[k], n, 1.0)
         into[4] += spring_energy(s) - after  # of the springs that act in this span, beside the next one
         after = begin
@@ -202,7 +201,7 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
 def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int:
     """A row for each stage: its number, start, end, then largest torque and its instant for each shaft.
 
-    Returns ENDED, or why it cannot be told. Stages that take no time have no row.
+    Returns ENDED, or why it cannot be computed. Stages that take no time have no row.
     """
     s = as_record(work, WORK)
     at = -1
@@ -262,7 +261,7 @@ def torque_settles(
     for i in range(s.n):
         J += s.J[i]
     settled, within, sign = begin, True, 1.0
-    away = s.held[0]
+    away = s.net_torque[0]
     for row in range(spans.shape[0]):
         start, end = spans[row, S_START], spans[row, S_END]
         if end <= begin:
@@ -274,9 +273,9 @@ def torque_settles(
         for o in range(n + 1):
             before, every = 0.0, 0.0
             for i in range(s.n):
-                q = -s.ground[i] * s.speed[i, o] + (s.push[i] if o == 0 else 0.0)
+                q = -s.ground[i] * s.speed[i, o] + (s.constant_torque[i] if o == 0 else 0.0)
                 q += s.torque_u[o] if i == s.at_motor else 0.0
-                q += s.outside[i, o] if s.tones != 0.0 else 0.0
+                q += s.exciting_torque[i, o] if s.tones != 0.0 else 0.0
                 every += q
                 before += q if i <= k else 0.0
             s.f[o] = s.torque[k, o] - (before - share * every)

@@ -81,14 +81,14 @@ def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
                 if i == s.at_motor:
                     total += u
                 if i > 0:
-                    total += s.after[i - 1] * T
+                    total += s.share_after[i - 1] * T
                 T = 0.0
                 if i < joints:
                     v = w - series[joints + i + 1, j, o]
                     T = s.stiff[i] * series[i, j, o] + s.damp[i] * v
                     series[i, j, o + 1] = share * v
-                    total -= s.before[i] * T
-                series[joints + i, j, o + 1] = share * total * s.inverse[i]
+                    total -= s.share_before[i] * T
+                series[joints + i, j, o + 1] = share * total * s.inverse_J[i]
 
 
 @inner
@@ -175,10 +175,10 @@ def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> N
         if jump == 0.0 or v == 0.0:  # flanks that touch, and part or press as a mass breaks away
             continue
         for i in range(k, k + 2):
-            share = jump * (s.after[k] if i > k else -s.before[k]) * s.inverse[i]
+            share = jump * (s.share_after[k] if i > k else -s.share_before[k]) * s.inverse_J[i]
             if span[S_MASSES + OF_MASS * i + 1] == 0.0:  # held before: the blow may break it away
                 share = rates[1, i] / v
-            if s.inverse[i] == 0.0:
+            if s.inverse_J[i] == 0.0:
                 continue
             for q in range(columns):
                 X[joints + i, q] += share * X[k, q]

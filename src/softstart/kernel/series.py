@@ -56,7 +56,7 @@ def set_piece(s: Record, i: int, piece: int) -> None:
     """The straight piece of its load curve on which mass i is: `piece` of the points lie before it."""
     s.piece[i] = piece
     s.incline[i] = 0.0
-    s.changed = 1.0
+    s.modes_changed = 1.0
     last = s.points[i]
     if piece == 0:
         s.offset[i] = s.torque_at[i, 0]
@@ -86,28 +86,28 @@ def find_piece(s: Record, i: int) -> None:
 @inner
 def set_gear(s: Record, k: int) -> None:
     """The share of the torque of shaft k that acts on the masses beside it, in the present directions."""
-    s.before[k] = 1.0
-    s.after[k] = 1.0
+    s.share_before[k] = 1.0
+    s.share_after[k] = 1.0
     if s.eta[k] == 1.0:
         return
     i = k + int(s.gear[k])
-    s.gears[s.first[i]] += 1
+    s.lossy_gears[s.body[i]] += 1
     forward = s.sign[k] * s.direction[i]  # power flows towards the last mass
     if forward == 0.0:
         return
     if i == k:
-        s.before[k] = 1.0 / s.eta[k] if forward > 0.0 else s.eta[k]
+        s.share_before[k] = 1.0 / s.eta[k] if forward > 0.0 else s.eta[k]
     else:
-        s.after[k] = s.eta[k] if forward > 0.0 else 1.0 / s.eta[k]
+        s.share_after[k] = s.eta[k] if forward > 0.0 else 1.0 / s.eta[k]
 
 
 @inner
-def grip(s: Record, i: int, direction: float, o: int) -> float:
+def gear_friction(s: Record, i: int, direction: float, o: int) -> float:
     """The coefficient of order o of the friction of the gears at the body i, were it to move so."""
     total = 0.0
     for k in range(s.n - 1):
         j = k + int(s.gear[k])
-        if s.eta[k] == 1.0 or s.first[j] != i:
+        if s.eta[k] == 1.0 or s.body[j] != i:
             continue
         driven = s.sign[k] * direction if j > k else -s.sign[k] * direction
         share = (1.0 - s.eta[k] if driven > 0.0 else 1.0 / s.eta[k] - 1.0) * s.sign[k]
@@ -125,14 +125,14 @@ def fastest_rate(s: Record) -> float:
     Gershgorin's theorem on the matrix of the shafts, c_k (1/J_a + 1/J_b) with sqrt(c_k c_l)/J beside it, and
     the same of the dampings; of load curves the largest slope over its inertia, whatever its sign.
     """
-    springs, dampers, ground, held = 0.0, 0.0, 0.0, 0.0
+    springs, dampers, ground, incline_rate = 0.0, 0.0, 0.0, 0.0
     before_c, before_d, before_row, before_damping = 0.0, 0.0, 0.0, 0.0
     i = 0
     while i < s.n:
-        shared = s.inverse[i]
+        shared = s.inverse_J[i]
         to_ground, incline = 0.0, 0.0
         j = i
-        while j < s.n and s.first[j] == i:
+        while j < s.n and s.body[j] == i:
             to_ground += s.ground[j]
             if s.points[j] > 0:
                 if s.by_angle[j] != 0.0:
@@ -141,21 +141,21 @@ def fastest_rate(s: Record) -> float:
                     to_ground += abs(s.incline[j])
             j += 1
         ground = max(ground, to_ground * shared)
-        held = max(held, incline * shared)
+        incline_rate = max(incline_rate, incline * shared)
         if j == s.n:
             break
         k = j - 1
-        share = max(s.before[k], s.after[k])
+        share = max(s.share_before[k], s.share_after[k])
         c, d = s.stiff[k] * share, s.damp[k] * share
         coupling = math.sqrt(c * before_c) * shared
         friction = math.sqrt(d * before_d) * shared
         springs = max(springs, before_row + coupling)
         dampers = max(dampers, before_damping + friction)
-        before_row = c * (shared + s.inverse[j]) + coupling
-        before_damping = d * (shared + s.inverse[j]) + friction
+        before_row = c * (shared + s.inverse_J[j]) + coupling
+        before_damping = d * (shared + s.inverse_J[j]) + friction
         before_c, before_d = c, d
         i = j
-    springs = max(springs, before_row) + held
+    springs = max(springs, before_row) + incline_rate
     dampers = max(dampers, before_damping) + ground
     return 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
 
@@ -169,35 +169,35 @@ def apply_modes(s: Record) -> None:
         if i == 0 or (s.mode[i - 1] != WELDED and s.mode[i - 1] != PRESSED):
             first = i
             s.body_J[i] = 0.0
-            s.hold[i] = 0.0
+            s.friction_limit[i] = 0.0
             s.stuck[i] = 0
-            s.rubbing[i] = 0
-            s.gears[i] = 0
+            s.friction_count[i] = 0
+            s.lossy_gears[i] = 0
         else:
             s.bodies = 1.0
-        s.first[i] = first
+        s.body[i] = first
         s.body_J[first] += s.J[i]
-        s.push[i] = s.mean[i] - s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
+        s.constant_torque[i] = s.mean[i] - s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
         if s.points[i] > 0:
-            s.push[i] -= s.offset[i]
-        if s.rubs[i] != 0.0:
-            s.rubbing[first] += 1
-            s.hold[first] += s.Mc[i] + s.friction[i]
+            s.constant_torque[i] -= s.offset[i]
+        if s.has_friction[i] != 0.0:
+            s.friction_count[first] += 1
+            s.friction_limit[first] += s.Mc[i] + s.friction[i]
             if s.direction[i] == 0.0:
                 s.stuck[first] = 1
         if s.braked != 0.0 and i == s.at_motor:
             s.stuck[first] = 1
     for i in range(s.n):
-        first = s.first[i]
-        s.inverse[i] = 0.0 if s.stuck[first] != 0 else 1.0 / s.body_J[first]
+        first = s.body[i]
+        s.inverse_J[i] = 0.0 if s.stuck[first] != 0 else 1.0 / s.body_J[first]
     for k in range(s.n - 1):
         spring = s.mode[k] == CONTACT or s.mode[k] == JOINED
         s.stiff[k] = s.c[k] if spring else (2.0 * s.c[k] if s.mode[k] == DOUBLED else 0.0)
         s.damp[k] = s.d[k] if spring else 0.0
-        s.slack[k] = s.side[k] * s.half[k]
+        s.spring_zero[k] = s.side[k] * s.half_gap[k]
         set_gear(s, k)
-    s.fastest = fastest_rate(s)
-    s.changed = 0.0
+    s.rate_bound = fastest_rate(s)
+    s.modes_changed = 0.0
 
 
 def needed(reach: float) -> int:
@@ -245,10 +245,10 @@ def add_tone(s: Record, tone: Record, h: float, n: int) -> None:
     even = tone.cosine * cos + tone.sine * sin
     odd = (tone.sine * cos - tone.cosine * sin) * turn
     for o in range(0, n + 1, 2):
-        s.outside[i, o] += even
+        s.exciting_torque[i, o] += even
         even *= -turn * turn / ((o + 1.0) * (o + 2.0))
         if o < n:
-            s.outside[i, o + 1] += odd
+            s.exciting_torque[i, o + 1] += odd
             odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
 
 
@@ -257,7 +257,7 @@ def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
     """The coefficients of the exciting torques."""
     for i in range(s.n):
         for o in range(n + 1):
-            s.outside[i, o] = 0.0
+            s.exciting_torque[i, o] = 0.0
     for row in range(tones.shape[0]):
         add_tone(s, as_record(tones[row], TONE), h, n)
 
@@ -267,9 +267,9 @@ def curve_torque(s: Record, i: int, o: int, share: float) -> float:
     """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
     if s.by_angle[i] != 0.0:
         if o == 0:
-            s.turned[i, 0] = s.angle[i]
-        s.turned[i, o + 1] = share * s.speed[i, o]
-        return s.incline[i] * s.turned[i, o]
+            s.rotation[i, 0] = s.angle[i]
+        s.rotation[i, o + 1] = share * s.speed[i, o]
+        return s.incline[i] * s.rotation[i, o]
     return s.incline[i] * s.speed[i, o]
 
 
@@ -283,24 +283,25 @@ def join(s: Record, o: int, share: float) -> None:
     while i < s.n:
         total = 0.0
         end = i
-        while end < s.n and s.first[end] == i:
-            total += s.held[end, o]
+        while end < s.n and s.body[end] == i:
+            total += s.net_torque[end, o]
             end += 1
-        rise = total * s.inverse[i]
+        rise = total * s.inverse_J[i]
         carried = 0.0
         for j in range(i, end):
             s.speed[j, o + 1] = share * rise
-            carried += s.held[j, o] - (total if math.isinf(s.J[j]) else s.J[j] * rise)
+            carried += s.net_torque[j, o] - (total if math.isinf(s.J[j]) else s.J[j] * rise)
             if s.stuck[i] != 0:
-                if s.braked != 0.0 and s.first[s.at_motor] == i:
+                if s.braked != 0.0 and s.body[s.at_motor] == i:
                     carried -= total if j == s.at_motor else 0.0
-                elif s.hold[i] > 0.0:
-                    carried -= total * (s.Mc[j] + s.friction[j]) / s.hold[i] if s.rubs[j] != 0.0 else 0.0
-                elif s.rubs[j] != 0.0:
-                    carried -= total / s.rubbing[i]
+                elif s.friction_limit[i] > 0.0:
+                    if s.has_friction[j] != 0.0:
+                        carried -= total * (s.Mc[j] + s.friction[j]) / s.friction_limit[i]
+                elif s.has_friction[j] != 0.0:
+                    carried -= total / s.friction_count[i]
             if j + 1 < end:
                 s.torque[j, o] = carried
-        s.held[i, o] = total
+        s.net_torque[i, o] = total
         i = end
 
 
@@ -314,27 +315,27 @@ def note_scale(s: Record) -> None:
     while i < s.n:
         scale = 0.0
         if i > 0:
-            scale += s.after[i - 1] * (abs(s.torque[i - 1, 0]) + s.stiff[i - 1] * s.half[i - 1])
+            scale += s.share_after[i - 1] * (abs(s.torque[i - 1, 0]) + s.stiff[i - 1] * s.half_gap[i - 1])
         j = i
         while True:
-            scale += abs(s.push[j]) + abs(s.ground[j] * s.w[j])
+            scale += abs(s.constant_torque[j]) + abs(s.ground[j] * s.w[j])
             if j == s.at_motor:
                 scale += abs(s.torque_u[0])
             if s.tones != 0.0:
-                scale += abs(s.outside[j, 0])
+                scale += abs(s.exciting_torque[j, 0])
             j += 1
-            if j == s.n or s.first[j] != i:
+            if j == s.n or s.body[j] != i:
                 break
         if j < s.n:
-            scale += s.before[j - 1] * (abs(s.torque[j - 1, 0]) + s.stiff[j - 1] * s.half[j - 1])
-        s.scale[i] = scale
+            scale += s.share_before[j - 1] * (abs(s.torque[j - 1, 0]) + s.stiff[j - 1] * s.half_gap[j - 1])
+        s.torque_scale[i] = scale
         i = j
 
 
 @separately_compiled(types.void(WORK_TYPE, types.float64, types.int64))
 def expand(s: Record, h: float, n: int) -> None:
     """All coefficients of the span of length h that begins with the present state and modes."""
-    speed, twist, torque, held = s.speed, s.twist, s.torque, s.held
+    speed, twist, torque, net_torque = s.speed, s.twist, s.torque, s.net_torque
     count, motor, load = s.n, s.at_motor, s.at_load
     forced, curved, bodies = s.tones != 0.0, s.curves != 0.0, s.bodies != 0.0
     expand_torque(s, h, n)
@@ -352,21 +353,21 @@ def expand(s: Record, h: float, n: int) -> None:
             if i == motor:
                 total += s.torque_u[o]
             if o == 0:
-                total += s.push[i]
+                total += s.constant_torque[i]
             if forced:
-                total += s.outside[i, o]
+                total += s.exciting_torque[i, o]
             if curved and s.points[i] > 0:
                 total -= curve_torque(s, i, o, share)
             if i + 1 < count:
                 v = w - speed[i + 1, o]
-                z = twist[i, o] - s.slack[i] if o == 0 else twist[i, o]
+                z = twist[i, o] - s.spring_zero[i] if o == 0 else twist[i, o]
                 T = s.stiff[i] * z + s.damp[i] * v
                 torque[i, o] = T
                 twist[i, o + 1] = share * v
-                total -= s.before[i] * T
-                passed_on = s.after[i] * T
-            held[i, o] = total
-            speed[i, o + 1] = share * s.inverse[i] * total
+                total -= s.share_before[i] * T
+                passed_on = s.share_after[i] * T
+            net_torque[i, o] = total
+            speed[i, o + 1] = share * s.inverse_J[i] * total
         if bodies:
             join(s, o, share)
         s.angle_u[o + 1] = share * speed[load, o]

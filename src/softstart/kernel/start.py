@@ -7,20 +7,19 @@ import math
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import FAINT, next_event, peak_within, rounding_of_twist, deviation_bound, value
-from softstart.kernel.jit import separately_compiled, compiled_as, inner, as_record
+from softstart.kernel.events import FAINT, deviation_bound, next_event, peak_within, rounding_of_twist, value
+from softstart.kernel.jit import as_record, compiled_as, inner, separately_compiled
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
-    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue,
-    note_excess, sample, take_answer,
+    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue, note_excess,
+    sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
-    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT, EVENT_LIMIT, LOWER, MASS, MEASURED, MOST_NOTED, NO_EVENT,
-    NOT_FINITE,
-    NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
-    SHAFT_NOTES, SPANS_PER_EVENT, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U,
-    TONE, TOO_LONG, TOO_STIFF,
-    UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
+    ANSWER, ASK, AT_EVENTS, AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, BEYOND, BUFFER_FULL, CURVE,
+    ENDED, EVENT_LIMIT, LOWER, MEASURED, MOST_MASSES, MOST_NOTED, NOT_FINITE, NOT_LOCATED, NO_EVENT, N_NOTES,
+    OF_MASS, OF_SHAFT, OPEN, PRESSED, SETTLE, SPANS_PER_EVENT, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF,
+    S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG, TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE,
+    Record,
 )  # fmt: skip
 from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, find_piece, orders
 
@@ -28,7 +27,6 @@ _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
 STEP = types.FunctionType(STEP_SIGNATURE)
-FIRST_MACHINE = N_NOTES  # place of the machine's numbers in the work of a start
 
 
 @inner
@@ -38,7 +36,7 @@ def set_machine(
     """Put what is given into the work of a start."""
     s = as_record(work, WORK)
     for j in range(machine.shape[0]):
-        work[FIRST_MACHINE + j] = machine[j]
+        work[AT_MACHINE + j] = machine[j]
     s.n = masses.shape[0]
     s.at_motor = int(s.motor)
     s.at_load = int(s.load)
@@ -46,29 +44,15 @@ def set_machine(
     s.path_end = max(s.at_motor, s.at_load)
     s.motor_shaft = s.at_motor if s.at_load > s.at_motor or s.at_motor == 0 else s.at_motor - 1
     for i in range(s.n):
-        mass = as_record(masses[i], MASS)
-        s.J[i] = mass.J
-        s.ground[i] = mass.ground
-        s.active[i] = mass.active
-        s.mean[i] = mass.mean
-        s.Mc[i] = mass.Mc
-        s.friction[i] = mass.friction
-        s.w0[i] = mass.w0
-        s.rubs[i] = 1.0 if mass.Mc > 0.0 or mass.friction > 0.0 else 0.0
+        for j in range(masses.shape[1]):
+            work[AT_MASSES + MOST_MASSES * j + i] = masses[i, j]
+        s.has_friction[i] = 1.0 if s.Mc[i] > 0.0 or s.friction[i] > 0.0 else 0.0
         s.points[i] = 0
     for k in range(s.n - 1):
-        shaft = as_record(shafts[k], SHAFT)
-        s.c[k] = shaft.c
-        s.d[k] = shaft.d
-        s.half[k] = shaft.half
-        s.rigid[k] = shaft.rigid
-        s.restitution[k] = shaft.restitution
-        s.law[k] = shaft.law
-        s.theta0[k] = shaft.theta0
-        s.eta[k] = shaft.eta
-        s.gear[k] = shaft.gear
-        if shaft.eta != 1.0:
-            s.rubs[k + int(shaft.gear)] = 1.0
+        for j in range(shafts.shape[1]):
+            work[AT_SHAFTS + MOST_MASSES * j + k] = shafts[k, j]
+        if s.eta[k] != 1.0:  # a gear with losses rubs on the mass that it sits at
+            s.has_friction[k + int(s.gear[k])] = 1.0
     s.curves = 0.0
     for row in range(curves.shape[0]):
         curve = as_record(curves[row], CURVE)
@@ -93,7 +77,7 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     for j in range(N_NOTES):
         work[j] = 0.0
     s.pending = 0.0
-    s.over = 0.0
+    s.beyond_limits = 0.0
     s.ask_at = 0.0
     s.ask_on_gap = 1.0 if on_gap else 0.0
     s.demand_slope = 0.0
@@ -114,16 +98,16 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
         s.incline[i] = 0.0
         find_piece(s, i)
     s.phi = 0.0
-    s.u = s.ref = s.demand = s.initial_torque
+    s.u = s.u_ref = s.demand = s.initial_torque
     s.stage = 1.0
-    s.changed = 1.0
+    s.modes_changed = 1.0
     if path_closed(s, -1):  # a start in contact begins with stage 2
         s.stage = 2.0
         s.contacts = 1.0
         s.first_contact = 0.0
         s.impact_speed = 0.0
         for k in range(s.path, s.path_end):
-            if s.half[k] > 0.0:
+            if s.half_gap[k] > 0.0:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
 
 
@@ -132,7 +116,7 @@ def note_span(s: Record, row: Vector) -> None:
     """What is needed to evaluate any instant of this span again, but for its end."""
     row[S_START] = s.time
     row[S_U] = s.u
-    row[S_REF] = s.ref
+    row[S_REF] = s.u_ref
     row[S_SLOPE] = s.slope
     row[S_PHI] = s.phi
     row[S_BRAKED] = s.braked
@@ -158,19 +142,19 @@ def advance_state(s: Record, n: int, x: float, time: float) -> None:
         s.w[i] = value(s.speed[i], n, x)
         if s.points[i] > 0:
             s.passed[i] = 0
-            s.angle[i] = value(s.turned[i], n, x)
+            s.angle[i] = value(s.rotation[i], n, x)
     for k in range(s.n - 1):
-        s.zeros[k] = 0
+        s.leading_zeros[k] = 0
         if s.mode[k] != PRESSED and s.mode[k] != WELDED:
             s.theta[k] = value(s.twist[k], n, x)
     s.phi = value(s.angle_u, n, x)
-    s.u = value(s.torque_u, 1 if s.follows != 0.0 else n, x)
+    s.u = value(s.torque_u, 1 if s.on_line != 0.0 else n, x)
     move_demand(s, time)
     s.time += time
 
 
 @separately_compiled(types.float64(WORK_TYPE, types.int64, types.int64, *[types.float64] * 3))
-def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> float:
+def approach_acceleration(s: Record, k: int, n: int, x: float, h: float, side: float) -> float:
     """The relative acceleration of the masses beside shaft k towards the flank `side`, rad/s^2.
 
     Where it is lost in rounding the flank is reached because of what follows it in the series: it is 0 then.
@@ -186,16 +170,13 @@ def pressing(s: Record, k: int, n: int, x: float, h: float, side: float) -> floa
 
 
 @inner
-def note_events(s: Record, events: Matrix) -> None:
+def note_events(work: Vector, events: Matrix) -> None:
     """Record what has been noted since the last span."""
+    s = as_record(work, WORK)
     if events.shape[0] > 0:
-        for j in range(s.noted):
-            event = as_record(events[int(s.n_events)], EVENT)
-            event.time = s.note_time[j]
-            event.kind = s.note_kind[j]
-            event.place = s.note_place[j]
-            event.value = s.note_value[j]
-            event.impulse = s.note_impulse[j]
+        for i in range(s.noted):
+            for j in range(events.shape[1]):
+                events[int(s.n_events), j] = work[AT_EVENTS + MOST_NOTED * j + i]
             s.n_events += 1.0
     s.noted = 0
 
@@ -211,10 +192,16 @@ def expand_all(s: Record, tones: Matrix, h: float, n: int) -> None:
 @inner
 def rate_of(s: Record) -> float:
     """An upper bound of all rates of the span, 1/s."""
-    if s.changed != 0.0:
+    if s.modes_changed != 0.0:
         apply_modes(s)
-    rate = max(s.fastest, s.tone_rate)
-    return rate if s.follows != 0.0 else max(rate, 1.0 / s.lag)
+    rate = max(s.rate_bound, s.tone_rate)
+    return rate if s.on_line != 0.0 else max(rate, 1.0 / s.lag)
+
+
+@inner
+def last_instant(s: Record) -> float:
+    """When the start ends, or is given up because its target speed is not reached."""
+    return s.time_limit if math.isnan(s.start_time) and s.t_end == math.inf else s.t_end
 
 
 @inner
@@ -224,10 +211,7 @@ def stop_reason(s: Record, spans: Matrix, events: Matrix) -> int:
         return BUFFER_FULL
     if s.n_spans > SPANS_PER_EVENT * s.event_cap:  # recorded or not: each takes time
         return TOO_STIFF
-    stop = s.t_end
-    if math.isnan(s.start_time) and stop == math.inf:
-        stop = s.time_limit
-    if s.time >= stop:
+    if s.time >= last_instant(s):
         note_excess(s)
         s.final_speed = s.w[s.at_load]
         if s.stage == 2.0:
@@ -246,10 +230,7 @@ def stop_reason(s: Record, spans: Matrix, events: Matrix) -> int:
 @inner
 def horizon(s: Record) -> float:
     """The instant up to which nothing changes from outside."""
-    stop = s.t_end
-    if math.isnan(s.start_time) and stop == math.inf:
-        stop = s.time_limit
-    until = min(s.ask_at, stop)
+    until = min(s.ask_at, last_instant(s))
     if s.pending > 0.0:
         until = min(until, s.due_time[0])
     if s.braked != 0.0:
@@ -271,7 +252,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         begin_torque(s)
         if s.braked != 0.0 and s.time >= s.release_at:
             release(s)
-            note_events(s, events)
+            note_events(work, events)
         until = horizon(s)
         h = until - s.time
         cut = s.slew_end < h
@@ -288,7 +269,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         n = orders(rate * h)
         expand_all(s, tones, h, n)
         event = next_event(s, h, n)
-        where, x = s.where, s.share
+        where, x = s.event_place, s.event_share
         if event == UNSOLVED:
             return NOT_LOCATED
         for k in range(s.n - 1):
@@ -313,13 +294,13 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         press = 0.0
         rest = 0.0
         if event in (UPPER, LOWER):
-            press = pressing(s, where, n, x, h, 1.0 if event == UPPER else -1.0)
+            press = approach_acceleration(s, where, n, x, h, 1.0 if event == UPPER else -1.0)
         elif event == SETTLE and s.restitution[where] < 1.0:
             ratio = -s.twist[where, 1] / s.twist[where, 2]
             rest = h * ratio / (1.0 - s.restitution[where])
         if handle(s, event, where, press, rest, h) != 0 and s.ask_on_gap != 0.0:
             s.ask_at = s.time
-        note_events(s, events)
+        note_events(work, events)
         if s.events > s.event_cap:
             return EVENT_LIMIT
 
@@ -327,7 +308,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
 @separately_compiled(types.float64(WORK_TYPE, types.int64))
 def spring_torque(s: Record, k: int) -> float:
     """The torque of a shaft whose spring acts."""
-    return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
+    return float(s.stiff[k] * (s.theta[k] - s.spring_zero[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
 
 @inner
@@ -336,7 +317,7 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
     mode = s.mode[k]
     if mode in (OPEN, BEYOND):
         return 0.0
-    if s.changed != 0.0:
+    if s.modes_changed != 0.0:
         apply_modes(s)
     if mode in (PRESSED, WELDED):
         begin_torque(s)
@@ -386,14 +367,14 @@ def run_start(  # type: ignore[no-untyped-def]
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
     s = as_record(work, WORK)
-    told = as_record(command, ANSWER)
+    reply = as_record(command, ANSWER)
     while True:
         reason = advance(work, tones, spans, events)
         if reason == ASK:
             measure(work, sees, tones, measured)
-            told.slope = 0.0
+            reply.slope = 0.0
             step(parameters, measured, state, command)
-            reason = take_answer(s, told.torque, told.ask_again, told.slope)
+            reason = take_answer(s, reply.torque, reply.ask_again, reply.slope)
         if reason != ASK:
             s.status = reason
             return reason
@@ -421,13 +402,10 @@ def run_many(  # type: ignore[no-untyped-def]
         for j in range(state.shape[0]):
             state[j] = 0.0
         begin(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
-        own = parameters[i if parameters.shape[0] > 1 else 0]
-        run_start(step, own, sees, work, nothing, nothing, nothing, measured, state, command)
+        numbers = parameters[i if parameters.shape[0] > 1 else 0]
+        run_start(step, numbers, sees, work, nothing, nothing, nothing, measured, state, command)
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):
-            shaft = as_record(shaft_notes[i, k], SHAFT_NOTES)
-            shaft.peak = s.peak[k]
-            shaft.peak_time = s.peak_time[k]
-            shaft.impulse = s.impulse[k]
-            shaft.first_peak = s.first_peak[k]
+            for j in range(shaft_notes.shape[2]):
+                shaft_notes[i, k, j] = work[AT_SHAFT_NOTES + MOST_MASSES * j + k]

@@ -27,15 +27,15 @@ from softstart.controller.base import CompiledController, Controller, PlainContr
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import motor as exchange
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.linear.plant import Plant, SampledPlant, contact_plant, plant_scales, sampled
 from softstart.linear.systems import System
 from softstart.start.engine import plain_answer
-from softstart.start.recorded import StartRecorder
-from softstart.start.rows import Rows, kernel_input
+from softstart.start.kernel_input import KernelInput, kernel_input
+from softstart.start.trajectory import StartRecorder
 
 FAR = 1e9  # in target speeds: never reached
-CLOSED = (at.CONTACT, at.JOINED, at.PRESSED, at.WELDED)
+CLOSED = (rec.CONTACT, rec.JOINED, rec.PRESSED, rec.WELDED)
 LONGEST, STIFF = 58.0, 0.02  # elastic periods and time limits after which a start counts as never steady
 MOST_SAMPLES = 20_000
 STEADY = 1e-6  # of M12avg_base: spread of shaft torque and demand over two elastic periods
@@ -79,7 +79,7 @@ class Sample:
     @property
     def plant(self) -> Any:
         """The plant by names, as `softstart.kernel.records` has them."""
-        return self.work.view(at.WORK)[0]
+        return self.work.view(rec.WORK)[0]
 
     def displaced(self, plant: Plant, by: Vector) -> Sample:
         """The sample with the machine moved by a state of `plant`, and the controller not."""
@@ -103,7 +103,7 @@ class SampledStart:
     machine: Any
     controller: Controller
     step: Step
-    rows: Rows
+    rows: KernelInput
     first_state: Vector
     differencing: bool
 
@@ -146,18 +146,18 @@ class SampledStart:
         now, state = recorder.state, self.first_state
         if begin is not None:
             recorder.work[:], state = begin.work, begin.state
-            now.changed, now.t_end = 1.0, until
+            now.modes_changed, now.t_end = 1.0, until
         name = f"{self.machine.name}, controller {label_of(self.controller)}"
-        while (reason := recorder.advance()) != at.ENDED:
-            if reason != at.ASK:
+        while (reason := recorder.advance()) != rec.ENDED:
+            if reason != rec.ASK:
                 raise SimulationError(f"{name}: the start was given up at t = {now.time:.6g} s.")
             work = recorder.work.copy()
             measured, torque = self._measured(recorder)
             demand, ask_again, slope, after = self.step(measured, state)
-            moves = (now.rubs == 0.0) | (now.direction != 0.0)
+            moves = (now.has_friction == 0.0) | (now.direction != 0.0)
             pressing = np.isin(now.mode[: self.rows.count - 1], CLOSED).all() and moves.all()
             yield Sample(bool(pressing), torque, measured, state, demand, ask_again, work)
-            if recorder.answer(demand, ask_again, slope) != at.ASK:
+            if recorder.answer(demand, ask_again, slope) != rec.ASK:
                 raise SimulationError(
                     f"{name}: at t = {now.time:.6g} s the controller's answer was no "
                     f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."

@@ -23,9 +23,9 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.kernel import motor as exchange
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.linear.systems import System
-from softstart.start.rows import Rows, kernel_input
+from softstart.start.kernel_input import KernelInput, kernel_input
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +69,14 @@ def plant_scales(machine: Machine) -> PlantScales:
     base, period = float(machine.mean_torque), float(rows.machine.period)
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
-    c = rows.shafts.view(at.SHAFT)[0, :, 0]["c"]
+    c = rows.shafts.view(rec.SHAFT)[0, :, 0]["c"]
     windup, Omega = base * float((1.0 / c[c > 0.0]).sum()), 2.0 * math.pi / period
     return PlantScales(base, windup, Omega, period, Omega * windup)
 
 
-def _motor_side(rows: Rows) -> slice:
+def _motor_side(rows: KernelInput) -> slice:
     """The masses that turn with the motor while all gaps are open."""
-    half = rows.shafts.view(at.SHAFT)[0, :, 0]["half"]
+    half = rows.shafts.view(rec.SHAFT)[0, :, 0]["half_gap"]
     motor, open_ = int(rows.machine.motor), np.flatnonzero(half)
     first = max((int(k) + 1 for k in open_ if k < motor), default=0)
     return slice(first, min((int(k) + 1 for k in open_ if k >= motor), default=rows.count))
@@ -94,8 +94,8 @@ def contact_plant(
     given = kernel_input(at_one_position(machine))
     kept = _motor_side(given) if gaps_open else slice(0, given.count)
     motor, load = int(given.machine.motor) - kept.start, int(given.machine.load) - kept.start
-    mass = given.masses.view(at.MASS)[0, kept, 0]
-    shaft = given.shafts.view(at.SHAFT)[0, kept.start : kept.stop - 1, 0]
+    mass = given.masses.view(rec.MASS)[0, kept, 0]
+    shaft = given.shafts.view(rec.SHAFT)[0, kept.start : kept.stop - 1, 0]
     rigid = shaft["rigid"] != 0.0
     if rigid[max(motor - 1, 0) : motor + 1].any():
         raise InputError(
@@ -120,7 +120,7 @@ def contact_plant(
     torque = -mass["ground"][:, None] * w  # on each mass
     torque[:-1] -= np.where(behind, 1.0, passed_on) * T
     torque[1:] += np.where(behind, passed_on, 1.0) * T
-    for curve in given.curves[0].view(at.CURVE)[:, 0]:
+    for curve in given.curves[0].view(rec.CURVE)[:, 0]:
         i = int(curve.mass) - kept.start
         if inclines is not None and 0 <= i < body.size:
             torque[i] -= inclines[int(curve.mass)] * (angle[i] if curve.by_angle else w[i])

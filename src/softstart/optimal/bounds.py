@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from softstart.drive import Drive
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal.contact_motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import (
@@ -166,7 +166,7 @@ def _of_chain(problem: Problem, machine: Any) -> float | str:
     load = int(rows.machine.load)
     if load == rows.machine.motor or (shafts["eta"] != 1.0).any():
         return "no bound is known where the motor or a gear with losses adds to T"
-    if rows.curves.size and (rows.curves.view(at.CURVE)["mass"] == load).any():
+    if rows.curves.size and (rows.curves.view(rec.CURVE)["mass"] == load).any():
         return "no bound is known where the load torque follows a curve"
     one = masses[load]
     J, taken, w0 = float(one["J"]), float(one["Mc"] + one["active"]), float(one["w0"])
@@ -220,14 +220,14 @@ def _first_pull(problem: Problem, machine: Any) -> float:
     last, record = masses.size - 1, rows.machine
     alone = record.motor == 0.0 and record.load == last and last > 1
     quiet = not masses["w0"].any() and not (masses["Mc"] + masses["active"])[:last].any()
-    quiet = quiet and not masses["friction"].any() and (np.abs(shafts["theta0"]) <= shafts["half"]).all()
+    quiet = quiet and not masses["friction"].any() and (np.abs(shafts["theta0"]) <= shafts["half_gap"]).all()
     plain = not rows.curves.size and (shafts["eta"] == 1.0).all() and np.isfinite(masses["J"]).all()
     if not (alone and quiet and plain):
         return 0.0
     U, falls = _largest(problem), float(masses["active"][last])
     J1, Jb, JL = (float(masses["J"][i]) for i in (0, last - 1, last))
-    reach = float(shafts["half"][-1] - shafts["theta0"][-1])
-    t1 = math.sqrt(2.0 * float(shafts["half"][0] - abs(shafts["theta0"][0])) * J1 / U)
+    reach = float(shafts["half_gap"][-1] - shafts["theta0"][-1])
+    t1 = math.sqrt(2.0 * float(shafts["half_gap"][0] - abs(shafts["theta0"][0])) * J1 / U)
     fallen = 0.5 * falls / JL * t1 * t1
     if fallen >= reach:
         return math.sqrt(2.0 * reach * JL / falls) if falls > 0.0 else 0.0

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive.machine import Machine
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, OptimumError, largest_heat
 from softstart.optimal.starts import DemandRun, steady_shaft_torques, wanted
@@ -72,9 +72,9 @@ def check(
 
 def _realised(problem: Problem, run: Run) -> Iterator[str]:
     """In each span lag u' = ref + slope s - u: u is extreme at its ends or where u' = 0."""
-    lag = float(run.recorded.rows.machine.lag)
-    columns = (at.S_START, at.S_END, at.S_U, at.S_REF, at.S_SLOPE)
-    start, end, first, ref, ub = (run.recorded.spans[:, column] for column in columns)
+    lag = float(run.trajectory.input.machine.lag)
+    columns = (rec.S_START, rec.S_END, rec.S_U, rec.S_REF, rec.S_SLOPE)
+    start, end, first, ref, ub = (run.trajectory.spans[:, column] for column in columns)
     length, ua = end - start, ref - lag * ub  # u(s) = ua + ub s + ue exp(-s/lag)
     ue = first - ua
     turns = np.zeros_like(length)
@@ -112,8 +112,8 @@ def torque_allowed(problem: Problem, w1: ArrayLike) -> Vector:
 def _torque_speed(problem: Problem, profile: TorqueProfile, run: Run) -> Iterator[str]:
     if not problem.torque_speed:
         return
-    times = DemandRun(profile, run.recorded).instants(run.elastic_period / 64)
-    state = run.recorded.at(times)
+    times = DemandRun(profile, run.trajectory).instants(run.elastic_period / 64)
+    state = run.trajectory.at(times)
     over = state["u"] - torque_allowed(problem, state["w"][:, run.drive.motor_index])
     i = int(np.argmax(over))
     if over[i] > BEYOND * problem.highest_torque:
@@ -126,12 +126,12 @@ def _terminal(problem: Problem, run: Run, end: float) -> Iterator[str]:
         if not run.start_time <= end * (1.0 + ROUNDING):
             yield f"The load reaches its target speed after {run.start_time:.9g} s, not within {end:.9g} s."
         return
-    state, target = run.recorded.at([end]), problem.target
+    state, target = run.trajectory.at([end]), problem.target
     off = float(np.abs(state["w"][0] / target - 1.0).max())
     if off > 1e-6:
         yield f"The speeds at {end:.6g} s are off their target of {target:.9g} rad/s by a share of {off:.3g}."
     if problem.terminal == "steady":
-        aim = wanted(steady_shaft_torques(run.recorded.rows), problem.base_torque, run.drive.motor_index)
+        aim = wanted(steady_shaft_torques(run.trajectory.input), problem.base_torque, run.drive.motor_index)
         off = float(np.abs(state["T"][0] - aim).max())
         if off > SAME * problem.base_torque:
             yield f"The shaft torques at {end:.6g} s are off the load torques behind them by {off:.6g} N m."

@@ -197,7 +197,7 @@ class Descent:
         heat = 0.0
         if problem.minimise == "heat" or problem.heat is not None:
             times, weights = starts[0].quadrature(end)
-            u = starts[0].recorded.at(times)["u"] / problem.starting_torque
+            u = starts[0].trajectory.at(times)["u"] / problem.starting_torque
             heat = float(weights @ (u * u))
         objective = (peak if problem.minimise == "k_dyn" else heat) / self.scale
         objective += self._roughness(torques)
@@ -221,7 +221,7 @@ class Descent:
         )
 
     def _missing(self, player: DemandSimulator, start: DemandRun, end: float) -> Vector:
-        state = start.recorded.at([end])
+        state = start.trajectory.at([end])
         lacking: Vector = 1.0 - state["w"][0] / player.target
         if self.problem.terminal == "reached":
             return lacking[[player.load]]
@@ -235,7 +235,7 @@ class Descent:
     def _beyond(self, player: DemandSimulator, start: DemandRun) -> float:
         """By how much the realised torque exceeds the curve at worst, as a share of the highest torque."""
         times = start.instants(self.curve_step)
-        state = start.recorded.at(times)
+        state = start.trajectory.at(times)
         return max(float(self.above(state["u"], state["w"][:, player.motor]).max()), 0.0)
 
     def above(self, u: Vector, w: Vector) -> Vector:
@@ -403,7 +403,7 @@ def terminal_rows(search: Descent, found: Candidate) -> tuple[Matrix, Vector]:
     for player, start, end in zip(search.players, found.starts, found.ends, strict=True):
         answer = start.state_by_demand([end])[0]
         joints, beside = player.joints, 1e-5 * player.period
-        at = start.recorded.at([end - beside, end, end + beside])
+        at = start.trajectory.at([end - beside, end, end + beside])
         w = answer[joints:-1] / player.target
         rate = (at["w"][2] - at["w"][0]) / (2.0 * beside * player.target)
         if search.problem.terminal == "reached":
@@ -549,11 +549,11 @@ class Model:
         shafts, curve = [], []
         for player, start in zip(search.players, found.starts, strict=True):
             times = start.with_peaks(start.instants(search.step))
-            state = start.recorded.at(times)
+            state = start.trajectory.at(times)
             shafts.append(_of_shafts(search, start, times, state["T"]))
             if problem.torque_speed:
                 times = start.instants(search.curve_step)
-                state = start.recorded.at(times)
+                state = start.trajectory.at(times)
                 w = state["w"][:, player.motor]
                 near = np.flatnonzero(search.above(state["u"], w) > -CLOSE)
                 by = start.state_by_demand(times[near])
@@ -567,8 +567,8 @@ class Model:
             times, weights = found.starts[0].quadrature(found.end)
             share = np.sqrt(weights) / problem.starting_torque
             by = found.starts[0].state_by_demand(times)[:, -1] * (share * search.high)[:, None]
-            u = found.starts[0].recorded.at(times)["u"] * share
-            last = float(found.starts[0].recorded.at([found.end])["u"][0]) / problem.starting_torque
+            u = found.starts[0].trajectory.at(times)["u"] * share
+            last = float(found.starts[0].trajectory.at([found.end])["u"][0]) / problem.starting_torque
             cost = 1.0 / search.scale if problem.minimise == "heat" else 0.0
             squares.append(Square(by, u, last * last * found.end, cost, problem.heat))
         if problem.smoothness > 0.0:

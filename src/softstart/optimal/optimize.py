@@ -15,7 +15,7 @@ from softstart.drive import Limits
 from softstart.drive.limits import Limit
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
 from softstart.optimal.check import check, replayed
@@ -34,8 +34,8 @@ from softstart.optimal.result import (
 from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve, rigid_start_time
 from softstart.parallel import on_one_thread
 from softstart.profile import TorqueProfile
+from softstart.start.kernel_input import kernel_input
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
-from softstart.start.rows import kernel_input
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -326,7 +326,7 @@ def _easier(problem: Problem) -> Iterator[Problem]:
     From strategies an undamped chain comes to poor local optima, and one torque for several machines often.
     """
     assert problem.start_time is not None
-    shafts = kernel_input(problem.machines[0]).shafts[0].view(at.SHAFT)[:, 0]
+    shafts = kernel_input(problem.machines[0]).shafts[0].view(rec.SHAFT)[:, 0]
     if len(problem.machines) > 1:
         for share in RUNGS:
             shorter = replace(problem, start_time=share * problem.start_time)

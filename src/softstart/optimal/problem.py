@@ -300,7 +300,7 @@ class Problem:
 def _rows(machine: Any) -> tuple[Any, Any]:
     """The machine as rows of the kernel, and its masses by names."""
     from softstart.kernel.records import MASS
-    from softstart.start.rows import kernel_input
+    from softstart.start.kernel_input import kernel_input
 
     given = kernel_input(machine)
     return given, given.masses[0].view(MASS)[:, 0]

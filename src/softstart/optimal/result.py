@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.results import Result
@@ -25,11 +25,11 @@ BINDING = 1e-3  # a limit is what forbids a quicker start if less than this shar
 def heat_of(run: Run, until: float) -> float:
     """I2t heat in s: the integral of (u/Ms)^2 of the realised torque from 0 to `until`, exact."""
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    start, end = np.minimum(run.recorded.spans[:, [at.S_START, at.S_END]].T, until)
+    start, end = np.minimum(run.trajectory.spans[:, [rec.S_START, rec.S_END]].T, until)
     half = 0.5 * (end - start)
     times = start[:, None] + half[:, None] * (nodes + 1.0)
     index = np.repeat(np.arange(half.size), nodes.size)
-    u = run.recorded.at(times.ravel(), index)["u"].reshape(times.shape)
+    u = run.trajectory.at(times.ravel(), index)["u"].reshape(times.shape)
     return float(half @ (u * u @ weights)) / float(run.drive.motor.starting_torque) ** 2
 
 

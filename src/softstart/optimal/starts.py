@@ -13,11 +13,11 @@ from scipy.interpolate import make_interp_spline
 from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.drive.machine import Machine
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.profile import TorqueProfile
 from softstart.start.engine import ended, run_one
-from softstart.start.recorded import StartRecorder, Trajectory
-from softstart.start.rows import MAX_EVENTS, Rows, kernel_input
+from softstart.start.kernel_input import MAX_EVENTS, KernelInput, kernel_input
+from softstart.start.trajectory import StartRecorder, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,24 +25,24 @@ class DemandRun:
     """A start under a demand, from 0 to its end."""
 
     profile: TorqueProfile
-    recorded: Trajectory
+    trajectory: Trajectory
 
     @property
     def peak(self) -> float:
         """Largest |T| of all shafts, N m, located."""
-        return float(np.abs(self.recorded.shafts["peak"]).max())
+        return float(np.abs(self.trajectory.shafts["peak"]).max())
 
     def reached(self, target: float, latest: float, load: int) -> float:
         """When the load first has its target speed, s; if not until `latest`, when it comes nearest to it."""
-        time = float(self.recorded.notes["start_time"])
+        time = float(self.trajectory.notes["start_time"])
         if time <= latest:
             return time
         times = np.linspace(0.5 * latest, latest, 257)
-        return float(times[np.argmax(self.recorded.at(times)["w"][:, load])])
+        return float(times[np.argmax(self.trajectory.at(times)["w"][:, load])])
 
     def instants(self, step: float) -> Vector:
         """Both sides of every joint of spans and instants in between, no further apart than `step`, s."""
-        start, end = self.recorded.spans[:, [at.S_START, at.S_END]].T
+        start, end = self.trajectory.spans[:, [rec.S_START, rec.S_END]].T
         count = np.cumsum(np.append(0.0, np.ceil((end - start) / step).clip(1.0)))
         inside = np.interp(np.arange(count[-1]), count, np.append(start, end[-1]))
         before = end - 1e-9 * (end - start)  # a step of the torque has two sides
@@ -50,7 +50,7 @@ class DemandRun:
 
     def with_peaks(self, times: Vector) -> Vector:
         """Rising instants, and between them where |T| of a shaft has a maximum: exactly the largest one."""
-        T = np.abs(self.recorded.at(times)["T"])
+        T = np.abs(self.trajectory.at(times)["T"])
         left, here, right = T[:-2], T[1:-1], T[2:]
         j, k = np.nonzero((here >= left) & (here >= right) & (here > 0.0))
         a, b = times[j + 1] - times[j], times[j + 2] - times[j + 1]
@@ -59,11 +59,11 @@ class DemandRun:
         inside = curved > 0.0
         shift = 0.5 * (rise * b * b - fall * a * a)[inside] / curved[inside]  # vertex of the parabola
         vertices = times[j + 1][inside] + shift
-        return np.unique(np.concatenate([times, vertices, self.recorded.shafts["peak_time"]]))
+        return np.unique(np.concatenate([times, vertices, self.trajectory.shafts["peak_time"]]))
 
     def quadrature(self, until: float) -> tuple[Vector, Vector]:
         """Instants and weights, s, of an integral over the start up to `until`: Gauss in each span."""
-        start, end = np.minimum(self.recorded.spans[:, [at.S_START, at.S_END]].T, until)
+        start, end = np.minimum(self.trajectory.spans[:, [rec.S_START, rec.S_END]].T, until)
         nodes, weights = np.polynomial.legendre.leggauss(5)
         half = 0.5 * (end - start)[:, None]
         inside = half[:, 0] > 0.0
@@ -72,7 +72,7 @@ class DemandRun:
 
     def torques_by_demand(self, times: ArrayLike) -> NDArray[np.float64]:
         """dT_k(times[j])/du_q as [j, k, q], in N m/(N m)."""
-        return self.recorded.sensitivities(self.profile.time, times)[0]
+        return self.trajectory.sensitivities(self.profile.time, times)[0]
 
     def along_contacts(self, times: Vector) -> tuple[Matrix, Matrix]:
         """How instants move that keep their place between the contacts, and dT_k/dt there.
@@ -80,13 +80,13 @@ class DemandRun:
         A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/du = -(dtheta_k/du)/theta_k'; in
         between the shift is interpolated, and it is none at both ends. Shapes (j, q) in s/(N m) and (j, k).
         """
-        recorded = self.recorded
-        events = recorded.events[recorded.events["kind"] == at.CLOSED]
+        trajectory = self.trajectory
+        events = trajectory.events[trajectory.events["kind"] == rec.CLOSED]
         events = events[(events["time"] > 0.0) & (events["time"] < times[-1])]
         moved = np.zeros((times.size, self.profile.time.size))
         if events.size:
             shafts = events["place"].astype(int)
-            when = recorded.at(events["time"])["w"]
+            when = trajectory.at(events["time"])["w"]
             v = when[np.arange(shafts.size), shafts] - when[np.arange(shafts.size), shafts + 1]
             hard = np.abs(v) > 1e-4 * float(np.abs(when).max())  # a softer contact moves too far
             begin, shafts, v = np.ascontiguousarray(events["time"][hard]), shafts[hard], v[hard]
@@ -94,14 +94,14 @@ class DemandRun:
             begin, kept = np.unique(begin, return_index=True)
             none, knots = np.zeros((1, moved.shape[1])), np.concatenate([[0.0], begin, [times[-1]]])
             moved = make_interp_spline(knots, np.concatenate([none, shift[kept], none]), k=1)(times)
-        inside = recorded.index(times)
+        inside = trajectory.index(times)
         step = 1e-6 * float(self.profile.time[-1])
-        after, before = (recorded.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
+        after, before = (trajectory.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
         return moved, (after - before) / (2.0 * step)
 
     def state_by_demand(self, marks: ArrayLike) -> NDArray[np.float64]:
         """Of twists, speeds and realised torque at rising marks: the derivatives as [j, part, q]."""
-        return self.recorded.sensitivities(self.profile.time, (), marks)[1]
+        return self.trajectory.sensitivities(self.profile.time, (), marks)[1]
 
 
 class DemandSimulator:
@@ -155,20 +155,20 @@ class DemandSimulator:
         return found
 
 
-def parts(machine: Machine) -> tuple[Rows, Any, Any]:
+def parts(machine: Machine) -> tuple[KernelInput, Any, Any]:
     """A machine as rows of the kernel, and its masses and shafts by names."""
     rows = kernel_input(machine)
-    return rows, rows.masses[0].view(at.MASS)[:, 0], rows.shafts[0].view(at.SHAFT)[:, 0]
+    return rows, rows.masses[0].view(rec.MASS)[:, 0], rows.shafts[0].view(rec.SHAFT)[:, 0]
 
 
-def steady_shaft_torques(rows: Rows) -> Vector:
+def steady_shaft_torques(rows: KernelInput) -> Vector:
     """The torques of the shafts of a machine while all masses turn at its target speed, N m.
 
     >>> from softstart import Drive
     >>> steady_shaft_torques(kernel_input(Drive.load("crane-4amtkf"))).tolist()
     [7.16]
     """
-    masses, motor = rows.masses[0].view(at.MASS)[:, 0], int(rows.machine.motor)
+    masses, motor = rows.masses[0].view(rec.MASS)[:, 0], int(rows.machine.motor)
     steady: Vector = masses["Mc"] + masses["active"] + masses["mean"]
     loads = steady + masses["friction"] + masses["ground"] * float(rows.machine.target)
     behind = np.cumsum(loads[::-1])[::-1][1:]

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import NotConverged
 from softstart.optimal.starts import parts, steady_shaft_torques
@@ -161,16 +161,18 @@ def phases_of(problem: Problem, run: Run) -> list[ContactPhase]:
         raise InputError(
             f"run: it ends at {run.end_time:.6g} s; give one to an elastic period after the start time."
         )
-    recorded, phases = run.recorded, list[ContactPhase]()
-    times, modes = recorded.spans[:, [at.S_START, at.S_END]], recorded.of_shafts(1)[:-1]
-    sides = np.where(modes == at.CONTACT, recorded.of_shafts(2)[:-1], 2.0 * (modes == at.JOINED)).astype(int)
-    moving, braked = recorded.of_masses(1)[:-1].astype(int), recorded.spans[:, at.S_BRAKED] != 0.0
+    trajectory, phases = run.trajectory, list[ContactPhase]()
+    times, modes = trajectory.spans[:, [rec.S_START, rec.S_END]], trajectory.of_shafts("mode")[:-1]
+    flanks, joined = trajectory.of_shafts("side")[:-1], 2.0 * (modes == rec.JOINED)
+    sides = np.where(modes == rec.CONTACT, flanks, joined).astype(int)
+    moving = trajectory.of_masses("direction")[:-1].astype(int)
+    braked = trajectory.spans[:, rec.S_BRAKED] != 0.0
     kinds = list(zip(map(tuple, sides.tolist()), map(tuple, moving.tolist()), braked.tolist(), strict=True))
     for begin, end in ((0.0, t_f), (t_f, t_f + run.elastic_period)):
         lasting = np.flatnonzero(np.diff(times.clip(begin, end))[:, 0] > LEAST * end).tolist()
         for kind, group in groupby(lasting, key=kinds.__getitem__):
             spans = list(group)
-            reached, is_open = phases[-1].end if phases else 0.0, modes[spans] == at.OPEN
+            reached, is_open = phases[-1].end if phases else 0.0, modes[spans] == rec.OPEN
             until = min(float(times[spans[-1], 1]), end)
             phases.append(ContactPhase(reached, until, *kind, is_open.all(axis=0), is_open[-1]))
         phases[-1] = replace(phases[-1], end=end, last=end == t_f)
@@ -185,7 +187,7 @@ class _Machine:
         given = rows.machine
         self.J, self.ground, self.load_torque = mass["J"], mass["ground"], mass["active"] + mass["mean"]
         self.hold = mass["Mc"] + mass["friction"]
-        self.c, self.d, self.half, self.law = shaft["c"], shaft["d"], shaft["half"], shaft["law"]
+        self.c, self.d, self.half, self.law = shaft["c"], shaft["d"], shaft["half_gap"], shaft["law"]
         self.motor, self.load, self.Ms = int(given.motor), int(given.load), problem.starting_torque
         self.lag, self.rate, self.release_at = float(given.lag), float(given.rate), float(given.release_at)
         self.first_torque = [float(given.initial_torque)]
@@ -196,7 +198,7 @@ class _Machine:
             "efficiency: no gears with losses": (shaft["eta"] != 1.0).any(),
             "stiffness: no rigid shafts": shaft["rigid"].any(),
             "curve_torque: no load curves": rows.curves.size > 0,
-            "contact_law = modelica: no-pull and dead-zone": (self.d[self.law == at.MODELICA] > 0.0).any(),
+            "contact_law = modelica: no-pull and dead-zone": (self.d[self.law == rec.MODELICA] > 0.0).any(),
         }
 
     def split(self, x: SX, u: SX) -> tuple[SX, SX, SX]:
@@ -351,7 +353,7 @@ class _Program:
             inner = slice(points if side == next_side else points - 1)
             if side:
                 pressed = np.sign(side) * T[k, inner]
-                pulls = abs(side) == 2 or machine.law[k] == at.DEAD_ZONE
+                pulls = abs(side) == 2 or machine.law[k] == rec.DEAD_ZONE
                 self.between(-math.inf, pressed - self.peak, 0.0)
                 self.between(0.0, pressed + self.peak if pulls else pressed, math.inf)
                 if abs(side) == 1 and pulls:
@@ -378,7 +380,8 @@ class _Program:
             self.between(0.0, push[machine.motor] if math.isinf(machine.release_at) else late, 0.0)
         for k, (side, next_side) in enumerate(zip(phase.pressing, then.pressing, strict=True)):
             T = machine.torques(then if next_side else phase, x)[k] / base
-            if side != next_side and (machine.law[k] == at.DEAD_ZONE or (next_side and phase.open_at_end[k])):
+            closes = next_side and phase.open_at_end[k]
+            if side != next_side and (machine.law[k] == rec.DEAD_ZONE or closes):
                 self.between(0.0, (x[k] - (side or next_side) * machine.half[k]) * machine.c[k] / base, 0.0)
             elif side != next_side:
                 self.between(0.0, T, 0.0)
@@ -434,7 +437,7 @@ class _Program:
 
     def from_run(self, run: Run, straight: bool) -> CasadiProblem:
         """The program on elements of equal length in each phase, from the states and demands of a run."""
-        machine, spans, mesh, guesses = self.machine, run.recorded.spans, [], []
+        machine, spans, mesh, guesses = self.machine, run.trajectory.spans, [], []
         stiffness = machine.c * (1.0 / machine.J[:-1] + 1.0 / machine.J[1:])
         for phase in self.phases:
             fastest = math.sqrt(stiffness[np.array(phase.pressing) != 0].max(initial=0.0))
@@ -442,10 +445,10 @@ class _Program:
             count = math.ceil(phase.length * max(fastest / 3.0, 16.0 / self.period))
             edges = np.linspace(0.0, 1.0, 1 + max(2, count))
             inside = phase.begin + phase.length * edges.clip(LEAST, 1.0 - LEAST)
-            span = spans[run.recorded.index(inside)]
-            demands = span[:, at.S_REF] + span[:, at.S_SLOPE] * (inside - span[:, at.S_START])
+            span = spans[run.trajectory.index(inside)]
+            demands = span[:, rec.S_REF] + span[:, rec.S_SLOPE] * (inside - span[:, rec.S_START])
             shares = np.array([0.0, 1.0]) if straight else self.shares(edges)
-            values = run.recorded.at(phase.begin + phase.length * shares)
+            values = run.trajectory.at(phase.begin + phase.length * shares)
             states = [values["twist"], values["w"], *[values["u"][:, None]] * bool(machine.lag)]
             demands = np.full(edges.size, demands.mean()) if straight else demands
             guesses.append(PhaseTable(phase.length, shares, np.concatenate(states, axis=1), edges, demands))

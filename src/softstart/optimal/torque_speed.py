@@ -20,7 +20,7 @@ from softstart.arrays import Vector
 from softstart.kernel.records import CURVE, MASS
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Infeasibility, InfeasibleError
-from softstart.start.rows import kernel_input
+from softstart.start.kernel_input import kernel_input
 
 Corners = tuple[tuple[float, float], ...]
 

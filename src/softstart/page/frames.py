@@ -164,9 +164,9 @@ class FrameBuilder:
         """The values with which the selected strategy starts; marks at its defaults and at tuned values."""
         session, inputs, units = self.session, self.session.inputs, self.session.inputs.units
         controller = inputs.controllers[inputs.selected]
-        told = None if result.run is None else result.run.told
+        fitted = None if result.run is None else result.run.design_drive
         try:
-            default = controller.defaults(inputs.machine.design_drive if told is None else told)
+            default = controller.defaults(inputs.machine.design_drive if fitted is None else fitted)
         except Exception as error:  # as in `follow`
             sentence_of(error)
             return {}
@@ -487,8 +487,8 @@ def stages_of(run: Run, shaft: int) -> list[tuple[float, float, int]]:
 
     Each has a start and an end in s, and the flank that is touched: 0 while the gap is open.
     """
-    spans = run.recorded.spans
-    mode, side = run.recorded.of_shafts(1)[:-1, shaft], run.recorded.of_shafts(2)[:-1, shaft]
+    spans = run.trajectory.spans
+    mode, side = run.trajectory.of_shafts("mode")[:-1, shaft], run.trajectory.of_shafts("side")[:-1, shaft]
     touched = np.where(np.isin(mode, (rec.OPEN, rec.BEYOND)), 0, np.where(side < 0.0, -1, 1))
     first = np.flatnonzero(np.diff(touched, prepend=2))[:MOST_STAGES]
     begins = spans[first, rec.S_START]
@@ -535,8 +535,8 @@ def landmarks(run: Run) -> Vector:
     """Instants that are never thinned away: events and the instants just before, peaks of all stages, the
     peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
     """
-    events, joints = run.recorded.events["time"], run.recorded.spans[:, rec.S_START]
-    peaks = [*run.recorded.shafts["peak_time"], *(stage.peak_time for stage in run.stages)]
+    events, joints = run.trajectory.events["time"], run.trajectory.spans[:, rec.S_START]
+    peaks = [*run.trajectory.shafts["peak_time"], *(stage.peak_time for stage in run.stages)]
     if joints.size > JUMPS:
         joints = joints[:0]
     sudden = np.concatenate([events, joints])

@@ -126,7 +126,7 @@ def start_figure(run: Run) -> Any:
 
 
 def _peak(run: Run) -> float:
-    return float(run.recorded.shafts["peak"][run.worst_shaft])
+    return float(run.trajectory.shafts["peak"][run.worst_shaft])
 
 
 def before_after_figure(rows: Sequence[Row]) -> Any:

@@ -1,4 +1,4 @@
-"""The kernel driven from Python: scratch, growing records, compiled and plain controllers."""
+"""One start under a compiled or a plain controller, from one control instant to the next."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 import traceback
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -19,65 +19,54 @@ from softstart.controller.base import (
     Measured,
     PlainController,
     Sensor,
+    label_of,
 )
 from softstart.errors import InputError, SimulationError
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.kernel.motor import M_TIME, NEW_STATE
-from softstart.start.recorded import StartRecorder
+from softstart.quantities import number_in, show
 from softstart.start.status import Status, status_of
+from softstart.start.trajectory import StartRecorder
 
 SILENCE = 60.0  # s after which a controller that has not returned is named
-_watched: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
-_busy = threading.Event()  # the watcher looks as long as it is set
-_watchers: list[threading.Thread] = []  # one at most: it sleeps, and does not end
+_computing: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
+_watchers = [threading.Thread()]  # one, which looks at them as long as the process lives; not yet started
 _starting = threading.Lock()
 
 
 class watched:  # noqa: N801  a context manager, used like a function
-    """Name on stderr, once, a controller that has not returned for `SILENCE`; nothing is stopped."""
+    """Name on stderr, once, a controller that has not returned for `SILENCE`; nothing is stopped.
+
+    A thread does it: the main one may be in the compiled step itself, which hears no signal.
+    """
 
     __slots__ = ("name",)
 
     def __init__(self, controller: Controller) -> None:
-        self.name = controller.name or type(controller).__name__
+        self.name = label_of(controller)
 
     def __enter__(self) -> None:
-        _watched[threading.get_ident()] = time.monotonic(), self.name
-        if not (_busy.is_set() and _watchers[0].is_alive()):  # in a forked process it is not
-            _wake()
+        _computing[threading.get_ident()] = time.monotonic(), self.name
+        if not _watchers[0].is_alive():  # at the first time, and in a forked process
+            with _starting:
+                if not _watchers[0].is_alive():
+                    _watchers[0] = threading.Thread(target=_watch, name="softstart-watch", daemon=True)
+                    _watchers[0].start()
 
     def __exit__(self, *_: object) -> None:
-        _watched.pop(threading.get_ident(), None)
-
-
-def _wake() -> None:
-    """Let the watcher look, which is started at the first time."""
-    with _starting:
-        if not (_watchers and _watchers[0].is_alive()):
-            _watchers[:] = [threading.Thread(target=_watch, name="softstart-watch", daemon=True)]
-            _watchers[0].start()
-        _busy.set()
+        _computing.pop(threading.get_ident(), None)
 
 
 def _watch() -> None:
-    """Look at the controllers that compute, while there are any."""
+    """Look at the controllers that compute."""
     named: set[tuple[float, str]] = set()
     while True:
-        _busy.wait()
         time.sleep(0.1 if SILENCE < 1.0 else 0.5)
-        # in this order: who begins meanwhile is seen here, or sees that it is cleared
-        _busy.clear()
-        if _watched:
-            _busy.set()
-        for began, name in set(_watched.values()) - named:
+        for began, name in set(_computing.values()) - named:
             if time.monotonic() - began >= SILENCE:
                 named.add((began, name))
-                print(
-                    f"The controller {name} has not returned for {SILENCE:g} s: its step may not end. "
-                    "It goes on; Ctrl-C ends the command.",
-                    file=sys.stderr,
-                    flush=True,
-                )
+                sentence = f"Controller {name} has been in step() for {SILENCE:g} s. Press Ctrl-C to abort."
+                print(sentence, file=sys.stderr, flush=True)
 
 
 def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, until: float | None) -> int:
@@ -85,12 +74,10 @@ def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, 
 
     `drive` is the one for which the (fitted) controller is set up.
     """
-    if isinstance(controller, CompiledController):
-        # a copy: the kernel takes no read-only numbers
-        numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
-        return run_compiled(controller, numbers, recorder, until)
     sees = 0 if controller is None else controller.sensors
     recorder.begin(math.inf if until is None else float(until), bool(sees & Sensor.STAGE))
+    if isinstance(controller, CompiledController):
+        return _run_compiled(controller, drive, recorder)
     if controller is None:
         recorder.state.ask_at = math.inf
     elif not isinstance(controller, PlainController):
@@ -100,26 +87,24 @@ def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, 
     state = tuple(controller.initial_state) if controller else ()
     while True:
         reason = recorder.advance()
-        if reason == at.BUFFER_FULL:
+        if reason == rec.BUFFER_FULL:
             recorder.grow()
-        elif reason == at.ASK and controller:
+        elif reason == rec.ASK and controller:
             recorder.measure()
             torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
             reason = recorder.answer(torque, ask_again, slope)
-        if reason not in (at.ASK, at.BUFFER_FULL):
+        if reason not in (rec.ASK, rec.BUFFER_FULL):
             recorder.state.status = reason
             return reason
 
 
-def run_compiled(
-    controller: CompiledController, numbers: Vector, recorder: StartRecorder, until: float | None
-) -> int:
-    """The same under a compiled controller with these numbers: the loop itself runs in the kernel."""
-    recorder.begin(math.inf if until is None else float(until), bool(controller.sensors & Sensor.STAGE))
+def _run_compiled(controller: CompiledController, drive: Any, recorder: StartRecorder) -> int:
+    """The same under a compiled controller: the loop itself runs in the kernel."""
+    numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, as the kernel wants it
     memory = np.zeros(controller.state_size)
     command = np.zeros(NEW_STATE + controller.state_size)
     with watched(controller):
-        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
+        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == rec.BUFFER_FULL:
             recorder.grow()
     return reason
 
@@ -162,12 +147,12 @@ def check_limits(
 
 
 def _time(name: str, value: object, remedy: str) -> float | None:
-    """A time above 0 s, or None."""
+    """A time above 0 s, as a number or with a unit, or None."""
     if value is None:
         return None
-    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
-        return float(value)
-    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
+    if 0.0 < (seconds := number_in("s", value, name)) < math.inf:
+        return seconds
+    raise InputError(f"{name} = {show(value)}: give a time above 0 s; {remedy}.")
 
 
 def ended(notes: Any, reason: int, until: float | None, max_events: int, start: str) -> Status:

@@ -13,7 +13,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
 from softstart.drive import SNCurve
 from softstart.errors import InputError
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.quantities import number_in
 from softstart.results import OneLine, Result
 from softstart.start.metrics import REFERENCE
@@ -272,7 +272,7 @@ def fatigue(
     if estimate:
         asked = [_again(run, machine) for run in asked]
     found = next((run for run in asked if run.controller_name == REFERENCE), None)
-    direct = found or simulate(machine, REFERENCE, fitted_to=asked[0].told)
+    direct = found or simulate(machine, REFERENCE, fitted_to=asked[0].design_drive)
     reference = damages(direct, curve)
     others = [[damages(_again(run, one), curve) for one in near] for run in (direct, *asked)]
     worn = [_over_wear(run, curve, gap) for run in (direct, *asked)] if not math.isnan(gap) else []
@@ -301,7 +301,7 @@ def torque_turning_points(run: Run, shaft: int = 0) -> Matrix:
     >>> [round(float(torque), 1) for torque in points[:2, 1]]
     [120.0, 180.8]
     """
-    return run.recorded.turning_points(shaft, STILL * float(run.peak_torques[shaft]))
+    return run.trajectory.turning_points(shaft, STILL * float(run.peak_torques[shaft]))
 
 
 def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matrix:
@@ -336,18 +336,18 @@ def impacts(run: Run, shaft: int = 0) -> Vector:
     >>> impacts(simulate("hoist-15kw", "direct")).size
     0
     """
-    recorded, rows = run.recorded, run.recorded.rows
-    side, w = recorded.of_shafts(2)[:, shaft], recorded.of_masses(0)
-    closed = np.isin(recorded.of_shafts(1)[:, shaft], [at.CONTACT, at.DOUBLED])
+    trajectory, rows = run.trajectory, run.trajectory.input
+    side, w = trajectory.of_shafts("side")[:, shaft], trajectory.of_masses("speed")
+    closed = np.isin(trajectory.of_shafts("mode")[:, shaft], [rec.CONTACT, rec.DOUBLED])
     meets = (closed[1:] > closed[:-1]).nonzero()[0] + 1
     # not above 0 where flanks that overlap still take hold again
     speed = side[meets] * (w[meets, shaft] - w[meets, shaft + 1])
     # rigid joints without a gap make one body of their masses; the motor's is fixed while its brake holds
-    joints = rows.shafts[0].view(at.SHAFT)[:, 0]
-    body = np.append(0, np.cumsum((joints["rigid"] == 0.0) | (joints["half"] > 0.0)))
-    light = 1.0 / np.bincount(body, rows.masses[0].view(at.MASS)[:, 0]["J"])
+    joints = rows.shafts[0].view(rec.SHAFT)[:, 0]
+    body = np.append(0, np.cumsum((joints["rigid"] == 0.0) | (joints["half_gap"] > 0.0)))
+    light = 1.0 / np.bincount(body, rows.masses[0].view(rec.MASS)[:, 0]["J"])
     inverse = np.tile(light, (meets.size, 1))
-    inverse[recorded.states[meets, at.S_BRAKED] == 1.0, body[int(rows.machine.motor)]] = 0.0
+    inverse[trajectory.states[meets, rec.S_BRAKED] == 1.0, body[int(rows.machine.motor)]] = 0.0
     energy: Vector = 0.5 * speed**2 / (inverse[:, body[shaft]] + inverse[:, body[shaft + 1]])
     return energy[speed > 0.0]
 
@@ -452,7 +452,7 @@ def life_ratio(reference: float, damage: float) -> float:
 def _again(run: Run, machine: Any) -> Run:
     """The same start of a changed machine, its controller as it was set up."""
     until = max(one.end_time for one in run.each) if math.isnan(run.start_time) else None
-    return simulate(machine, run.controller, until, fitted_to=run.told, base=run.base)
+    return simulate(machine, run.controller, until, fitted_to=run.design_drive, base=run.base)
 
 
 # over wear -----------------------------------------------------------------------------------------------

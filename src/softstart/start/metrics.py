@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.kernel import records as at
-from softstart.start.recorded import Trajectory
+from softstart.kernel import records as rec
+from softstart.start.trajectory import Trajectory
 
 REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
 # share of the target speed by which a load that has settled may still be below it
 SETTLED_BAND = 0.001
 
 
-def settled_time(recorded: Trajectory, target_speed: float, band: float = SETTLED_BAND) -> float:
+def settled_time(trajectory: Trajectory, target_speed: float, band: float = SETTLED_BAND) -> float:
     """First instant, not before the start time, from which on the load keeps its speed, s.
 
     It keeps it where w2 >= (1 - band) target_speed to the end of the run; NaN if it is below at the end. The
@@ -37,10 +37,10 @@ def settled_time(recorded: Trajectory, target_speed: float, band: float = SETTLE
     (`Run.settling_time` is for damped drives), and its size is what K_dyn judges. The crossing is located in
     the polynomials of the spans.
     """
-    start = float(recorded.notes["start_time"])
+    start = float(trajectory.notes["start_time"])
     if math.isnan(start):
         return math.nan
-    return recorded.load_settles(start, (1.0 - band) * target_speed)
+    return trajectory.load_settles(start, (1.0 - band) * target_speed)
 
 
 @dataclass(frozen=True)
@@ -70,14 +70,14 @@ class Energy:
         return self.ground + self.shafts + self.gears + self.impacts
 
 
-def energy_balance(recorded: Trajectory) -> Energy:
+def energy_balance(trajectory: Trajectory) -> Energy:
     """The energy balance of a recorded start; the residual is computed, not assumed."""
-    motor, exciting, load, ground, shafts, gears, elastic = recorded.work().tolist()
-    masses = recorded.rows.masses[0].view(at.MASS)[:, 0]
+    motor, exciting, load, ground, shafts, gears, elastic = trajectory.work().tolist()
+    masses = trajectory.input.masses[0].view(rec.MASS)[:, 0]
     moves = np.isfinite(masses["J"])
-    gained = recorded.of_masses(0)[-1] ** 2 - masses["w0"] ** 2
+    gained = trajectory.of_masses("speed")[-1] ** 2 - masses["w0"] ** 2
     kinetic = 0.5 * float(masses["J"][moves] @ gained[moves])
-    struck = np.isin(recorded.events["kind"], [at.IMPACT, at.SETTLED])
-    impacts = float(recorded.events["value"][struck].sum())
+    struck = np.isin(trajectory.events["kind"], [rec.IMPACT, rec.SETTLED])
+    impacts = float(trajectory.events["value"][struck].sum())
     residual = motor + exciting - kinetic - elastic - load - ground - shafts - gears - impacts
     return Energy(motor, exciting, kinetic, elastic, load, ground, shafts, gears, impacts, residual)

@@ -18,26 +18,26 @@ from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.engine import run_one
-from softstart.start.recorded import StartRecorder, Trajectory
-from softstart.start.rows import MAX_EVENTS
+from softstart.start.kernel_input import MAX_EVENTS
 from softstart.start.status import Status, status_of
+from softstart.start.trajectory import StartRecorder, Trajectory
 
 EVENT_NAMES = {
-    at.CLOSED: "gap closed",
-    at.OPENED: "gap opened",
-    at.STARTS: "load starts",
-    at.STOPS: "load stops",
-    at.TARGET_REACHED: "target speed reached",
-    at.RELEASED: "brake released",
-    at.IMPACT: "impact",
-    at.SETTLED: "impacts over, flanks press",
+    rec.CLOSED: "gap closed",
+    rec.OPENED: "gap opened",
+    rec.STARTS: "load starts",
+    rec.STOPS: "load stops",
+    rec.TARGET_REACHED: "target speed reached",
+    rec.RELEASED: "brake released",
+    rec.IMPACT: "impact",
+    rec.SETTLED: "impacts over, flanks press",
 }
-OF_MOTOR = {at.STARTS: "motor starts", at.STOPS: "motor stops"}
-OF_GEAR = {at.STARTS: "gear lets go", at.STOPS: "gear holds"}
+OF_MOTOR = {rec.STARTS: "motor starts", rec.STOPS: "motor stops"}
+OF_GEAR = {rec.STARTS: "gear lets go", rec.STOPS: "gear holds"}
 PLOT_POINTS = 1500
 SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a load must keep its speed
 
@@ -137,7 +137,7 @@ class Run(Result, view="starts.run_sheet"):
         The starts from each position, if it is unknown. Then K_dyn, peaks with their instants, impulses,
         impact speed, excess of the demand, start and settled times are the largest among them, each by
         itself. Traces, events, stages, contacts, energy and end of the run are those of `shown`.
-    told : Drive or None
+    design_drive : Drive or None
         The drive whose numbers the controller works with, if not `drive`.
 
     Examples
@@ -163,8 +163,8 @@ class Run(Result, view="starts.run_sheet"):
     controller: Controller | None
     base: Any
     status: Status
-    recorded: Trajectory
-    told: Drive | None = None
+    trajectory: Trajectory
+    design_drive: Drive | None = None
     positions: Mapping[str, Run] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -214,13 +214,13 @@ class Run(Result, view="starts.run_sheet"):
 
     def _of_shafts(self, name: str) -> Matrix:
         """What the kernel notes of each shaft: a row for each position, a column for each shaft."""
-        return np.stack([run.recorded.shafts[name] for run in self.each])
+        return np.stack([run.trajectory.shafts[name] for run in self.each])
 
     # figures -------------------------------------------------------------------------------------------
 
     @property
     def _notes(self) -> Any:
-        return self.recorded.notes
+        return self.trajectory.notes
 
     @property
     def peak_torques(self) -> Vector:
@@ -244,7 +244,7 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def motor_shaft(self) -> int:
         """The index of the shaft beside the motor, on the way to the load."""
-        return self.recorded.rows.motor_shaft
+        return self.trajectory.input.motor_shaft
 
     @property
     def worst_shaft(self) -> int:
@@ -294,8 +294,8 @@ class Run(Result, view="starts.run_sheet"):
         """
 
         def own(run: Run) -> float:
-            first = float(np.abs(run.recorded.shafts["first_peak"]).max())
-            if math.isnan(run.recorded.notes["stage_2_end"]):
+            first = float(np.abs(run.trajectory.shafts["first_peak"]).max())
+            if math.isnan(run.trajectory.notes["stage_2_end"]):
                 return math.nan
             return float(formulas.dynamic_coefficient(first, self.base_torque))
 
@@ -329,7 +329,7 @@ class Run(Result, view="starts.run_sheet"):
 
         Counted from the command of the start, so that it includes what the torque takes to release a brake.
         """
-        return self._worst(lambda run: float(run.recorded.notes["start_time"]))
+        return self._worst(lambda run: float(run.trajectory.notes["start_time"]))
 
     @cached_property
     def settled_time(self) -> float:
@@ -339,7 +339,7 @@ class Run(Result, view="starts.run_sheet"):
         computed further where it is shorter. See `metrics.settled_time` for the definition.
         """
         target = float(self.drive.target_speed)
-        return self._worst(lambda run: metrics.settled_time(run._continued.recorded, target))
+        return self._worst(lambda run: metrics.settled_time(run._continued.trajectory, target))
 
     @property
     def settling_end(self) -> float:
@@ -367,7 +367,7 @@ class Run(Result, view="starts.run_sheet"):
             begin, last = run.stages[-1].start, run.end_time - run.elastic_period
             if begin > last:
                 return math.nan  # too short to be called settled
-            found = run.recorded.torque_settles(run.motor_shaft, begin, band * run.base_torque)
+            found = run.trajectory.torque_settles(run.motor_shaft, begin, band * run.base_torque)
             return found if found <= last else math.nan
 
         return self._worst(settled)
@@ -375,7 +375,7 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def elastic_period(self) -> float:
         """The period of the first natural frequency with all gaps closed, 2 pi/Omega, s."""
-        return float(self.recorded.rows.machine["period"])
+        return float(self.trajectory.input.machine["period"])
 
     @property
     def end_time(self) -> float:
@@ -395,7 +395,7 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def impact_speed(self) -> float:
         """Speed at which the flanks first meet, rad/s: dw12 of [G](10)."""
-        return self._worst(lambda run: float(run.recorded.notes["impact_speed"]), np.fmax)
+        return self._worst(lambda run: float(run.trajectory.notes["impact_speed"]), np.fmax)
 
     @property
     def torque_at_contact(self) -> float:
@@ -410,8 +410,8 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def clipped(self) -> Clipped:
         """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
-        excess = self._worst(lambda run: float(run.recorded.notes["excess"]))
-        return Clipped(excess, self._worst(lambda run: float(run.recorded.notes["excess_time"])))
+        excess = self._worst(lambda run: float(run.trajectory.notes["excess"]))
+        return Clipped(excess, self._worst(lambda run: float(run.trajectory.notes["excess_time"])))
 
     @property
     def stage_durations(self) -> tuple[float, float]:
@@ -424,9 +424,9 @@ class Run(Result, view="starts.run_sheet"):
         return first, second
 
     def _kind(self, event: Any) -> str:
-        kind, place, given = int(event["kind"]), int(event["place"]), self.recorded.rows
+        kind, place, given = int(event["kind"]), int(event["place"]), self.trajectory.input
         if kind in OF_GEAR:
-            mass = given.masses[0, place].view(at.MASS)[0]
+            mass = given.masses[0, place].view(rec.MASS)[0]
             if mass.friction > 0.0 and place == int(given.machine.motor):
                 return OF_MOTOR[kind]
             if mass.Mc == 0.0:
@@ -436,7 +436,7 @@ class Run(Result, view="starts.run_sheet"):
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """All events in order of time."""
-        rows = self.recorded.events[np.argsort(self.recorded.events["time"], kind="stable")]
+        rows = self.trajectory.events[np.argsort(self.trajectory.events["time"], kind="stable")]
         return tuple(
             Event(float(e["time"]), self._kind(e), float(e["value"]), int(e["place"]), float(e["impulse"]))
             for e in rows
@@ -445,8 +445,8 @@ class Run(Result, view="starts.run_sheet"):
     @cached_property
     def stages(self) -> tuple[Stage, ...]:
         """All stages that take time; the last one ends with the run."""
-        peaks, sides = self.recorded.stage_peaks(), self.recorded.of_shafts(2)[:, self.motor_shaft]
-        at_start = self.recorded.index(peaks[:, 1])
+        peaks, sides = self.trajectory.stage_peaks(), self.trajectory.of_shafts("side")[:, self.motor_shaft]
+        at_start = self.trajectory.index(peaks[:, 1])
         found = []
         for row, span in zip(peaks, at_start, strict=True):
             number, torques, times = int(row[0]), row[3::2], row[4::2]
@@ -463,15 +463,15 @@ class Run(Result, view="starts.run_sheet"):
         if self.controller is None or not self.end_time < self.settling_end:
             return self
         recorder = StartRecorder(
-            self.recorded.rows.limited(max_events=MAX_EVENTS), int(self.controller.sensors)
+            self.trajectory.input.with_limits(max_events=MAX_EVENTS), int(self.controller.sensors)
         )
         try:
-            reason = run_one(self.controller, self.told or self.drive, recorder, self.settling_end)
+            reason = run_one(self.controller, self.design_drive or self.drive, recorder, self.settling_end)
         except SimulationError:
             return self
         if not status_of(reason, True, True).finished:
             return self
-        return replace(self, recorded=recorder.finished())
+        return replace(self, trajectory=recorder.finished())
 
     # states --------------------------------------------------------------------------------------------
 
@@ -486,15 +486,15 @@ class Run(Result, view="starts.run_sheet"):
         flat = np.ascontiguousarray(when.ravel())
         if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
             raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
-        states = self.recorded.at(flat)
-        machine = self.recorded.rows.machine
+        states = self.trajectory.at(flat)
+        machine = self.trajectory.input.machine
         motor, load = int(machine.motor), int(machine.load)
         between = states["twist"][:, min(motor, load) : max(motor, load)].sum(axis=1)
         of_masses = {
             "phi1": states["phi"][:, motor], "phi2": states["phi"][:, load], "w1": states["w"][:, motor],
             "w2": states["w"][:, load], "theta": between if motor < load else -between,
         }  # fmt: skip
-        single = states["T"][:, 0] if self.recorded.rows.count == 2 else states["T"]
+        single = states["T"][:, 0] if self.trajectory.input.count == 2 else states["T"]
         v = of_masses["w1"] - of_masses["w2"]
         found = {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
         return {
@@ -505,9 +505,9 @@ class Run(Result, view="starts.run_sheet"):
     @cached_property
     def t(self) -> Vector:
         """Instants of the traces, s: an even grid and every event and located peak."""
-        edges = self.recorded.events["time"]
+        edges = self.trajectory.events["time"]
         grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
-        peaks = [self.recorded.shafts["peak_time"], [stage.peak_time for stage in self.stages]]
+        peaks = [self.trajectory.shafts["peak_time"], [stage.peak_time for stage in self.stages]]
         when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), *peaks])
         return np.unique(when.clip(0.0, self.end_time))
 
@@ -594,7 +594,7 @@ class Run(Result, view="starts.run_sheet"):
     @cached_property
     def energy(self) -> metrics.Energy:
         """Energy balance of the run."""
-        return metrics.energy_balance(self.recorded)
+        return metrics.energy_balance(self.trajectory)
 
     def by_position(self) -> dict[str, Any]:
         """K_dyn and start time from each position, and which is the worst for the shaft."""
@@ -637,7 +637,7 @@ class Run(Result, view="starts.run_sheet"):
             "stage_1_duration": first,
             "stage_2_duration": second,
             "stages": int(self._notes["stage"]),
-            "events": len(self.recorded.events),
+            "events": len(self.trajectory.events),
             "settled_time": self.settled_time,
             "torque_settling_time": self.settling_time() if known else None,
             "energy": {**asdict(self.energy), "dissipated": self.energy.dissipated},

@@ -16,9 +16,9 @@ from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
 from softstart.start.engine import check_limits, ended, run_one
-from softstart.start.recorded import StartRecorder
-from softstart.start.rows import MAX_EVENTS, Rows, kernel_input
+from softstart.start.kernel_input import MAX_EVENTS, KernelInput, kernel_input
 from softstart.start.run import Run, worst_run
+from softstart.start.trajectory import StartRecorder
 
 if TYPE_CHECKING:
     import xarray
@@ -179,7 +179,7 @@ def _check_other(name: str, other: object, drive: object) -> None:
         raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
 
 
-def check_end(machine: Any, controller: object, until: float | None, rows: Rows) -> None:
+def check_end(machine: Any, controller: object, until: float | None, rows: KernelInput) -> None:
     """A run needs an end, and a controller a motor."""
     if controller is not None and machine.motor is None:
         raise InputError(

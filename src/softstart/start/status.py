@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 
 
 class Status(Enum):
@@ -65,13 +65,13 @@ class Status(Enum):
 
 _FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED})
 _BROKEN = {
-    at.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
-    at.NOT_LOCATED: Status.NOT_LOCATED,
-    at.NOT_FINITE: Status.NOT_FINITE,
-    at.BAD_COMMAND: Status.BAD_COMMAND,
-    at.QUEUE_FULL: Status.QUEUE_FULL,
-    at.TOO_LONG: Status.TOO_LONG,
-    at.TOO_STIFF: Status.TOO_STIFF,
+    rec.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
+    rec.NOT_LOCATED: Status.NOT_LOCATED,
+    rec.NOT_FINITE: Status.NOT_FINITE,
+    rec.BAD_COMMAND: Status.BAD_COMMAND,
+    rec.QUEUE_FULL: Status.QUEUE_FULL,
+    rec.TOO_LONG: Status.TOO_LONG,
+    rec.TOO_STIFF: Status.TOO_STIFF,
 }
 
 

@@ -23,8 +23,9 @@ from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole, show
-from softstart.start.batch import figure_columns, has_margin
+from softstart.start.batch import figure_columns
 from softstart.start.engine import check_limits
+from softstart.start.results import has_margin
 from softstart.sweeping.compute import SweepSettings, Task, check_corners, compute, first_start
 from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths, grid_values, read_grid
 from softstart.sweeping.store import STATUS, Store

@@ -15,8 +15,8 @@ from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.parallel import Pool, checked_workers, sharing
 from softstart.quantities import check_whole
-from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain, as_far_as_known
+from softstart.start.results import has_margin
 from softstart.store import PartStore, Target
 from softstart.tuning.gains import GainSearch, Progress, StartCounter, best_gains
 from softstart.tuning.outcome import Tuning

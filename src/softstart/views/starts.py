@@ -229,8 +229,8 @@ def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
 def shaft_torques(axes: Axes, run: Run) -> None:
     """The torque of each shaft with its peak, and where K_dyn is 1."""
     for (name, line), torque, time, peak in zip(
-        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.recorded.shafts["peak_time"],
-        run.recorded.shafts["peak"], strict=True,
+        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.trajectory.shafts["peak_time"],
+        run.trajectory.shafts["peak"], strict=True,
     ):  # fmt: skip
         axes.plot(run.t, torque, label=name, **line)
         axes.plot([time], [peak], "o", ms=4, color=line["color"])

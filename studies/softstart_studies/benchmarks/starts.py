@@ -47,7 +47,7 @@ COLUMNS = (
 def batch(problem: Problem, count: int) -> Solve:
     """The compiled kernel over a batch of prepared machines."""
     ready, set_up = prepared(problem.machines(count)), problem.set_up()
-    return lambda: ready.notes([set_up]).peaks
+    return lambda: ready.results([set_up]).peaks
 
 
 def formula(problem: Problem, count: int) -> Solve:

@@ -10,7 +10,7 @@ from tests.twin import chain_of
 from softstart import Command, Drive, InputError, PlainController, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import Sensor
-from softstart.start.rows import kernel_input
+from softstart.start.kernel_input import kernel_input
 from softstart.views.starts import shaft_table
 
 CRANE = Drive.load("crane-4amtkf")

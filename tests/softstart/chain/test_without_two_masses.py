@@ -32,7 +32,7 @@ def test_direct_is_a_profile_of_the_starting_torque() -> None:
 def test_momentum_tells_the_torque_of_a_profile() -> None:
     """The impulse of the motor less that of the load is the momentum of all masses."""
     run = simulate(CHAIN, make_controller("profile", {"profile": PROFILE}), until=0.25)
-    w = run.recorded.at([0.25])["w"][0]
+    w = run.trajectory.at([0.25])["w"][0]
     impulse = 20.0 * 0.25 + 0.5 * 42.0 / 0.3 * 0.25**2 - 1.0 * 0.25
     assert w @ [0.035, 0.05, 0.5] == pytest.approx(impulse, rel=1e-6)
 

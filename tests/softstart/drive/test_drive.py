@@ -126,7 +126,7 @@ def test_limits_are_read_with_units_written_back_and_change_no_start():
     assert Drive.from_toml(drive.to_toml()) == drive
     assert not Drive.from_toml(CRANE.to_toml() + "[limits.fatigue]\nslope = 5\n").limits  # decides nothing
     one, other = simulate(CRANE, "ramp"), simulate(drive, "ramp")
-    assert one.recorded.notes.tobytes() == other.recorded.notes.tobytes()
+    assert one.trajectory.notes.tobytes() == other.trajectory.notes.tobytes()
     with pytest.raises(InputError, match=r"limits.shaft_torque: .* changes no start"):
         sweep("crane-4amtkf", "direct", {"limits.shaft_torque": [90, 100]})
 

@@ -31,8 +31,11 @@ def test_energy_balance(make: Any, seed: int) -> None:
     assert abs(energy.residual) < 1e-9 * turnover
     # damping only ever takes energy; but a flank that pulls away and is pressed again while still overlapped
     # finds its spring loaded (these laws have no memory of its creeping back), which may give some back
-    mode, beyond = run.recorded.of_shafts(1), np.abs(run.recorded.of_shafts(0)) - 0.5 * run.drive.gap
-    side = np.where(np.isin(mode, [OPEN, BEYOND]), 0.0, run.recorded.of_shafts(2))
+    mode, beyond = (
+        run.trajectory.of_shafts("mode"),
+        np.abs(run.trajectory.of_shafts("twist")) - 0.5 * run.drive.gap,
+    )
+    side = np.where(np.isin(mode, [OPEN, BEYOND]), 0.0, run.trajectory.of_shafts("side"))
     pressed_again = (side[:-1] == 0.0) & (side[1:] != 0.0) & (beyond[1:] > 1e-9 * (run.drive.gap + 1e-6))
     if not pressed_again.any():
         assert energy.dissipated > -1e-9 * turnover
@@ -48,7 +51,7 @@ def test_total_momentum(seed: int) -> None:
     start, end = run.at(0.0), run.at(run.end_time)
     J1, J2 = run.drive.J1, run.drive.J2
     # u is smooth within each recorded span: 20 Gauss nodes a span are exact to rounding
-    rows = run.recorded.spans
+    rows = run.trajectory.spans
     nodes, weights = np.polynomial.legendre.leggauss(20)
     impulse, size = -drawn["Mc"] * run.end_time, drawn["Mc"] * run.end_time
     for index, row in enumerate(rows):
@@ -56,7 +59,7 @@ def test_total_momentum(seed: int) -> None:
         edges = np.linspace(row[0], row[1], pieces + 1)
         half = 0.5 * np.diff(edges)[:, None]
         times = edges[:-1, None] + half * (nodes + 1.0)
-        u = run.recorded.at(times.ravel(), np.full(times.size, index))["u"].reshape(times.shape)
+        u = run.trajectory.at(times.ravel(), np.full(times.size, index))["u"].reshape(times.shape)
         impulse += float(np.sum(half * (u * weights)))
         size += float(np.sum(half * np.abs(u * weights)))
     change = float(J1 * (end["w1"] - start["w1"]) + J2 * (end["w2"] - start["w2"]))

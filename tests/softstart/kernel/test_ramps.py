@@ -76,7 +76,7 @@ def test_the_limiter_meets_a_moving_line(torque: float, slope: float, meets: flo
     t = np.linspace(0.0, 0.06, 301)
     u = np.where(t < meets, 1000.0 * t, torque + slope * t)
     np.testing.assert_allclose(run.at(t)["u"], u, atol=1e-11)
-    assert meets == 0.0 or np.abs(run.recorded.spans[:, 0] - meets).min() < 1e-15
+    assert meets == 0.0 or np.abs(run.trajectory.spans[:, 0] - meets).min() < 1e-15
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,6 @@ def test_ramps_that_join_leave_no_splinters_behind_the_limiter() -> None:
     torque = 30.0 + 25.0 * np.sin(40.0 * knots)
     player = make_controller("profile", {"profile": TorqueProfile(knots, torque)})
     run = simulate(CRANE.replace(torque_rate=5000.0, torque_lag=0.002), player, until=0.3)
-    lengths = np.diff(run.recorded.spans[1:, :2], axis=1)
+    lengths = np.diff(run.trajectory.spans[1:, :2], axis=1)
     assert len(lengths) < 301 + 40
     assert lengths.min() > 1e-7  # splinters are a rounding of the torque over the rate, 1e-18 s

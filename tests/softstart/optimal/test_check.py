@@ -17,7 +17,7 @@ from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import solve_pulse_coast_hold
 from softstart.optimal.result import LowerBound, OptimumError, heat_of
 from softstart.optimal.starts import steady_shaft_torques
-from softstart.start.rows import kernel_input
+from softstart.start.kernel_input import kernel_input
 
 PROBLEM = Problem(CRANE, LONG)
 GOOD, END, CLAIMED = solve_pulse_coast_hold(PROBLEM)
@@ -219,6 +219,6 @@ def test_a_steady_shaft_carries_the_friction_of_its_load_too() -> None:
     assert math.isclose(T, 7.16 + 0.05 * 60.0)
     moving = {"initial_motor_speed": 60.0, "initial_load_speed": 60.0, "target_speed": 90.0}
     run = played(drive.replace(start_position=0.25 + T / drive.c, **moving), TorqueProfile([0.0], [T]), 0.5)
-    state = run.recorded.at([0.1, 0.5])
+    state = run.trajectory.at([0.1, 0.5])
     np.testing.assert_allclose(state["T"], T, rtol=1e-9)
     np.testing.assert_allclose(state["w"], 60.0, rtol=1e-9)

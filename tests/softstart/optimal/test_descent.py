@@ -67,13 +67,13 @@ def test_finished_meets_the_end_by_the_smallest_changes(terminal: Any) -> None:
     assert np.abs(done.torques - found.torques).max() < 1e-2 * search.high
     assert done.peak == pytest.approx(found.peak, rel=1e-3)
     run = played(problem.drive, TorqueProfile(search.time, done.torques), done.end + 0.01)
-    state = run.recorded.at([done.end])
+    state = run.trajectory.at([done.end])
     if terminal == "reached":
         assert state["w"][0, 1] >= 60.0 * (1.0 - 1e-9)
     else:
         np.testing.assert_allclose(state["w"][0], 60.0, rtol=1e-9)
     if terminal == "steady":
-        np.testing.assert_allclose(state["T"][0], steady_shaft_torques(run.recorded.rows), rtol=1e-6)
+        np.testing.assert_allclose(state["T"][0], steady_shaft_torques(run.trajectory.input), rtol=1e-6)
 
 
 @pytest.mark.parametrize("where", [0.0, -0.25])

@@ -63,14 +63,14 @@ def kept(best: Optimum) -> Optimum:
     assert best.bound.k_dyn >= momentum_bound(problem).k_dyn * (1.0 - 1e-9) or problem.start_time is None
     low, high = problem.lowest_torque, problem.highest_torque
     for run in runs:
-        state = run.recorded.at(np.linspace(0.0, until, 3000))
+        state = run.trajectory.at(np.linspace(0.0, until, 3000))
         assert low * (1.0 + 1e-9) - 1e-9 <= state["u"].min() <= state["u"].max() <= high * (1.0 + 1e-9)
         assert np.abs(state["T"]).max() <= best.k_dyn * problem.base_torque * (1.0 + 1e-9)
         if problem.torque_speed:
             speed, torque = zip(*problem.torque_speed, strict=True)
             motor = state["w"][:, run.drive.motor_index]
             assert (state["u"] - np.interp(motor, speed, torque)).max() <= 2e-4 * high
-        end = run.recorded.at([best.end_time])
+        end = run.trajectory.at([best.end_time])
         if problem.terminal == "reached":
             assert run.start_time <= best.end_time * (1.0 + 1e-9)
         else:
@@ -86,7 +86,7 @@ def kept(best: Optimum) -> Optimum:
         assert best.k_dyn <= problem.k_dyn * (1.0 + 1e-3)
     if problem.heat is not None:
         assert best.heat <= problem.heat * (1.0 + 1e-3)
-    record = runs[0].recorded.rows.machine
+    record = runs[0].trajectory.input.machine
     if problem.smoothness > 0.0 or np.isfinite(record.rate):
         slopes = np.abs(np.diff(best.profile.torque)) / np.maximum(np.diff(best.profile.time), 1e-300)
         assert best.profile.torque[0] == 0.0

@@ -9,7 +9,7 @@ import pytest
 from tests.softstart.optimal.drives import CRANE, HELD, random_chain
 
 from softstart import Drive
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.optimal.starts import DemandRun, DemandSimulator
 from softstart.profile import TorqueProfile
 
@@ -28,7 +28,7 @@ def slopes(
     found = []
     for step in (STEP, 0.5 * STEP):
         ends = [
-            player.play(moved(profile, direction, sign * step), until).recorded.at(instants)
+            player.play(moved(profile, direction, sign * step), until).trajectory.at(instants)
             for sign in (1.0, -1.0)
         ]
         found.append({name: (ends[0][name] - ends[1][name]) / (2.0 * step) for name in NAMES})
@@ -39,9 +39,9 @@ def off(
     player: DemandSimulator, played: DemandRun, direction: Any, until: float, rng: np.random.Generator
 ) -> float:
     """The largest difference of sensitivities from differences, as a share of the largest of their kind."""
-    profile, recorded = played.profile, played.recorded
+    profile, trajectory = played.profile, played.trajectory
     instants = np.sort(rng.uniform(0.2 * until, until, 12))
-    known = np.append(recorded.events["time"], profile.time)
+    known = np.append(trajectory.events["time"], profile.time)
     instants = instants[np.abs(instants[:, None] - known[None, :]).min(axis=1) > 1e-4 * until]
     measured = slopes(player, profile, direction, until, instants)
     states, joints = played.state_by_demand(instants) @ direction, player.joints
@@ -69,9 +69,9 @@ def test_the_answers_of_chains_are_differences(chains: int, curved: bool) -> Non
         time = np.array([0.0, edges[0], edges[0], *edges[1:]])  # one step among straight lines
         profile = TorqueProfile(time, rng.uniform(5.0, 55.0, time.size))
         played = player.play(profile, until)
-        kinds = played.recorded.events["kind"]
-        contacts += int((kinds == at.CLOSED).sum())
-        friction += int(np.isin(kinds, [at.STARTS, at.STOPS]).sum())
+        kinds = played.trajectory.events["kind"]
+        contacts += int((kinds == rec.CLOSED).sum())
+        friction += int(np.isin(kinds, [rec.STARTS, rec.STOPS]).sum())
         worst = max(worst, off(player, played, rng.normal(size=time.size), until, rng))
     assert contacts > 7.5 * chains
     assert friction > 0.2 * chains
@@ -101,7 +101,7 @@ def test_the_answers_of_drives_are_differences(name: str) -> None:
         low = high * (-0.4 if drive.minimum_torque < 0.0 else 0.6 if drive.brake == "motor" else 0.05)
         profile = TorqueProfile(time, rng.uniform(low, 0.95 * high, time.size))
         played = player.play(profile, until)
-        released += int((played.recorded.events["kind"] == at.RELEASED).sum())
+        released += int((played.trajectory.events["kind"] == rec.RELEASED).sum())
         worst = max(worst, off(player, played, rng.normal(size=time.size), until, rng))
     assert worst < 1e-6
     assert released == (8 if drive.brake == "motor" else 0)
@@ -128,7 +128,7 @@ def test_instants_move_with_the_contacts() -> None:
         shift, _ = played.along_contacts(np.append(begin["time"], until))
         assert not shift[-1].any()
         exact, measured = shift[:-1] @ direction, (ends[0]["time"] - ends[1]["time"]) / (2.0 * STEP)
-        speeds = played.recorded.at(begin["time"])["w"]
+        speeds = played.trajectory.at(begin["time"])["w"]
         place = begin["place"].astype(int)
         v = np.abs(speeds[np.arange(place.size), place] - speeds[np.arange(place.size), place + 1])
         hard = v > 0.02 * np.abs(speeds).max()
@@ -140,5 +140,5 @@ def test_instants_move_with_the_contacts() -> None:
 
 
 def contacts(played: DemandRun) -> Any:
-    events = played.recorded.events
-    return events[(events["kind"] == at.CLOSED) & (events["time"] > 0.0)]
+    events = played.trajectory.events
+    return events[(events["kind"] == rec.CLOSED) & (events["time"] > 0.0)]

@@ -30,10 +30,10 @@ def checked(problem, run, straight=False, between=EXACT):
     """The claim, and its exact run, with what every start must keep."""
     claim = solve_collocation(problem, run, straight)
     exact = played(problem.drive, claim.profile, claim.end_time + run.elastic_period)
-    end = exact.recorded.at([claim.end_time])
+    end = exact.trajectory.at([claim.end_time])
     w = end["w"][0] / problem.target
     if problem.terminal == "reached":
-        assert w[int(exact.recorded.rows.machine.load)] >= 1.0 - 1e-6
+        assert w[int(exact.trajectory.input.machine.load)] >= 1.0 - 1e-6
     else:
         np.testing.assert_allclose(w, 1.0, atol=1e-5)
     assert problem.start_time is None or claim.end_time <= problem.start_time * (1.0 + 1e-7)
@@ -43,7 +43,7 @@ def checked(problem, run, straight=False, between=EXACT):
     value = value or heat_of(exact, claim.end_time)
     assert value == pytest.approx(claim.value, rel=between)
     if problem.torque_speed:
-        state = exact.recorded.at(np.linspace(0.0, exact.end_time, 2000))
+        state = exact.trajectory.at(np.linspace(0.0, exact.end_time, 2000))
         over = state["u"] - torque_allowed(problem, state["w"][:, exact.drive.motor_index])
         assert over.max() <= BEYOND * problem.highest_torque
     return claim, exact

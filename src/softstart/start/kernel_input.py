@@ -1,10 +1,10 @@
-"""A machine as the rows of numbers that the kernel works on: the one place where both kinds are written."""
+"""A machine as the numbers that the kernel works on: the one place where both kinds are written."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -15,35 +15,37 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive, Machine
 from softstart.drive.records import Columns, each_of
 from softstart.errors import InputError
-from softstart.kernel import records as at
+from softstart.kernel import records as rec
 from softstart.kernel.motor import encoder_count
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain, ChainArrays
 
-LAWS: Final = {"no-pull": at.NO_PULL, "dead-zone": at.DEAD_ZONE, "modelica": at.MODELICA}
+LAWS: Final = {"no-pull": rec.NO_PULL, "dead-zone": rec.DEAD_ZONE, "modelica": rec.MODELICA}
 LONGEST: Final = 100_000  # elastic periods of one start
 MAX_EVENTS: Final = 1_000_000  # events and control instants of one start
 SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Starts as rows: of each its motor and limits, its N masses, its N - 1 shafts, its load curves.
+class KernelInput:
+    """What the kernel is given of each of n starts, one record a row, as `kernel.records` lays them out."""
 
-    `tones` are the harmonics of exciting torques, which all starts have alike.
-    """
-
-    machines: Matrix
-    masses: NDArray[np.float64]
-    shafts: NDArray[np.float64]
-    curves: NDArray[np.float64]
-    tones: Matrix
+    machines: Matrix  # (n, .): motor, encoder, limits of the start
+    masses: NDArray[np.float64]  # (n, N, .)
+    shafts: NDArray[np.float64]  # (n, N - 1, .)
+    curves: NDArray[np.float64]  # (n, ., .): load curves
+    tones: Matrix  # harmonics of exciting torques, the same for all starts
 
     @property
     def machine(self) -> Any:
         """The first row of `machines`, by names."""
-        return self.machines[0].view(at.MACHINE)[0]
+        return self.machines[0].view(rec.MACHINE)[0]
+
+    @property
+    def first(self) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix]:
+        """The first start, as `kernel.start.begin` takes it."""
+        return self.machines[0], self.masses[0], self.shafts[0], self.curves[0], self.tones
 
     @property
     def count(self) -> int:
@@ -56,46 +58,40 @@ class Rows:
         motor, load = int(self.machine.motor), int(self.machine.load)
         return motor if load > motor or motor == 0 else motor - 1
 
-    def taken(self, which: Any) -> Rows:
+    def take(self, which: Any) -> KernelInput:
         """Some of the starts."""
-        return Rows(
-            self.machines[which], self.masses[which], self.shafts[which], self.curves[which], self.tones
-        )
+        machines, masses, shafts = self.machines[which], self.masses[which], self.shafts[which]
+        return KernelInput(machines, masses, shafts, self.curves[which], self.tones)
 
-    def limited(self, time_limit: float | None = None, max_events: int | None = None) -> Rows:
+    def with_limits(self, time_limit: float | None = None, max_events: int | None = None) -> KernelInput:
         """The same with another time limit or cap on events."""
-        if time_limit is None and max_events is None:
-            return self
         machines = self.machines.copy()
-        named = machines.view(at.MACHINE)[:, 0]
+        columns = machines.view(rec.MACHINE)[:, 0]
         if time_limit is not None:
-            named["time_limit"] = np.minimum(time_limit, named["longest"])
+            columns["time_limit"] = np.minimum(time_limit, columns["longest"])
         if max_events is not None:
-            named["event_cap"] = max_events
-        return Rows(machines, self.masses, self.shafts, self.curves, self.tones)
+            columns["event_cap"] = max_events
+        return replace(self, machines=machines)
 
 
-def joined(rows: Sequence[Rows]) -> Rows:
+def concatenate(inputs: Sequence[KernelInput]) -> KernelInput:
     """Starts in one call; InputError for machines that do not match."""
-    if len(rows) == 1:
-        return rows[0]
-    motors = {(one.count, one.machine.motor, one.machine.load) for one in rows}
+    if len(inputs) == 1:
+        return inputs[0]
+    motors = {(one.count, one.machine.motor, one.machine.load) for one in inputs}
     if len(motors) > 1:
         raise InputError(
             "chains: starts in one call have the same number of masses, and motors and loads on the same "
             "ones; sort the chains by that."
         )
-    most = max(one.curves.shape[1] for one in rows)
-    curves = [np.pad(one.curves, ((0, 0), (0, most - one.curves.shape[1]), (0, 0))) for one in rows]
-    for one, padded in zip(rows, curves, strict=True):
+    most = max(one.curves.shape[1] for one in inputs)
+    curves = [np.pad(one.curves, ((0, 0), (0, most - one.curves.shape[1]), (0, 0))) for one in inputs]
+    for one, padded in zip(inputs, curves, strict=True):
         padded[:, one.curves.shape[1] :, 0] = -1.0  # of no mass
-    return Rows(
-        np.concatenate([one.machines for one in rows]),
-        np.concatenate([one.masses for one in rows]),
-        np.concatenate([one.shafts for one in rows]),
-        np.concatenate(curves),
-        rows[0].tones,
+    machines, masses, shafts = (
+        np.concatenate([getattr(one, name) for one in inputs]) for name in ("machines", "masses", "shafts")
     )
+    return KernelInput(machines, masses, shafts, np.concatenate(curves), inputs[0].tones)
 
 
 def kernel_input(
@@ -103,7 +99,7 @@ def kernel_input(
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, Any] | None = None,
-) -> Rows:
+) -> KernelInput:
     """A machine as a row of the kernel; columns of drives as many.
 
     Without `time_limit` a start that never reaches its target speed is given up after a hundred times
@@ -114,7 +110,7 @@ def kernel_input(
         made, stiff = _of_drive(machine)
     else:
         made, stiff = _of_chain(cast("Chain", machine), excitation or {})
-    named = made.machines.view(at.MACHINE)[:, 0]
+    named = made.machines.view(rec.MACHINE)[:, 0]
     named["event_cap"] = max_events
     named["longest"] = np.where(named["period"] > 0.0, LONGEST * named["period"], math.inf)
     longest = named["longest"]
@@ -130,15 +126,15 @@ def kernel_input(
     return made
 
 
-def blank(shape: tuple[int, ...], masses: int, curves: int = 0) -> Rows:
+def zeros(shape: tuple[int, ...], masses: int, curves: int = 0) -> KernelInput:
     """Rows of zeros for so many starts."""
     count = math.prod(shape)
-    return Rows(
-        np.zeros((count, at.N_MACHINE)),
-        np.zeros((count, masses, at.size(at.MASS))),
-        np.zeros((count, masses - 1, at.size(at.SHAFT))),
-        np.zeros((count, curves, at.size(at.CURVE))),
-        np.zeros((0, at.size(at.TONE))),
+    return KernelInput(
+        np.zeros((count, rec.N_MACHINE)),
+        np.zeros((count, masses, rec.size(rec.MASS))),
+        np.zeros((count, masses - 1, rec.size(rec.SHAFT))),
+        np.zeros((count, curves, rec.size(rec.CURVE))),
+        np.zeros((0, rec.size(rec.TONE))),
     )
 
 
@@ -160,15 +156,15 @@ def _motor(named: Any, motor: Any, column: Any = np.float64) -> None:
     named["lag"] = np.where(lag > 1e-12 * named["period"], lag, 0.0)
 
 
-def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
+def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     """The rows of a drive or of columns of drives, and how long stiff ones take."""
     shape: tuple[int, ...] = ()
     column: Any = np.float64
     if isinstance(drive, Columns):
         shape, column = drive.shape, partial(each_of, drive)
-    made = blank(shape, 2)
-    named = made.machines.view(at.MACHINE)[:, 0]
-    masses, shaft = made.masses.view(at.MASS)[..., 0], made.shafts.view(at.SHAFT)[:, 0, 0]
+    made = zeros(shape, 2)
+    named = made.machines.view(rec.MACHINE)[:, 0]
+    masses, shaft = made.masses.view(rec.MASS)[..., 0], made.shafts.view(rec.SHAFT)[:, 0, 0]
     J1, J2 = column(drive.motor_inertia), column(drive.load_inertia)
     c, Mc, Ms = column(drive.stiffness), column(drive.Mc), column(drive.starting_torque)
     friction, b1, b2 = map(column, drive.frictions)
@@ -182,27 +178,29 @@ def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
         masses["J"][:, i], masses["ground"][:, i], masses["w0"][:, i] = J, ground, w0
     masses["friction"][:, 0] = friction
     masses["Mc"][:, 1], masses["active"][:, 1] = column(drive.reactive_torque), column(drive.active_torque)
-    shaft["c"], shaft["d"], shaft["half"] = c, column(drive.damping), 0.5 * column(drive.gap)
+    shaft["c"], shaft["d"], shaft["half_gap"] = c, column(drive.damping), 0.5 * column(drive.gap)
     shaft["law"], shaft["eta"] = LAWS[drive.contact_law], 1.0
     shaft["theta0"] = column(drive.theta0)
     net = np.maximum(Ms - Mc - (friction + (b1 + b2) * target), 1e-3 * (Ms - Mc))
     return made, np.atleast_1d((J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net)
 
 
-def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, Vector]:
+def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[KernelInput, Vector]:
     """The row of a chain, and how long a stiff one takes: infinite where that is not known."""
     arrays = chain.at_motor_shaft()
     _refuse(chain, arrays)
     count = arrays.J.size
-    if count > at.MOST_MASSES:
-        raise InputError(f"mass: {count} masses; a start takes {at.MOST_MASSES} at most, so join some first.")
+    if count > rec.MOST_MASSES:
+        raise InputError(
+            f"mass: {count} masses; a start takes {rec.MOST_MASSES} at most, so join some first."
+        )
     curved = [(i, mass) for i, mass in enumerate(chain.masses) if mass.curve is not None]
-    made = blank((), count, len(curved))
-    named = made.machines.view(at.MACHINE)[:, 0]
-    masses, shafts = made.masses.view(at.MASS)[0, :, 0], made.shafts.view(at.SHAFT)[0, :, 0]
+    made = zeros((), count, len(curved))
+    named = made.machines.view(rec.MACHINE)[:, 0]
+    masses, shafts = made.masses.view(rec.MASS)[0, :, 0], made.shafts.view(rec.SHAFT)[0, :, 0]
     masses["J"], masses["ground"], masses["w0"] = arrays.J, arrays.d_ground, arrays.w0
     masses["Mc"], masses["active"] = arrays.friction, arrays.active
-    for curve, (i, mass) in zip(made.curves[0].view(at.CURVE)[:, 0], curved, strict=True):
+    for curve, (i, mass) in zip(made.curves[0].view(rec.CURVE)[:, 0], curved, strict=True):
         ratio = float(arrays.speed_ratio[i])
         at_points, torques, by_angle = mass.curve  # type: ignore[misc]
         curve["mass"], curve["points"], curve["by_angle"] = i, len(at_points), by_angle
@@ -213,7 +211,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
         if welded[k]:  # one body has one speed, not two that differ by rounding
             masses["w0"][k + 1] = masses["w0"][k]
     shafts["c"] = np.where(arrays.rigid, 0.0, arrays.c)
-    shafts["d"], shafts["half"], shafts["rigid"] = arrays.d, 0.5 * arrays.gap, arrays.rigid
+    shafts["d"], shafts["half_gap"], shafts["rigid"] = arrays.d, 0.5 * arrays.gap, arrays.rigid
     shafts["restitution"] = np.nan_to_num(arrays.restitution)
     shafts["law"], shafts["theta0"] = [LAWS[law] for law in arrays.law], arrays.theta0
     shafts["eta"], shafts["gear"] = arrays.efficiency, arrays.gear - np.arange(count - 1)
@@ -229,7 +227,9 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
         for omega, cosine, sine in zip(torque.frequencies, torque.cosine, torque.sine, strict=True):
             tones.append((i, omega, brought * cosine, brought * sine))
     if tones:
-        made = Rows(made.machines, made.masses, made.shafts, made.curves, np.array(tones, dtype=np.float64))
+        made = KernelInput(
+            made.machines, made.masses, made.shafts, made.curves, np.array(tones, dtype=np.float64)
+        )
     motor = chain.motor
     if motor is None:
         return made, np.array([math.inf])
@@ -244,7 +244,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     return made, np.array([inertia * _driven_by_curves(made, left, heavier, speeds)])
 
 
-def _driven_by_curves(made: Rows, left: float, heavier: Vector, speeds: float) -> float:
+def _driven_by_curves(made: KernelInput, left: float, heavier: Vector, speeds: float) -> float:
     """The integral of dw/(sum of the torques) up to a speed: infinite where load curves do not drive it on.
 
     `left` is what the other torques leave, N m. A curve over speed drives where it is negative; its power
@@ -252,7 +252,7 @@ def _driven_by_curves(made: Rows, left: float, heavier: Vector, speeds: float) -
     """
     w = np.linspace(0.0, speeds, 1001)
     torque = np.full(w.shape, left)
-    for curve in made.curves[0].view(at.CURVE)[:, 0]:
+    for curve in made.curves[0].view(rec.CURVE)[:, 0]:
         if not curve["by_angle"]:
             points, through = int(curve["points"]), heavier[int(curve["mass"])]
             brakes = np.interp(w, curve["at"][:points], curve["torque"][:points])
