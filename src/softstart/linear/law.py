@@ -85,7 +85,7 @@ class Sample:
         """The sample with the machine moved by a state of `plant`, and the controller not."""
         copy = replace(self, work=self.work.copy(), state=self.state.copy())
         now = copy.plant
-        now["zeros"][:] = now["passed"][:] = 0  # what has just happened no longer applies
+        now["leading_zeros"][:] = now["passed"][:] = 0  # what has just happened no longer applies
         for name, rows in plant.masses.items():
             now[name][: len(rows)] += rows @ by[: rows.shape[1]]
         for name, row in (("phi", plant.rows["phi2"]), ("u", plant.rows.get("u", NONE))):
