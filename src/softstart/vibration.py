@@ -32,7 +32,8 @@ from softstart.results import Result
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.chain.model import Chain, ChainArrays
+    from softstart.chain.arrays import ChainArrays
+    from softstart.chain.model import Chain
 
 AT_REST = 1e18  # times the inertia of all others: the motion of a mass at rest is below rounding
 FACTOR = 10.0

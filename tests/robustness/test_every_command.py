@@ -13,7 +13,7 @@ import pytest
 
 from softstart import Drive
 from softstart.chain.elements import LIBRARY
-from softstart.chain.model import load_machine
+from softstart.chain.machines import load_machine
 from softstart.cli import main
 from softstart.drive import library
 from softstart.drive.data_sheet import DataSheet

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from softstart import Chain, Drive, InputError
-from softstart.chain.model import LIBRARY
+from softstart.chain.elements import LIBRARY
 from softstart.drive import library
 from softstart.input.parameters import REQUIRED
 from softstart.page.machines import startable, with_typed_changes

@@ -10,8 +10,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from softstart.chain.arrays import ChainArrays
 from softstart.chain.elements import Mass, Motor, Shaft
-from softstart.chain.model import Chain, ChainArrays, by_name
+from softstart.chain.machines import by_name
+from softstart.chain.model import Chain
 from softstart.vibration import Reduction, Vibration
 from softstart.vibration import natural_vibration as _natural_vibration
 from softstart.vibration import reduce_chain as _reduce_chain

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import wraps
 from numbers import Real
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
-from softstart.chain.model import Chain, load_machine
-from softstart.drive import Drive, Machine
+from softstart.chain.elements import LIBRARY
+from softstart.chain.model import Chain
+from softstart.drive import Drive, Machine, library
 from softstart.drive.checks import BROADCAST
 from softstart.drive.records import Columns, Records
 from softstart.errors import InputError
-from softstart.input.files import object_of
+from softstart.hints import nearest
+from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, read_value
 from softstart.quantities import RefusedError, parse, show
@@ -31,6 +36,64 @@ def as_machine(given: MachineLike, name: str = "drive") -> Machine:
     True
     """
     return object_of(given, (Drive, Chain), load_machine, f"{name}: give one Drive or Chain")
+
+
+def as_chain(given: Chain | str | os.PathLike[str]) -> Chain:
+    """The chain itself, or that of a name or file; InputError for anything else."""
+    return object_of(given, Chain, Chain.load, "chain: give one Chain")
+
+
+Rest = ParamSpec("Rest")
+Result = TypeVar("Result")
+
+
+def by_name(
+    function: Callable[Concatenate[Chain, Rest], Result],
+) -> Callable[Concatenate[Chain | str | os.PathLike[str], Rest], Result]:
+    """The same function of a chain or of its name or file."""
+
+    @wraps(function)
+    def named(chain: Chain | str | os.PathLike[str], *rest: Rest.args, **options: Rest.kwargs) -> Result:
+        return function(as_chain(chain), *rest, **options)
+
+    return named  # type: ignore[return-value]  # `chain` may be given by its name as well
+
+
+def load_machine(given: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Drive | Chain:
+    """The drive or the chain of a file, or a shipped one by its name; `also` changes a chain.
+
+    A file is that of a chain if it has a table [[mass]].
+
+    >>> type(load_machine("crane-4amtkf")).__name__, type(load_machine("crane-4-mass")).__name__
+    ('Drive', 'Chain')
+    """
+    if is_chain(given):
+        return Chain.load(given, also=also)
+    try:
+        return Drive.load(given)
+    except InputError:
+        names = LIBRARY.names()
+        if refusal_of(given) == ABSENT and nearest(str(given), (*names, *library.names())) in names:
+            Chain.load(given)  # names the chain that was meant
+        raise
+
+
+def is_chain(given: str | os.PathLike[str]) -> bool:
+    """Whether a name or a path is that of a chain."""
+    if isinstance(given, str) and given in LIBRARY.names():
+        return given not in library.names()
+    with suppress(RefusedError):
+        return isinstance(given, str | os.PathLike) and is_chain_text(read_text(given))
+    return False
+
+
+def is_chain_text(text: str) -> bool:
+    """Whether a text is that of a chain: it has a table [[mass]].
+
+    >>> is_chain_text("[[mass]]"), is_chain_text("[motor]")
+    (True, False)
+    """
+    return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))
 
 
 def records(machine: Machine | Records | str, **fields: Any) -> Records:

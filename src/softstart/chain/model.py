@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, wraps
-from typing import Any, ClassVar, Concatenate, ParamSpec, Self, TypeVar
+from functools import cached_property
+from itertools import pairwise
+from operator import attrgetter
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.chain.arrays import ChainArrays, arrays_at
 from softstart.chain.elements import (
     LIBRARY,
     MASS,
@@ -34,18 +35,24 @@ from softstart.chain.elements import (
     Shaft,
 )
 from softstart.chain.unreduced import Unreduced
-from softstart.chain.words import Words
-from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
+from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machine
 from softstart.drive.checks import wrong_units
+from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
-from softstart.hints import nearest
+from softstart.hints import did_you_mean, nearest
 from softstart.input.documents import DocumentTable, construct, document_text, read_document
-from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.gear import NO_OUTPUT
-from softstart.input.parameters import Wording, read_values, sentences_of
-from softstart.quantities import RefusedError, show
+from softstart.input.parameters import Parameter, ParameterValue, Wording, read_values, sentences_of
+from softstart.quantities import show
 
+# mass[2].inertia, mass[drum].inertia, or mass_2_inertia
+PART = re.compile(r"(mass|shaft)(?:\[(.+)\]\.|_(\d+)_)(\w+)")
+SAME = 1e-12  # within this share two gaps are one, whatever binary makes of their sum
+OTHER_DAMPING = {
+    "damping": {"damping_ratio": None},
+    "damping_ratio": {"damping": 0.0},
+}  # each excludes the other
 BRANCHES = (
     "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
     "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "
@@ -60,7 +67,7 @@ BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joi
 
 
 @dataclass(frozen=True, init=False)
-class Chain(Words):
+class Chain(Machine):
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
     Each quantity is a number in SI or a string with a unit, on its own shaft.
@@ -189,19 +196,15 @@ class Chain(Words):
         before = f"{where}: " if where else ""
         wrong: list[str] = []
         start: dict[str, Any] = found["start"] or {}
-        parts = {
-            "masses": [
-                construct(Mass, row, f"{before}[mass] {i}, ", wrong) for i, row in enumerate(found["mass"], 1)
-            ],
-            "shafts": [
-                construct(Shaft, row, f"{before}[shaft] {i}, ", wrong)
-                for i, row in enumerate(found["shaft"], 1)
-            ],
-            "motor": found["motor"] and construct(Motor, found["motor"], f"{before}[motor], ", wrong),
-            "load_mass": start.get("load", ""),
-            "target_speed": start.get("target_speed"),
-            "position": start.get("position", "mid-gap"),
+        parts: dict[str, Any] = {
+            name: [
+                construct(part, row, f"{before}[{table}] {i}, ", wrong)
+                for i, row in enumerate(found[table], 1)
+            ]
+            for name, table, part in (("masses", "mass", Mass), ("shafts", "shaft", Shaft))
         }
+        parts["motor"] = found["motor"] and construct(Motor, found["motor"], f"{before}[motor], ", wrong)
+        parts |= {"load_mass" if key == "load" else key: value for key, value in start.items()}
         chain = None if wrong else construct(cls, parts | found[""], before, wrong)
         if chain is None:
             raise InputError(wrong)
@@ -209,13 +212,16 @@ class Chain(Words):
 
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
-        start = {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
         rows: list[tuple[DocumentTable, Any]] = [(TOP, vars(self))]
         for i, mass in enumerate(self.masses):
             rows += [(MASS, mass.values()), *((SHAFT, shaft.values()) for shaft in self.shafts[i : i + 1])]
         rows += [] if self.motor is None else [(MOTOR, self.motor.values())]
-        rows.append((START, start))
+        rows.append((START, self._start_values()))
         return document_text((table, _without_defaults(table, values)) for table, values in rows)
+
+    def _start_values(self) -> dict[str, Any]:
+        """The values of the table [start], by key."""
+        return {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
 
     # ---- places ------------------------------------------------------------------------------------------
 
@@ -253,9 +259,25 @@ class Chain(Words):
         return tuple(speed / of_reference for speed in speeds)
 
     @property
+    def motor_index(self) -> int:
+        return 0 if self.motor is None else self.index(self.motor.mass)
+
+    @property
+    def load_index(self) -> int:
+        return self.index(self.load_mass)
+
+    @property
     def mass_names(self) -> tuple[str, ...]:
-        """The masses by their names."""
         return tuple(mass.name for mass in self.masses)
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Each shaft by the masses that it joins.
+
+        >>> Chain.load("crane-4-mass").shaft_names[0]
+        'rotor - pinion'
+        """
+        return tuple(f"{before} - {after}" for before, after in pairwise(self.mass_names))
 
     @property
     def local_gaps(self) -> tuple[float, ...]:
@@ -463,17 +485,6 @@ class Chain(Words):
         ]
         return replace(self, shafts=tuple(damped))
 
-    def with_gap(self, gap: float) -> Self:
-        """The chain with all gaps widened alike, so that they are `gap` together, rad at the motor shaft.
-
-        >>> Chain.load("crane-4-mass").with_gap(1.0).shafts[1].gap
-        0.4
-        """
-        whole = float(self.gaps.sum())
-        if whole == 0.0:
-            raise InputError("gap: the chain has no gap that could be widened; give its shafts some.")
-        return self.scaled(gaps=gap / whole)
-
     @property
     def permissible_torques(self) -> Vector:
         """What each shaft permits, N m at the motor shaft; NaN where nothing is given."""
@@ -507,6 +518,167 @@ class Chain(Words):
             masses=tuple(self.masses[i] for i in kept),
             shafts=self.shafts[kept[0] : kept[-1]],
         )
+
+    # ---- the chain changed ------------------------------------------------------------------------------
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of all shafts in series, N m/rad at the motor shaft; infinite where all are rigid."""
+        compliance = float((1.0 / self.stiffnesses).sum())
+        return 1.0 / compliance if compliance > 0.0 else math.inf
+
+    @property
+    def gap_and_inertia(self) -> tuple[float, float]:
+        """All gaps together, rad at the motor shaft, and the inertia of the load mass, kg m2.
+
+        >>> Chain.load("crane-4-mass").gap_and_inertia[1]
+        69.2
+        """
+        return float(self.gaps.sum()), self.masses[self.load_index].inertia
+
+    @property
+    def motor_inertia_at_load(self) -> float:
+        ratio = self.speed_ratios("motor")[self.load_index]
+        return self.masses[self.motor_index].inertia / ratio**2
+
+    def with_gap(self, gap: float) -> Self:
+        """The chain with all gaps widened alike, so that they are `gap` together, rad at the motor shaft.
+
+        >>> Chain.load("crane-4-mass").with_gap(1.0).shafts[1].gap
+        0.4
+        """
+        whole = float(self.gaps.sum())
+        if whole == 0.0 < gap:
+            raise InputError(
+                f"gap = {gap!r}: the chain has no gap that could be widened; give its shafts some."
+            )
+        return self.scaled(gaps=ratio_of(gap, whole))
+
+    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Self | None = None) -> Self:
+        """The chain with another gap and load inertia, all gaps widened alike.
+
+        A chain whose gaps are all closed has them as its `origin`.
+
+        >>> Chain.load("crane-4-mass").with_gap_and_inertia(1.0, 70.0).masses[-1].inertia
+        70.0
+        """
+        chain = self
+        if not any(shaft.gap for shaft in self.shafts) and origin is not None:
+            shafts = zip(self.shafts, origin.shafts, strict=True)
+            chain = replace(self, shafts=tuple(one.replace(gap=first.gap) for one, first in shafts))
+        chain = chain.with_gap(gap)
+        return chain if inertia == self.gap_and_inertia[1] else chain.with_values({"load_inertia": inertia})
+
+    def scaled(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+        """The chain with so many times its gaps, and its load mass with so many times its inertia.
+
+        An angle in a gap keeps its share of it, one beyond a flank its overlap.
+
+        >>> Chain.load("crane-4-mass").scaled(gaps=4.0).shafts[1].gap
+        0.8
+        """
+        masses, load = list(self.masses), self.load_index
+        masses[load] = masses[load].replace(inertia=load_inertia * masses[load].inertia)
+        return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
+
+    # ---- parameters by their keys ------------------------------------------------------------------------
+
+    def parameters_by_path(self) -> dict[str, tuple[Parameter, Any]]:
+        """All parameters by their paths, each with its value.
+
+        >>> Chain.load("crane-4-mass").parameters_by_path()["shaft[2].gap"][1]
+        0.2
+        """
+        parameters = {p.name: (p, getattr(self, p.name)) for p in TOP.parameters}
+        parts: list[tuple[str, Mass | Shaft | Motor]] = [] if self.motor is None else [("motor", self.motor)]
+        parts += [(f"mass[{i}]", mass) for i, mass in enumerate(self.masses, 1)]
+        parts += [(f"shaft[{i}]", shaft) for i, shaft in enumerate(self.shafts, 1)]
+        for path, part in parts:
+            values = part.values()
+            parameters |= {f"{path}.{name}": (p, values[name]) for name, p in part.PARAMETERS.items()}
+        start = self._start_values()
+        return parameters | {f"start.{p.name}": (p, start[p.name]) for p in START.parameters}
+
+    def parameter_keys(self) -> Iterator[str]:
+        yield from (PARAMETERS[name].path for name in AGGREGATES)
+        yield from (
+            path for path in self.parameters_by_path() if path.startswith(("mass[", "shaft[", "motor."))
+        )
+
+    def parameter_value(self, key: str) -> ParameterValue | None:
+        """The parameter that a key names, as in a file or in Python; None where there is none.
+
+        Each mass and shaft has its own parameters. Beside them a chain has some of a drive: its gap is the
+        sum of all gaps at the motor shaft, its stiffness that of all shafts in series, its load the load
+        mass.
+
+        >>> crane = Chain.load("crane-4-mass")
+        >>> keys = ("shaft.gap", "shaft[rotor - pinion].gap", "mass[2].inertia")
+        >>> [crane.parameter_value(key).name for key in keys]
+        ['gap', 'shaft_1_gap', 'mass_2_inertia']
+        >>> round(crane.parameter_value("gap").value, 9), crane.parameter_value("start.position").value
+        (0.5, 'mid-gap')
+        """
+        name = BY_PATH.get(key, key)
+        if (match := PART.fullmatch(key)) is not None:
+            kind, place, number, word = match.groups()
+            index, values = self._number(kind, place or number), self.parameters_by_path()
+            path = f"{kind}[{index}].{word}"
+            return ParameterValue(f"{kind}_{index}_{word}", *values[path]) if path in values else None
+        if name in AGGREGATES:
+            p = START.by_key["position"] if name == "start_position" else PARAMETERS[name]
+            return ParameterValue(name, p, AGGREGATES[name].read(self))
+        if self.motor is not None and name in self.motor.PARAMETERS and name != "mass":
+            return ParameterValue(name, self.motor.PARAMETERS[name], getattr(self.motor, name))
+        return None
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """The chain with these values, by the keys or names of their parameters.
+
+        >>> Chain.load("crane-4-mass").with_values({"gap": 1.0, "shaft[2].stiffness": 4e5}).shafts[2].gap
+        0.02
+        """
+        chain, of_motor, wrong = self, {}, []
+        for key, value in values.items():
+            if (parameter := chain.parameter_value(key)) is None:
+                wrong.append(chain.no_such(key, value))
+            elif (match := PART.fullmatch(parameter.name)) is not None:
+                kind, _, number, word = match.groups()
+                chain = chain.with_part(kind, int(number) - 1, word, value)
+            elif parameter.name in AGGREGATES:
+                chain = AGGREGATES[parameter.name].changed(chain, value)
+            else:
+                of_motor[parameter.name] = value
+        if wrong:
+            raise InputError(wrong)
+        if chain.motor is None or not of_motor:
+            return chain
+        return replace(chain, motor=chain.motor.replace(**of_motor))  # at once: one bounds the other
+
+    def no_such(self, key: str, value: object) -> str:
+        """The sentence on a key that names no parameter."""
+        keys = list(self.parameter_keys())
+        names = [p.name for path in keys if (p := self.parameter_value(path)) is not None]
+        hint = did_you_mean(key, [*keys, *names], otherwise=f"its parameters are {', '.join(names)}.")
+        return f"{key} = {show(value)}: a chain has no parameter {show(key)}; {hint}"
+
+    def _number(self, kind: str, place: str) -> int:
+        """The number of a mass or shaft, from 1, by that number or by its name; 0 where there is none."""
+        names = self.mass_names if kind == "mass" else self.shaft_names
+        if place in names:
+            return names.index(place) + 1
+        return int(place) if place.isdecimal() and int(place) <= len(names) else 0
+
+    def with_part(self, kind: str, index: int, word: str, value: Any) -> Self:
+        """The chain with another value of one mass or shaft; the gap as `Shaft.widened`."""
+        parts: list[Any] = list(self.masses if kind == "mass" else self.shafts)
+        if word == "gap" and parts[index].gap:
+            parts[index] = parts[index].widened(ratio_of(value, parts[index].gap))
+        else:  # of two that exclude one another
+            more = OTHER_DAMPING.get(word, {}) if kind == "shaft" else {}
+            parts[index] = parts[index].replace(**{word: value}, **more)
+        changed: dict[str, Any] = {"masses" if kind == "mass" else "shafts": tuple(parts)}
+        return replace(self, **changed)
 
     # ---- the chain at one shaft --------------------------------------------------------------------------
 
@@ -624,242 +796,45 @@ def _mistakes(
     return wrong
 
 
-Flags = NDArray[np.bool_]
+class Aggregate(NamedTuple):
+    """A quantity of the whole chain that a drive has as a parameter: how it is read, and set."""
+
+    read: Callable[[Chain], Any]
+    changed: Callable[[Any, Any], Any]
 
 
-@dataclass(frozen=True, eq=False)
-class ChainArrays:
-    """N masses and N - 1 shafts, all brought to one shaft, in SI; the arrays are read-only.
-
-    Of the masses: `J` inertia, `d_ground` damping to the ground, `active` load torque (braking where
-    positive) and `friction`, the reactive one; `Mc` is their sum, which forward motion takes; `w0` speed at
-    the start, `speed_ratio` the speed of the mass's own shaft over that of the reference shaft (`i` of [R];
-    own speed = speed here * speed_ratio).
-    Of the shafts: `c` stiffness (infinite where `rigid`), `d` damping, `gap` total gap, `restitution` (NaN
-    where not rigid), `law` contact laws, `theta0` twist at the start, `permissible` torque (NaN where none),
-    `torque_ratio` a torque here over the same at the shaft itself, `efficiency` of its gear and `gear`, the
-    index of the mass at which that sits: it turns with the mass, the shaft lies on its other side.
-    `motor` and `load` are the indices of the masses with the motor and with the target speed.
-    """
-
-    J: Vector
-    d_ground: Vector
-    active: Vector
-    friction: Vector
-    w0: Vector
-    speed_ratio: Vector
-    c: Vector
-    d: Vector
-    gap: Vector
-    rigid: Flags
-    restitution: Vector
-    law: tuple[ContactLaw, ...]
-    theta0: Vector
-    permissible: Vector
-    torque_ratio: Vector
-    efficiency: Vector
-    gear: NDArray[np.int64]
-    motor: int
-    load: int
-
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-
-    @property
-    def Mc(self) -> Vector:
-        """The load torques against forward motion, N m."""
-        return self.active + self.friction
-
-    @property
-    def held(self) -> int | None:
-        """The mass that stays at rest, of infinite inertia."""
-        found = np.flatnonzero(np.isinf(self.J))
-        return int(found[0]) if found.size else None
-
-    @property
-    def moving_J(self) -> Vector:
-        """The inertias of the masses that move, 0 for the one that does not."""
-        return self.J if self.held is None else np.where(np.isinf(self.J), 0.0, self.J)
-
-    @property
-    def path(self) -> range:
-        """The shafts that lead from the motor to the load; all of them where both are on one mass."""
-        low, high = sorted((self.motor, self.load))
-        return range(low, high) if low < high else range(self.c.size)
-
-    def mean_torques(self, motor_torque: float) -> Vector:
-        """Mean torque of each shaft, N m, while all masses speed up as one.
-
-        T_k = sum (J_i a + Mc_i) over the masses that shaft k drives, with a = (u - sum Mc)/sum J.
-
-        >>> Chain.load("crane-4-mass").at_motor_shaft().mean_torques(62.0).round(2)
-        array([53.9 , 53.38, 52.34])
-        """
-        J, load = self.moving_J, float(self.Mc.sum())
-        if self.held is None:
-            needed = J * (motor_torque - load) / float(J.sum()) + self.Mc
-        else:  # nothing speeds up: what the loads leave is held
-            needed = self.Mc + np.where(np.isinf(self.J), motor_torque - load, 0.0)
-        torques = np.cumsum(needed)[:-1]
-        torques[self.motor :] = np.cumsum(needed[::-1])[::-1][1 + self.motor :]
-        return torques
-
-    def mean_torque(self, motor_torque: float) -> float:
-        """Mean torque of the shafts from motor to load, N m: of `mean_torques`, weighted by compliance.
-
-        It is M12avg = (u J2 + J1 Mc)/(J1 + J2) of [G](16) with J1 and J2 by the lever rule, where the load
-        torque is on the load mass.
-        """
-        torques, path = self.mean_torques(motor_torque), list(self.path)
-        weights = np.where(self.rigid, 0.0, 1.0 / self.c)[path]
-        return float(np.average(torques[path], weights=weights if weights.any() else None))
-
-    @property
-    def efficiency_from_motor(self) -> Vector:
-        """The share of the motor's power that comes to each mass: the product of the gears on the way."""
-        shares = np.ones(self.J.size)
-        for i in range(self.motor, self.J.size - 1):
-            shares[i + 1] = shares[i] * self.efficiency[i]
-        for i in range(self.motor, 0, -1):
-            shares[i - 1] = shares[i] * self.efficiency[i - 1]
-        return shares
-
-
-def arrays_at(chain: Chain, index: int) -> ChainArrays:
-    """The chain at the shaft of mass `index`.
-
-    With `i` the speed of a shaft over that of the reference: inertias, dampings and stiffnesses times `i^2`,
-    torques times `i`, angles and speeds over `i`.
-    """
-    masses, shafts = chain.masses, chain.shafts
-    i = np.array(chain.speed_ratios(index))
-    of_shaft = np.array([i[k] if shaft.side == "before" else i[k + 1] for k, shaft in enumerate(shafts)])
-    J = np.array([mass.inertia for mass in masses]) * i * i
-    c = np.array([shaft.stiffness for shaft in shafts]) * of_shaft * of_shaft
-    permissible = [math.nan if s.permissible_torque is None else s.permissible_torque for s in shafts]
-    gap = np.array([shaft.gap for shaft in shafts]) / of_shaft
-    torque, active = (
-        np.array([mass.torque for mass in masses]) * i,
-        [mass.kind == "active" for mass in masses],
-    )
-    pulls = np.where(active, torque, 0.0)
-    angles = np.array([math.nan if s.start_position is None else s.start_position for s in shafts]) / of_shaft
-    return ChainArrays(
-        J=J,
-        d_ground=np.array([mass.damping for mass in masses]) * i * i,
-        active=pulls,
-        friction=np.where(active, 0.0, torque) + np.array([mass.friction for mass in masses]) * i,
-        w0=np.array([mass.initial_speed for mass in masses]) / i,
-        speed_ratio=i,
-        c=c,
-        d=np.array([shaft.damping for shaft in shafts]) * of_shaft * of_shaft + _from_ratios(shafts, J, c),
-        gap=gap,
-        rigid=np.array([shaft.rigid for shaft in shafts]),
-        restitution=np.array([math.nan if s.restitution is None else s.restitution for s in shafts]),
-        law=tuple(shaft.contact_law for shaft in shafts),
-        theta0=np.where(np.isnan(angles), _twists(chain, gap, c, pulls), angles),
-        permissible=np.array(permissible) * of_shaft,
-        torque_ratio=of_shaft,
-        efficiency=np.array([shaft.efficiency for shaft in shafts]),
-        gear=np.array([k + (shaft.side == "before") for k, shaft in enumerate(shafts)]),
-        motor=chain.motor_index,
-        load=chain.load_index,
+def _of_mass(place: str, word: str) -> Aggregate:
+    """A quantity of the mass at the index that has this name."""
+    return Aggregate(
+        lambda chain: getattr(chain.masses[getattr(chain, place)], word),
+        lambda chain, value: chain.with_part("mass", getattr(chain, place), word, value),
     )
 
 
-def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
-    """The dampings of the shafts that have a damping ratio: d = 2 zeta sqrt(c J1 J2/(J1 + J2)).
-
-    J1 and J2 are the masses that the shaft joins, each with those joined to it rigidly without a gap: what
-    swings on this shaft when all others are cut.
-    """
-    welded = [shaft.rigid and shaft.gap == 0.0 for shaft in shafts]
-    found = np.zeros(len(shafts))
-    for k, shaft in enumerate(shafts):
-        if shaft.damping_ratio:
-            first, last = k, k + 1
-            while first > 0 and welded[first - 1]:
-                first -= 1
-            while last < len(shafts) and welded[last]:
-                last += 1
-            before, after = float(J[first : k + 1].sum()), float(J[k + 1 : last + 1].sum())
-            both = before * after / (before + after) if math.isfinite(before + after) else min(before, after)
-            found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * both)
-    return found
+def _own(word: str) -> Aggregate:
+    return Aggregate(attrgetter(word), lambda chain, value: replace(chain, **{word: value}))
 
 
-def _twists(chain: Chain, gap: Vector, c: Vector, pulls: Vector) -> Vector:
-    """Twists of the shafts at the chain's position; those of an unknown one are 0, its middle.
-
-    The driving flank is that on which the motor drives the masses behind the shaft. Hanging, each shaft is
-    wound up by the active loads `pulls` behind it.
-    """
-    if chain.position in ("mid-gap", "unknown"):
-        return np.zeros(gap.size)
-    motor = chain.motor_index
-    drives = np.where(np.arange(gap.size) >= motor, 1.0, -1.0)
-    if chain.position != "hanging":
-        return (0.5 if chain.position == "driving-flank" else -0.5) * drives * gap
-    behind = np.cumsum(pulls)[:-1]
-    behind[motor:] = np.cumsum(pulls[::-1])[::-1][1 + motor :]
-    return np.sign(behind) * drives * (0.5 * gap + np.abs(behind) / c)
+def _with_stiffness(chain: Chain, value: float) -> Chain:
+    factor = ratio_of(value, chain.stiffness)
+    shafts = (one if one.rigid else one.replace(stiffness=factor * one.stiffness) for one in chain.shafts)
+    return replace(chain, shafts=tuple(shafts))
 
 
-def one_chain(given: Chain | str | os.PathLike[str]) -> Chain:
-    """The chain itself, or that of a name or file; InputError for anything else."""
-    return object_of(given, Chain, Chain.load, "chain: give one Chain")
+AGGREGATES: Mapping[str, Aggregate] = {
+    "gap": Aggregate(lambda chain: chain.gap_and_inertia[0], Chain.with_gap),
+    "stiffness": Aggregate(attrgetter("stiffness"), _with_stiffness),
+    "motor_inertia": _of_mass("motor_index", "inertia"),
+    "load_inertia": _of_mass("load_index", "inertia"),
+    "load_torque": _of_mass("load_index", "torque"),
+    "load_kind": _of_mass("load_index", "kind"),
+    "target_speed": _own("target_speed"),
+    "start_position": _own("position"),
+}
 
 
-Rest = ParamSpec("Rest")
-Result = TypeVar("Result")
-
-
-def by_name(
-    function: Callable[Concatenate[Chain, Rest], Result],
-) -> Callable[Concatenate[Chain | str | os.PathLike[str], Rest], Result]:
-    """The same function of a chain or of its name or file."""
-
-    @wraps(function)
-    def named(chain: Chain | str | os.PathLike[str], *rest: Rest.args, **options: Rest.kwargs) -> Result:
-        return function(one_chain(chain), *rest, **options)
-
-    return named  # type: ignore[return-value]  # `chain` may be given by its name as well
-
-
-def load_machine(given: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Drive | Chain:
-    """The drive or the chain of a file, or a shipped one by its name; `also` changes a chain.
-
-    A file is that of a chain if it has a table [[mass]].
-
-    >>> type(load_machine("crane-4amtkf")).__name__, type(load_machine("crane-4-mass")).__name__
-    ('Drive', 'Chain')
-    """
-    if is_chain(given):
-        return Chain.load(given, also=also)
-    try:
-        return Drive.load(given)
-    except InputError:
-        names = LIBRARY.names()
-        if refusal_of(given) == ABSENT and nearest(str(given), (*names, *library.names())) in names:
-            Chain.load(given)  # names the chain that was meant
-        raise
-
-
-def is_chain(given: str | os.PathLike[str]) -> bool:
-    """Whether a name or a path is that of a chain."""
-    if isinstance(given, str) and given in LIBRARY.names():
-        return given not in library.names()
-    with suppress(RefusedError):
-        return isinstance(given, str | os.PathLike) and is_chain_text(read_text(given))
-    return False
-
-
-def is_chain_text(text: str) -> bool:
-    """Whether a text is that of a chain: it has a table [[mass]].
-
-    >>> is_chain_text("[[mass]]"), is_chain_text("[motor]")
-    (True, False)
-    """
-    return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))
+def ratio_of(value: float, old: float) -> float:
+    """By which factor a value changes: 1 where it stays within rounding, and twice is exactly twice."""
+    if old == 0.0 or math.isclose(value, old, rel_tol=SAME):
+        return 1.0
+    return float(f"{value / old:.15g}")

@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart import formulas
-from softstart.chain.model import Chain, one_chain
+from softstart.chain.machines import as_chain
+from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
@@ -127,7 +128,7 @@ def verify_on_chain(
     ----------
     What a reduction keeps: [R], docs/theory/reduction.md; how to use it: docs/howto/reduce-a-driveline.md.
     """
-    chain, made = one_chain(chain), make_controller(controller, parameters)
+    chain, made = as_chain(chain), make_controller(controller, parameters)
     whole = simulate(chain, made, until, fitted_to=drive, base=drive)
     return Verification(simulate(drive, made, until), whole)
 
@@ -222,7 +223,7 @@ def two_mass_error(
     What two masses leave out: docs/theory/reduction.md; the 200 chains:
     tests/softstart/chain/test_verification.py.
     """
-    chain = one_chain(chain)
+    chain = as_chain(chain)
     drive = chain.design_drive if drive is None else drive
     verified, failed = [], {}
     for one in ready_controller_names() if controllers is None else controllers:

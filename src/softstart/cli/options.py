@@ -16,7 +16,8 @@ import click
 import numpy as np
 
 from softstart.chain.elements import LIBRARY as CHAINS
-from softstart.chain.model import Chain, is_chain
+from softstart.chain.machines import is_chain
+from softstart.chain.model import Chain
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness

@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.chain.model import is_chain_text
+from softstart.chain.machines import is_chain_text
 from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError
 from softstart.input.documents import parsed

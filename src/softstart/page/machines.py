@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Values, varied
-from softstart.chain.model import Chain, is_chain_text
+from softstart.chain.machines import Values, is_chain_text, varied
+from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.controller.tuned import Tuned

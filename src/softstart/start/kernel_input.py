@@ -19,7 +19,8 @@ from softstart.kernel import records as rec
 from softstart.kernel.motor import encoder_count
 
 if TYPE_CHECKING:
-    from softstart.chain.model import Chain, ChainArrays
+    from softstart.chain.arrays import ChainArrays
+    from softstart.chain.model import Chain
 
 LAWS: Final = {"no-pull": rec.NO_PULL, "dead-zone": rec.DEAD_ZONE, "modelica": rec.MODELICA}
 LONGEST: Final = 100_000  # elastic periods of one start

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, overload
 
-from softstart.chain.machines import MachineLike
-from softstart.chain.model import load_machine
+from softstart.chain.machines import MachineLike, load_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive.machine import Machine

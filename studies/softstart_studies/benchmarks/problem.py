@@ -80,7 +80,7 @@ class Problem:
 
     def machines(self, count: int = 0) -> list[Any]:
         """So many variants; without a count the machine itself."""
-        from softstart.chain.model import load_machine
+        from softstart.chain.machines import load_machine
 
         one: Any = load_machine(self.machine) if isinstance(self.machine, str) else self.machine
         damped = self.strategy.startswith(DAMPED)

@@ -14,8 +14,9 @@ import numpy as np
 from scipy import optimize
 
 from softstart.arrays import Vector
+from softstart.chain.arrays import ChainArrays
 from softstart.chain.elements import Mass, Shaft
-from softstart.chain.model import Chain, ChainArrays
+from softstart.chain.model import Chain
 from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
