@@ -49,10 +49,11 @@ from softstart.quantities import show
 # mass[2].inertia, mass[drum].inertia, or mass_2_inertia
 PART = re.compile(r"(mass|shaft)(?:\[(.+)\]\.|_(\d+)_)(\w+)")
 SAME = 1e-12  # within this share two gaps are one, whatever binary makes of their sum
-OTHER_DAMPING = {
+# of a shaft, each excludes the other
+INSTEAD: Mapping[str, dict[str, Any]] = {
     "damping": {"damping_ratio": None},
     "damping_ratio": {"damping": 0.0},
-}  # each excludes the other
+}
 BRANCHES = (
     "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
     "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "
@@ -674,8 +675,8 @@ class Chain(Machine):
         parts: list[Any] = list(self.masses if kind == "mass" else self.shafts)
         if word == "gap" and parts[index].gap:
             parts[index] = parts[index].widened(ratio_of(value, parts[index].gap))
-        else:  # of two that exclude one another
-            more = OTHER_DAMPING.get(word, {}) if kind == "shaft" else {}
+        else:
+            more = INSTEAD.get(word, {}) if kind == "shaft" else {}
             parts[index] = parts[index].replace(**{word: value}, **more)
         changed: dict[str, Any] = {"masses" if kind == "mass" else "shafts": tuple(parts)}
         return replace(self, **changed)
