@@ -27,7 +27,7 @@ UV := $(BIN)/uv pip install --quiet --python $(BIN)/python
 install = ($(PIP) install --only-binary :all: uv && $(UV) --editable '$(1)') || $(PIP) install --editable '$(1)'
 EVERYTHING := .[dev,docs,page,package]
 
-unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules anew
+unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would recompile all modules
 
 .PHONY: compare test slow check fuzz everything floors pythons serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 

@@ -22,8 +22,9 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
     "sphinx_copybutton",
-    "mathml",  # the four below are in _ext
+    "mathml",  # the five below are in _ext
     "house_docstrings",
+    "further_reading",
     "generated_pages",
     "public_names",
 ]

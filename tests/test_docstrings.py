@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 import inspect
 import re
+import runpy
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +15,8 @@ import softstart
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 FUNCTIONS = [name for name in softstart.__all__ if inspect.isfunction(getattr(softstart, name))]
 CLASSES = [name for name in softstart.__all__ if inspect.isclass(getattr(softstart, name))]
+DOCS = Path(__file__).parent.parent / "docs"
+FURTHER = runpy.run_path(str(DOCS / "_ext" / "further_reading.py"))  # the pages about each module
 # raised by softstart: their text is all they have, and no paper is its source
 ERRORS = {"InfeasibleError", "InputError", "OptimumError", "SimulationError"}
 # others are returned, not called by users
@@ -39,7 +43,14 @@ def test_summary_and_example(name: str) -> None:
     assert first.endswith("."), f"{name}: the first line is one sentence"
     assert ">>>" in found.get("Examples", ""), f"{name}: no example under Examples"
     if name not in ERRORS:
-        assert found.get("References", "").strip(), f"{name}: no source under References"
+        pages = FURTHER["pages_of"](getattr(softstart, name).__module__)
+        assert pages or found.get("References", "").strip(), f"{name}: neither page nor References"
+
+
+def test_pages_about_modules_exist() -> None:
+    assert [
+        page for pages in FURTHER["PAGES"].values() for page in pages if not (DOCS / f"{page}.md").exists()
+    ] == []
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
-MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
+MORE_MISTAKES = re.compile(r"(\d+) more errors\.")
 MOST, LONGEST = 30, 1500  # sentences of one error, and characters of one sentence: more would fill pages
 
 
@@ -31,7 +31,7 @@ class InputError(ValueError):
     def __init__(self, sentences: Iterable[str] | str) -> None:
         found = [sentences] if isinstance(sentences, str) else list(sentences)
         if len(found) > MOST + 1:
-            found[MOST:] = [f"{len(found) - MOST} more things are wrong."]
+            found[MOST:] = [f"{len(found) - MOST} more errors."]
         self.sentences: tuple[str, ...] = tuple(map(_readable, found))
         super().__init__("\n".join(self.sentences))
 

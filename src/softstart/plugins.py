@@ -29,6 +29,15 @@ def registered(group: str) -> dict[str, EntryPoint]:
     return {point.name: point for point in sorted(points, key=lambda point: point.name)}
 
 
+def controller_names() -> tuple[str, ...]:
+    """Names of all installed controllers, the built-in ones and those of other packages; none is imported.
+
+    >>> "direct" in controller_names()
+    True
+    """
+    return tuple(registered(CONTROLLERS))
+
+
 def _of_checkout(group: str) -> list[EntryPoint]:
     if not CHECKOUT.is_file():
         return []

@@ -44,10 +44,6 @@ class TorqueProfile(OneLine):
     >>> pulse = TorqueProfile([0.0, 0.25, 0.25, 1.0], [62.0, 62.0, 0.0, 48.0])
     >>> pulse.at([0.0, 0.25, 0.5, 2.0]).tolist()
     [62.0, 0.0, 16.0, 48.0]
-
-    References
-    ----------
-    Profiles of optimal starts: docs/theory/optimum.md; reaction to contact: docs/optimal-starts.md.
     """
 
     time: Vector

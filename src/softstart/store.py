@@ -36,18 +36,6 @@ NAMED = 3  # damaged parts that are named
 REMOVING = threading.RLock()
 
 
-def warn_of_damage(path: Path, parts: Sequence[str]) -> None:
-    """Say which parts of a target are not as they were written; the caller computes them again."""
-    if parts:
-        shown = [*parts[:NAMED], f"{len(parts) - NAMED} more"] if len(parts) > NAMED + 1 else list(parts)
-        verb = "are" if len(parts) > 1 else "is"
-        warnings.warn(
-            f"{path}: {listed(shown)} {verb} damaged (wrong checksum) and made again; all else is kept.",
-            DamagedWarning,
-            stacklevel=2,
-        )
-
-
 class Target(NamedTuple):
     """Where results are kept: the option that named it, its path, and what it holds ("sweep").
 
@@ -60,9 +48,14 @@ class Target(NamedTuple):
     inside: str = ""
 
     @property
+    def kind(self) -> str:
+        """Folder or file."""
+        return "folder" if self.inside else "file"
+
+    @property
     def other(self) -> str:
         """What the user may do instead."""
-        return "give another folder" if self.inside else "name another file"
+        return f"choose another {self.kind}"
 
     def error(self, sentence: str) -> InputError:
         """The error for this target."""
@@ -70,27 +63,37 @@ class Target(NamedTuple):
 
     def foreign(self) -> InputError:
         """The error for a target that holds something else."""
-        kind = "folder" if self.inside else "file"
-        return self.error(f"this {kind} holds something else than a {self.content}; {self.other}.")
+        return self.error(f"not a {self.content} {self.kind}; {self.other}.")
 
     def damaged(self) -> InputError:
         """The error for a target that is damaged beyond use."""
-        what = "its list of finished parts" if self.inside else "this file"
-        return self.error(f"{what} is damaged; {self.other}, or delete this one to begin again.")
+        what = "its list of finished parts" if self.inside else "the file"
+        return self.error(f"{what} is damaged; {self.other}, or delete this one to start again.")
 
     def unwritable(self, error: Exception) -> InputError:
         """The error for a target that cannot be written."""
-        place = "a folder" if self.inside else "a file in a folder"
         reason = getattr(error, "strerror", None) or error
-        return self.error(f"nothing can be written there ({reason}); give {place} that you may write to.")
+        return self.error(f"cannot be written ({reason}); {self.other}.")
 
     def check_same(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
         """Raise InputError that names the inputs which differ from those that the target was begun with."""
         other = [name for name in {**before, **now} if before.get(name) != now.get(name)]
         if other:
             raise self.error(
-                f"it holds a {self.content} with another {listed(other)}; {self.other}, or delete this one "
-                "to begin again."
+                f"contains a {self.content} with another {listed(other)}; {self.other}, or delete this "
+                "one to start again."
+            )
+
+    def warn_of_damage(self, parts: Sequence[str]) -> None:
+        """Report the parts that are not as they were written; the caller computes them again."""
+        if parts:
+            shown = [*parts[:NAMED], f"{len(parts) - NAMED} more"] if len(parts) > NAMED + 1 else parts
+            verb = "are" if len(parts) > 1 else "is"
+            warnings.warn(
+                f"{self.path}: {listed(shown)} {verb} damaged (checksum mismatch) and will be recomputed; "
+                "the rest is kept.",
+                DamagedWarning,
+                stacklevel=2,
             )
 
     @contextmanager
@@ -108,8 +111,7 @@ class Target(NamedTuple):
                     raise self.foreign() from None
                 case "BUSY":
                     raise self.error(
-                        f"another process is writing this {self.content} now; wait for it or end it, or "
-                        f"{self.other}."
+                        f"another process is writing this {self.content}; wait for it, or {self.other}."
                     ) from None
                 case "FULL" | "IOERR" | "READONLY" | "CANTOPEN" | "PERM":
                     raise self.unwritable(error) from None
@@ -132,6 +134,7 @@ class PartStore:
         self.target, self.keys = target, keys
         self._inputs = json.dumps(inputs, sort_keys=True)
         self._parts: dict[str, Record] = {}
+        self.damaged: list[str] = []  # parts that were not as they had been written
         self._base: sqlite3.Connection | None = None
         self._open, self._stays = ExitStack(), False
 
@@ -150,7 +153,9 @@ class PartStore:
                 stack.callback(self._close, made)
                 stack.enter_context(at_stop(lambda: self._close(made)))
                 self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
-                warn_of_damage(self.target.path, self._read(self._base))
+                self.damaged = self._read(self._base)
+                if not self.target.inside:  # a folder reports its own files with them
+                    self.target.warn_of_damage(self.damaged)
                 self._open = stack.pop_all()
         return self
 

@@ -141,8 +141,7 @@ def natural_vibration(chain: Chain) -> Vibration:
 
     References
     ----------
-    [R]; docs/theory/reduction.md.
-    J. Demmel, W. Kahan, SIAM J. Sci. Stat. Comput. 11 (1990) 873-912, doi:10.1137/0911052: frequencies.
+    [R]; J. Demmel, W. Kahan, SIAM J. Sci. Stat. Comput. 11 (1990) 873-912, doi:10.1137/0911052: frequencies.
     I. S. Dhillon, B. N. Parlett, Linear Algebra Appl. 387 (2004) 1-28, doi:10.1016/j.laa.2003.12.028: shapes.
     """
     bodies = with_gaps_closed(chain.at_motor_shaft())
@@ -427,7 +426,7 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
 
     References
     ----------
-    [R]; the modal reduction: docs/theory/reduction.md.
+    [R].
     """
     arrays, load = chain.at_motor_shaft(), chain.load_mass
     wrong = []

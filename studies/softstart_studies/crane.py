@@ -102,4 +102,4 @@ def starts_figure(columns: Mapping[str, Mapping[str, Run]]) -> Figure:
         panels[0, 0].set(ylabel="motor torque, N m", ylim=(-3.0, 125.0), yticks=[0, 20, 40, 60])
         panels[1, 0].set_ylabel("shaft torque / $M_{12avg}$")
         panels[2, 0].set_ylabel("speed, rad/s\n(load; thin: motor; dotted: target)")
-    return figure  # type: ignore[no-any-return]
+    return figure

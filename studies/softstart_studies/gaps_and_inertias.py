@@ -222,7 +222,7 @@ def maps_figure(found: Grid, gains: str, heading: str) -> Figure:
             panel.set_title(name, loc="left")
         entitle(figure, f"$K_{{dyn}}$ over the optimum in the same time, active load, {heading} (struck "
                         "through: slower than the defaults)")  # fmt: skip
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 class GapsAndInertias(Study):

@@ -332,7 +332,7 @@ def ratios_figure(found: Mapping[LoadKind, Grid]) -> Figure:
             heat_map(panel, ratios, gaps, worst[kind], scale, decimals=3)
             panel.set_title(f"{kind} load (at most {MOST[kind]:.2f} asked)", loc="left")
         figure.suptitle("worst $K_{dyn}$ of each cell over that of the optimum", fontsize=9.5)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 class PulseCoastHoldStudy(Study):

@@ -337,7 +337,7 @@ def positions_figure(found: Findings) -> Figure:
         axes[0, 0].set_yticks(places, found.strategies)
         axes[0, 0].invert_yaxis()
         axes[0, 0].legend(fontsize=8)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def life_figure(found: Findings) -> Figure:
@@ -357,7 +357,7 @@ def life_figure(found: Findings) -> Figure:
             panel.axvline(1.0, color=GREY, lw=0.8, ls=":")
             panel.set_yscale("log")
         axes[0, 0].legend(fontsize=8)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _draw_points(panel: Any, name: str, points: Mapping[str, tuple[Any, Any]], up: str, across: str) -> None:

@@ -192,7 +192,7 @@ def life_figure(found: Life, over: bool) -> Figure:
             decade_ticks(axes[0].yaxis)
         axes[0].legend(loc="upper left")
         entitle(figure, f"{label} while the gap wears ({note})")
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 class Wear(Study):

@@ -126,10 +126,10 @@ def test_the_drive_may_get_limits_and_no_other_gap(folder: Path, tmp_path: Path)
     assert Identification.load(tmp_path).drive.limits.shaft_torque == 150.0
     wider = Drive.from_toml(text).replace(gap=0.1)
     (tmp_path / "drive.toml").write_text(wider.to_toml(), encoding="utf-8")
-    with pytest.raises(InputError, match=r"drive.toml: shaft.gap = 0.1, and the logs say 0.0"):
+    with pytest.raises(InputError, match=r"drive.toml: shaft.gap = 0.1, but it was identified as 0.0"):
         Identification.load(tmp_path)
     assert Identification.load(folder).with_settings(["start.target_speed=60"]).drive.target_speed == 60.0
-    with pytest.raises(InputError, match=r"--set shaft.gap=0.3: shaft.gap = 0.3, and the logs say"):
+    with pytest.raises(InputError, match=r"--set shaft.gap=0.3: shaft.gap = 0.3, but it was identified as"):
         Identification.load(folder).with_settings(["shaft.gap=0.3"])
 
 

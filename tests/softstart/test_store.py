@@ -51,7 +51,7 @@ def refused(path, sentence, **inputs):
 
 def test_other_inputs_are_named_and_their_file_left_alone(path):
     others = {"drive": "x", "seed": 1, "more": 1}
-    refused(path, "holds a tuning with another drive, seed and more; name another file", **others)
+    refused(path, "contains a tuning with another drive, seed and more; choose another file", **others)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\n", b"letter" * 999, "database"])
@@ -62,7 +62,7 @@ def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
             base.execute("CREATE TABLE notes (text)")
     else:
         path.write_bytes(content)
-    refused(path, "this file holds something else than a tuning; name another file")
+    refused(path, "not a tuning file; choose another file")
 
 
 def test_no_flipped_bit_comes_back_as_a_number(path):
@@ -80,7 +80,7 @@ def test_no_flipped_bit_comes_back_as_a_number(path):
                     for one in PARTS:
                         store.add(one)
             except InputError as error:
-                assert re.search("something else than|is damaged|readonly", str(error))  # noqa: PT017
+                assert re.search("not a|is damaged|readonly", str(error))  # noqa: PT017
                 continue
         assert all(one in (None, true) for one, true in zip(found, PARTS, strict=True))
         if None in found:
@@ -97,7 +97,7 @@ def test_no_flipped_bit_comes_back_as_a_number(path):
 def test_a_file_that_was_cut_off_is_refused_or_begun_again(path, size):
     os.truncate(path, size)
     if size:
-        refused(path, "is damaged|something else|cannot|nothing can be written")
+        refused(path, "is damaged|not a|cannot")
     else:
         assert found_in(path) == [None] * 4
 
@@ -125,7 +125,7 @@ def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=False)
     assert "InputError: save_to = " in done.stderr.splitlines()[-1]
-    assert "nothing can be written there" in done.stderr
+    assert "cannot be written" in done.stderr
     assert found_in(path)[:3] == PARTS
 
 
@@ -147,7 +147,7 @@ def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
         [sys.executable, "-c", HOLDER, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert holder.stdout.readline() == b"held\n"
-    refused(path, "another process is writing this tuning now; wait for it or end it, or name another file")
+    refused(path, "another process is writing this tuning; wait for it, or choose another file")
     (left,) = tmp_path.glob(".softstart-*.part")
     with fresh_folder(tmp_path):
         assert left.is_dir()

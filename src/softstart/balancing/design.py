@@ -167,7 +167,7 @@ class Balance(Result, view="balances.balance_sheet"):
     @property
     def note(self) -> str:
         """Why no balancer was designed; empty if one was."""
-        if any(one.shafts for one in self.residuals if one.name != "own-shafts"):
+        if any(residual.shafts for residual in self.residuals if residual.name != "own-shafts"):
             return ""
         known = self.engine.cylinders.couples_known
         return (
@@ -202,7 +202,7 @@ class Balance(Result, view="balances.balance_sheet"):
         inertia = engine.inertia_harmonics * w**2
         pressed = engine.gas is not None
         gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
-        force, couple = (largest_of_orders(one) * w**2 for one in engine.crank_shaking)
+        force, couple = (largest_of_orders(forces) * w**2 for forces in engine.crank_shaking)
         couple = couple if engine.cylinders.couples_known else math.nan * couple
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
@@ -241,17 +241,17 @@ class Balance(Result, view="balances.balance_sheet"):
             "orders": self.orders(),
             "designs": [
                 {
-                    "name": one.name,
-                    "about": one.about,
-                    "at_tuning_speed": one.row(self.tuning_index),
+                    "name": residual.name,
+                    "about": residual.about,
+                    "at_tuning_speed": residual.row(self.tuning_index),
                     **{
                         f"largest_{name}": float(values.max())
-                        for name, values in one.columns.items()
+                        for name, values in residual.columns.items()
                         if values is not None and name.endswith(("moment", "force", "couple"))
                     },
-                    "speeds": [one.row(i) for i in self.shown_indices],
+                    "speeds": [residual.row(i) for i in self.shown_indices],
                 }
-                for one in self.residuals
+                for residual in self.residuals
             ],
         }
 
@@ -290,7 +290,7 @@ def balance(
 
     References
     ----------
-    [B]: Khalaakin, on reducing the dynamic load of piston engines with balancing mechanisms; docs/paper-b.md.
+    [B]: Khalaakin, on reducing the dynamic load of piston engines with balancing mechanisms.
 
     Examples
     --------
@@ -303,18 +303,18 @@ def balance(
     own_speed = engine.tuning_speed if tuning_speed is None else tuning_speed
     tuning = number_in("rad/s", own_speed, "tuning_speed")
     if speeds is None:
-        asked = _round_speeds(operation.lowest_speed, operation.highest_speed)
+        shown = _round_speeds(operation.lowest_speed, operation.highest_speed)
     else:
-        asked = np.atleast_1d(np.asarray(to_si(list(speeds), "rad/s", "speeds")))
-    for name, values in (("tuning_speed", np.array([tuning])), ("speeds", asked)):
+        shown = np.atleast_1d(np.asarray(to_si(list(speeds), "rad/s", "speeds")))
+    for name, values in (("tuning_speed", np.array([tuning])), ("speeds", shown)):
         if np.any(values <= 0.0):
             raise InputError(f"{name} = {values.min():g} rad/s: a speed must be above 0.")
     range_of = np.linspace(operation.lowest_speed, operation.highest_speed, POINTS)
-    every = np.unique(np.concatenate([range_of, asked, [tuning]]))
-    given = operation.load if load is None else float(load)
-    torque = np.outer(every**2, engine.inertia_harmonics)
+    all_speeds = np.unique(np.concatenate([range_of, shown, [tuning]]))
+    load_used = operation.load if load is None else float(load)
+    torque = np.outer(all_speeds**2, engine.inertia_harmonics)
     if engine.gas is not None:
-        torque += [engine.gas_harmonics(float(speed), given) for speed in every]
+        torque += [engine.gas_harmonics(float(speed), load_used) for speed in all_speeds]
 
     layouts: list[tuple[str, str, tuple[BalancerShaft, ...], Complex | None]]
     layouts = [("none", "no balancer shafts", (), None)]
@@ -323,10 +323,10 @@ def balance(
     for name, about, gas, variable, sideways in DESIGNS if free_force(engine) else ():
         if gas and engine.gas is None:
             continue
-        speeds_of_arm = every if variable else np.full(every.size, tuning)
-        places = np.array([arm(engine, float(w), given, gas=gas) for w in speeds_of_arm])
+        speeds_of_arm = all_speeds if variable else np.full(all_speeds.size, tuning)
+        places = np.array([arm(engine, float(w), load_used, gas=gas) for w in speeds_of_arm])
         places = places if sideways else places.real + 0j
-        shafts = two_shafts(engine, complex(places[np.argmin(np.abs(every - tuning))]))
+        shafts = two_shafts(engine, complex(places[np.argmin(np.abs(all_speeds - tuning))]))
         layouts.append((name, about, shafts, places))
     against, along = couple_shaft(engine, -1), couple_shaft(engine, 1)
     if against:
@@ -335,8 +335,8 @@ def balance(
         )
     if along:
         layouts.append(("two-couple-shafts", "a second one that turns with the crank", against + along, None))
-    residuals = tuple(_residual(engine, every, torque, *layout) for layout in layouts)
-    return Balance(engine, given, tuning, every, asked, residuals)
+    residuals = tuple(_residual(engine, all_speeds, torque, *layout) for layout in layouts)
+    return Balance(engine, load_used, tuning, all_speeds, shown, residuals)
 
 
 def _round_speeds(low: float, high: float) -> Vector:

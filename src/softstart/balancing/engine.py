@@ -72,8 +72,7 @@ USUAL = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed", "speeds"
 
 def force_at(force: Complex, phi: ArrayLike) -> Complex:
     """The vector at crank angles in rad, over w^2."""
-    found: Complex = (np.exp(1j * np.multiply.outer(np.asarray(phi), TURNS)) * force).sum(axis=-1)
-    return found
+    return (np.exp(1j * np.multiply.outer(np.asarray(phi), TURNS)) * force).sum(axis=-1)
 
 
 def largest_of_orders(force: Complex) -> Vector:
@@ -161,7 +160,7 @@ class Engine:
 
     References
     ----------
-    [B]: Khalaakin, on reducing the dynamic load of piston engines with balancing mechanisms; docs/paper-b.md.
+    [B]: Khalaakin, on reducing the dynamic load of piston engines with balancing mechanisms.
 
     Examples
     --------
@@ -199,23 +198,25 @@ class Engine:
         >>> Engine.from_toml(engine.to_toml()) == engine
         True
         """
-        found = read_document(text, TABLES, "an engine", where=where, also=also, usual=USUAL)
+        document = read_document(text, TABLES, "an engine", where=where, also=also, usual=USUAL)
         before = f"{where}: " if where else ""
         wrong: list[str] = []
         parts: dict[str, Any] = {"gas": None}
         for key, make in PARTS.items():
             first, *others = (table.name for table in PART_TABLES[key])
-            if found[first] is not None:
-                values = found[first] | {k: v for name in others for k, v in (found[name] or {}).items()}
+            if document[first] is not None:
+                values = document[first] | {
+                    k: v for name in others for k, v in (document[name] or {}).items()
+                }
                 parts[key] = construct(make, values, f"{before}[{first}] ", wrong)
         parts["shafts"] = [
             construct(BalancerShaft, row, f"{before}[shaft] {i}, ", wrong)
-            for i, row in enumerate(found["shaft"], 1)
+            for i, row in enumerate(document["shaft"], 1)
         ]
         if wrong:
             raise InputError(wrong)
         try:
-            return cls(**parts, **found[""])
+            return cls(**parts, **document[""])
         except InputError as error:
             raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
 
@@ -258,21 +259,19 @@ class Engine:
         theta = np.asarray(theta, dtype=np.float64)
         gas, weights = self._weights(speed, load)
         difference = weights @ gas.shapes(self.cylinders, theta.ravel())
-        found: Vector = difference.reshape(theta.shape) + gas.crankcase_pressure
-        return found
+        return difference.reshape(theta.shape) + gas.crankcase_pressure
 
     def gas_torque(self, phi: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Torque in N m of the gas of all cylinders on the crank, at crank angles in rad."""
         theta = np.mod(-np.subtract.outer(self.cylinders.firing_angles, phi), CYCLE_ANGLE)
         difference = self.pressure(theta, speed, load) - self._weights(speed, load)[0].crankcase_pressure
-        found: Vector = -self.cylinders.area * (difference * self.cylinders.crank.slope(theta)).sum(axis=0)
-        return found
+        return -self.cylinders.area * (difference * self.cylinders.crank.slope(theta)).sum(axis=0)
 
     def inertia_torque(self, phi: ArrayLike, speed: float) -> Vector:
         """Torque in N m of the reciprocating masses on the crank: -m w^2 s' s'' for each cylinder."""
         theta, crank = -np.subtract.outer(self.cylinders.firing_angles, phi), self.cylinders.crank
-        found: Vector = (crank.slope(theta) * crank.curvature(theta)).sum(axis=0)
-        return -self.masses.reciprocating * speed**2 * found
+        products: Vector = (crank.slope(theta) * crank.curvature(theta)).sum(axis=0)
+        return -self.masses.reciprocating * speed**2 * products
 
     def torque(self, phi: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Torque in N m of gas and inertia on the crank. Its reaction acts on the housing."""
@@ -283,24 +282,23 @@ class Engine:
     @cached_property
     def _turned(self) -> Complex:
         """Sum over the cylinders of exp(-i q firing angle), 0 where an order cancels."""
-        found: Complex = np.exp(-1j * np.outer(ORDERS, self.cylinders.firing_angles)).sum(axis=1)
-        found[np.abs(found) < 1e-12 * self.cylinders.count] = 0.0
-        return found
+        sums: Complex = np.exp(-1j * np.outer(ORDERS, self.cylinders.firing_angles)).sum(axis=1)
+        sums[np.abs(sums) < 1e-12 * self.cylinders.count] = 0.0
+        return sums
 
     def gas_harmonics(self, speed: float, load: float | None = None) -> Complex:
         """C_q of the gas torque Re sum C_q exp(i q phi) in N m, q as in `ORDERS`; [B](2) has z A and z B."""
         gas, weights = self._weights(speed, load)
-        found: Complex = weights @ torque_harmonics(gas, self.cylinders) * self._turned
-        return found
+        return weights @ torque_harmonics(gas, self.cylinders) * self._turned
 
     @cached_property
     def inertia_harmonics(self) -> Complex:
         """The same of the inertia torque over w^2, in kg m^2, [B](3): B_k sin is -i B_k here."""
-        found = np.zeros(2 * HIGHEST + 1, dtype=np.complex128)
+        harmonics = np.zeros(2 * HIGHEST + 1, dtype=np.complex128)
         crank = self.cylinders.crank
         whole = inertia_torque_harmonics(crank.ratio, HIGHEST)
-        found[::2] = -1j * self.masses.reciprocating * crank.r**2 * whole
-        return found * self._turned
+        harmonics[::2] = -1j * self.masses.reciprocating * crank.r**2 * whole
+        return harmonics * self._turned
 
     def torque_harmonics(self, speed: float, load: float | None = None) -> Complex:
         """The same of gas and inertia together, in N m."""
@@ -315,10 +313,10 @@ class Engine:
         """
         if not 0.5 <= orders <= HIGHEST:
             raise InputError(f"orders = {orders}: harmonics from order 0.5 to {HIGHEST} can be taken.")
-        found = self.torque_harmonics(speed, load)
+        harmonics = self.torque_harmonics(speed, load)
         kept = (self._turned != 0.0) & (ORDERS > 0.0) & (orders >= ORDERS)
         return PeriodicTorque(
-            float(found[0].real), ORDERS[kept], found[kept].real, -found[kept].imag, float(speed)
+            float(harmonics[0].real), ORDERS[kept], harmonics[kept].real, -harmonics[kept].imag, float(speed)
         )
 
     # ---- forces on the housing ---------------------------------------------------------------------------

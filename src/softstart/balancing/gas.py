@@ -54,10 +54,10 @@ def torque_harmonics(cycle: SimpleCycle, cylinders: Cylinders) -> Complex:
     torque = cycle.shapes(cylinders, theta) * per_pressure * weights
     turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * HIGHEST + 1)))
     # einsum: threads of a BLAS cost more than such a small product where other processes work too
-    found: Complex = np.einsum("sn,nj->sj", torque, turning) * (2.0 / CYCLE_ANGLE)
-    found[:, 0] *= 0.5
-    found.setflags(write=False)
-    return found
+    harmonics: Complex = np.einsum("sn,nj->sj", torque, turning) * (2.0 / CYCLE_ANGLE)
+    harmonics[:, 0] *= 0.5
+    harmonics.setflags(write=False)
+    return harmonics
 
 
 class SimpleCycle(ParameterSet, kw_only=False):
@@ -178,31 +178,31 @@ class SimpleCycle(ParameterSet, kw_only=False):
     def shapes(self, cylinders: Cylinders, theta: Vector) -> Vector:
         """Pressures per Pa of intake, per Pa of exhaust, per J of heat, and 1; shape (4, n)."""
         theta = np.mod(np.asarray(theta, dtype=np.float64), CYCLE_ANGLE)
-        found = np.zeros((4, theta.size))
-        found[3] = 1.0
+        shapes = np.zeros((4, theta.size))
+        shapes[3] = 1.0
         psi = np.where(theta < 3.0 * math.pi, theta, theta - CYCLE_ANGLE)  # from firing dead centre
         end = self.exhaust_opening + self.blowdown
         closed = psi < end
-        found[1, ~closed & (psi < 2.0 * math.pi)] = 1.0
-        found[0, psi >= 2.0 * math.pi] = 1.0
+        shapes[1, ~closed & (psi < 2.0 * math.pi)] = 1.0
+        shapes[0, psi >= 2.0 * math.pi] = 1.0
         volume = self._volume(cylinders, psi[closed])
         full, start = (float(v) for v in self._volume(cylinders, np.array([math.pi, self.combustion_start])))
         n_c, n = self.compression_exponent, self.expansion_exponent
         compressed = (full / volume) ** n_c
         expanded = (full / start) ** n_c * (start / volume) ** n
         burning = psi[closed] >= -self.combustion_start
-        found[0, closed] = np.where(burning, expanded, compressed)
+        shapes[0, closed] = np.where(burning, expanded, compressed)
         edges, pieces = _heat_pieces(self, cylinders)
         within = np.clip(psi[closed], edges[0], edges[-1])
         heat = np.piecewise(within, [within >= edge for edge in edges[:-1]], pieces)
-        found[2, closed] = (n - 1.0) * heat / volume**n
+        shapes[2, closed] = (n - 1.0) * heat / volume**n
         if self.blowdown > 0.0:
             with np.errstate(over="ignore"):  # a very short blowdown
                 share = np.clip((psi[closed] - self.exhaust_opening) / self.blowdown, 0.0, 1.0)
             left = 0.5 * (1.0 + np.cos(math.pi * share))
-            found[:3, closed] *= left
-            found[1, closed] += 1.0 - left
-        return found
+            shapes[:3, closed] *= left
+            shapes[1, closed] += 1.0 - left
+        return shapes
 
     def weights(self, cylinders: Cylinders, speed: float, load: float) -> Vector:
         """Factors on `shapes` that give the pressure difference in Pa on the piston.

@@ -39,8 +39,7 @@ class SliderCrank:
     def height(self, phi: ArrayLike) -> Vector:
         """Height in m of the piston pin above the crank axis, r cos(phi) + sqrt(rod^2 - r^2 sin(phi)^2)."""
         phi = np.asarray(phi, dtype=np.float64)
-        found: Vector = self.r * np.cos(phi) + self.rod * self._cosine(phi)
-        return found
+        return self.r * np.cos(phi) + self.rod * self._cosine(phi)
 
     def slope(self, phi: ArrayLike) -> Vector:
         """First derivative of the height by phi, in m/rad; at constant w the piston's speed over w.
@@ -49,8 +48,7 @@ class SliderCrank:
         -1.0
         """
         phi = np.asarray(phi, dtype=np.float64)
-        found: Vector = -self.r * np.sin(phi) * (1.0 + self.ratio * np.cos(phi) / self._cosine(phi))
-        return found
+        return -self.r * np.sin(phi) * (1.0 + self.ratio * np.cos(phi) / self._cosine(phi))
 
     def curvature(self, phi: ArrayLike) -> Vector:
         """Second derivative of the height by phi, in m/rad^2; at constant w the acceleration over w^2.
@@ -61,8 +59,7 @@ class SliderCrank:
         phi = np.asarray(phi, dtype=np.float64)
         q = self._cosine(phi)
         bend = np.cos(2.0 * phi) / q + (0.5 * self.ratio * np.sin(2.0 * phi)) ** 2 / q**3
-        found: Vector = -self.r * (np.cos(phi) + self.ratio * bend)
-        return found
+        return -self.r * (np.cos(phi) + self.ratio * bend)
 
     def _cosine(self, phi: Vector) -> Vector:
         """Cosine of the angle between rod and cylinder."""
@@ -77,9 +74,9 @@ def acceleration_harmonics(ratio: float, orders: int) -> Vector:
     >>> acceleration_harmonics(0.25, 4).round(6).tolist()
     [0.0, 1.0, 0.254025, 0.0, -0.004098]
     """
-    found: Vector = -2.0 / PHI.size * np.fft.rfft(SliderCrank(1.0, 1.0 / ratio).curvature(PHI)).real
-    found[0] = found[3::2] = 0.0  # by symmetry
-    return found[: orders + 1]
+    harmonics: Vector = -2.0 / PHI.size * np.fft.rfft(SliderCrank(1.0, 1.0 / ratio).curvature(PHI)).real
+    harmonics[0] = harmonics[3::2] = 0.0  # by symmetry
+    return harmonics[: orders + 1]
 
 
 def inertia_torque_harmonics(ratio: float, orders: int) -> Vector:
@@ -91,6 +88,6 @@ def inertia_torque_harmonics(ratio: float, orders: int) -> Vector:
     [0.0, 0.063506, -0.50013, -0.192056, -0.016129]
     """
     crank = SliderCrank(1.0, 1.0 / ratio)
-    found: Vector = 2.0 / PHI.size * np.fft.rfft(crank.slope(PHI) * crank.curvature(PHI)).imag
-    found[0] = 0.0
-    return found[: orders + 1]
+    harmonics: Vector = 2.0 / PHI.size * np.fft.rfft(crank.slope(PHI) * crank.curvature(PHI)).imag
+    harmonics[0] = 0.0
+    return harmonics[: orders + 1]

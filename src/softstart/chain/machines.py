@@ -128,10 +128,6 @@ def records(machine: Machine | Records | str, **fields: Any) -> Records:
     [3.118, 4.865]
     >>> records(crane, gap=[[0.5], [2.0]], load_inertia=["0.1 kg*m^2", 0.175]).shape
     (2, 2)
-
-    References
-    ----------
-    docs/howto/python-in-a-notebook.md.
     """
     return _records(machine, fields, Columns.replace)
 

@@ -111,7 +111,7 @@ class Chain(Machine):
 
     References
     ----------
-    [R]; everything at one shaft: docs/theory/reduction.md; the file: docs/reference/chain-file.md.
+    [R].
     """
 
     WHAT: ClassVar[str] = "a chain"

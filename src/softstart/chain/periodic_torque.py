@@ -43,7 +43,7 @@ class PeriodicTorque:
 
     References
     ----------
-    [B] (2), (3); harmonics of the gas and inertia torque: docs/theory/balancer.md.
+    [B] (2), (3).
     """
 
     mean: float

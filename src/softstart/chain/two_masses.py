@@ -126,7 +126,7 @@ def verify_on_chain(
 
     References
     ----------
-    What a reduction keeps: [R], docs/theory/reduction.md; how to use it: docs/howto/reduce-a-driveline.md.
+    What a reduction keeps: [R].
     """
     chain, made = as_chain(chain), make_controller(controller, parameters)
     whole = simulate(chain, made, until, fitted_to=drive, base=drive)
@@ -217,11 +217,6 @@ def two_mass_error(
     >>> found = two_mass_error(chain, controllers=["direct", "ramp"])
     >>> [round(one.error, 3) for one in found.verified], round(found.of_torques, 3), found.enough
     ([0.029, 0.017], 0.138, False)
-
-    References
-    ----------
-    What two masses leave out: docs/theory/reduction.md; the 200 chains:
-    tests/softstart/chain/test_verification.py.
     """
     chain = as_chain(chain)
     drive = chain.design_drive if drive is None else drive

@@ -26,7 +26,7 @@ from softstart.input.parameters import Parameter, Wording, read_value
 from softstart.quantities import RefusedError
 from softstart.stopping import at_stop
 
-__all__ = ["asked", "prompt_text"]
+__all__ = ["ask_data_sheet", "prompt_text"]
 
 # asked only where one of the others was answered
 AFTER = {
@@ -45,10 +45,10 @@ EMPTY = "# left empty: "
 
 
 class _Answers:
-    """What was answered, by path, kept in a file after each answer; `given` is of the command line."""
+    """What was answered, by path, kept in a file after each answer; `settings` is of the command line."""
 
-    def __init__(self, file: Path, given: Mapping[str, object]) -> None:
-        self.file, self.given = file, given
+    def __init__(self, file: Path, settings: Mapping[str, object]) -> None:
+        self.file, self.settings = file, settings
         self.texts: dict[str, object] = {}
         self.seen: list[str] = []  # names of what was asked, in order
         if file.exists():
@@ -69,9 +69,9 @@ class _Answers:
 
     def values(self) -> dict[str, object]:
         """All values by path, but those that say something about another machine."""
-        machine = converted("machine", self.given.get("load.machine", self.texts.get("load.machine")))
+        machine = converted("machine", self.settings.get("load.machine", self.texts.get("load.machine")))
         other = {PARAMETERS[name].path for name, machines in ABOUT.items() if machine not in machines}
-        return {path: text for path, text in self.texts.items() if path not in other} | {**self.given}
+        return {path: text for path, text in self.texts.items() if path not in other} | {**self.settings}
 
     def known(self, name: str) -> bool:
         """Whether this was answered or given, and is not 0."""
@@ -87,7 +87,10 @@ class _Answers:
         about = machine in ABOUT.get(p.name, (machine,))
         after = any(map(self.known, AFTER.get(p.name, ()))) or p.name not in AFTER
         return (
-            p.path not in self.given and about and after and not any(map(self.known, UNLESS.get(p.name, ())))
+            p.path not in self.settings
+            and about
+            and after
+            and not any(map(self.known, UNLESS.get(p.name, ())))
         )
 
     def needed(self, p: Parameter) -> bool:
@@ -107,12 +110,12 @@ class _Answers:
         write_whole(self.file, lambda stream: stream.write("\n".join(lines) + "\n"))
 
 
-def asked(given: Mapping[str, object], file: Path) -> DataSheet:
-    """The data sheet of `given`, values by path, and of answers from standard input, kept in this file.
+def ask_data_sheet(settings: Mapping[str, object], file: Path) -> DataSheet:
+    """The data sheet of `settings`, values by path, and of answers from standard input, kept in this file.
 
     What contradicts is said, and what the sentence names is asked again.
     """
-    answers = _Answers(file, given)
+    answers = _Answers(file, settings)
     if answers.texts:
         _say(f"{len(answers.texts)} answers are taken up from {file}; remove it to begin again.")
     _say(f"Enter leaves a value out, {BACK[0]} goes back; the answers are kept in {file}.")

@@ -80,10 +80,10 @@ class Commands(click.Group):
         """The command of this name, imported; None if there is none."""
         if cmd_name not in COMMANDS:
             return super().get_command(ctx, cmd_name)
-        found: click.Command = getattr(
+        command: click.Command = getattr(
             import_module(f"softstart.cli.{COMMANDS[cmd_name][0]}"), f"{cmd_name}_command"
         )
-        return found
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of commands in the help, by purpose."""
@@ -95,10 +95,10 @@ class Commands(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options that begin with `incomplete`."""
-        found = [
+        items = [
             CompletionItem(name, help=short_help(name)) for name in COMMANDS if name.startswith(incomplete)
         ]
-        return found + click.Command.shell_complete(self, ctx, incomplete)
+        return items + click.Command.shell_complete(self, ctx, incomplete)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -24,8 +24,8 @@ def one_of(names: Callable[[], Iterable[str]], otherwise: str = "file", end: str
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         done, comma, begun = incomplete.rpartition(",")
-        found = [name for name in names() if name.startswith(begun) and name not in done.split(",")]
-        items = [CompletionItem(f"{done}{comma}{name}{end}") for name in found]
+        matches = [name for name in names() if name.startswith(begun) and name not in done.split(",")]
+        items = [CompletionItem(f"{done}{comma}{name}{end}") for name in matches]
         return items or [CompletionItem(incomplete, type=otherwise)]
 
     return complete
@@ -46,9 +46,9 @@ def completion_command(shell: str | None) -> None:
       eval "$(softstart completion zsh)"
       softstart completion fish | source
     """
-    asked = shell or Path(os.environ.get("SHELL", "")).name
-    made = get_completion_class(asked)
-    if made is None:
-        raise InputError(f'shell = "{asked}": no completion for this shell; {did_you_mean(asked, SHELLS)}')
+    name = shell or Path(os.environ.get("SHELL", "")).name
+    completion = get_completion_class(name)
+    if completion is None:
+        raise InputError(f'shell = "{name}": no completion for this shell; {did_you_mean(name, SHELLS)}')
     root = click.get_current_context().find_root().command
-    print(made(root, {}, "softstart", "_SOFTSTART_COMPLETE").source())
+    print(completion(root, {}, "softstart", "_SOFTSTART_COMPLETE").source())

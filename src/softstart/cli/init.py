@@ -9,8 +9,16 @@ from pathlib import Path
 import click
 
 from softstart.chain.elements import LIBRARY
-from softstart.cli.asking import asked
-from softstart.cli.options import changes_option, json_option, named_as_options, read_changes, typed_settings
+from softstart.cli.asking import ask_data_sheet
+from softstart.cli.options import (
+    command,
+    json_option,
+    named_as_options,
+    option,
+    read_changes,
+    set_option,
+    typed_settings,
+)
 from softstart.cli.running import working
 from softstart.drive import data_sheet_words as sheets
 from softstart.drive import library
@@ -28,15 +36,12 @@ TEMPLATE = """\
 ANSWERS = Path("softstart-init.sheet.toml")  # in the current folder
 
 
-@click.command("init")
+@command("init")
 @click.argument("sheet", required=False, metavar="[SHEET]")
-@changes_option(
-    DataSheet.TABLES,
-    "Set a value of the data sheet, for example motor.rated_power='3 kW' or gear.ratio=31.5.",
-)
-@click.option("--out", metavar="FILE", help="Drive file to write, for example mine.toml. Default: print it.")
-@click.option("--ask", is_flag=True, help="Ask for missing values; the default on a terminal without SHEET.")
-@click.option("--template", is_flag=True, help="Print an empty data sheet to fill in.")
+@set_option(DataSheet.TABLES)
+@option("--out")
+@option("--ask", is_flag=True)
+@option("--template", is_flag=True)
 @json_option
 def init_command(*, sheet: str | None, out: str | None, ask: bool, template: bool, as_json: bool) -> None:
     """Create a drive file from data sheet values.
@@ -44,41 +49,57 @@ def init_command(*, sheet: str | None, out: str | None, ask: bool, template: boo
     Asks for the values of rating plate, gearbox, shaft and load, and refers them to the motor shaft; comments
     in the file state the origin of each value, and what is assumed. SHEET is a TOML file with the values;
     --template prints one to fill in.
+
+    Options
+    -------
+    --set KEY=VALUE
+        Set a value of the data sheet, for example motor.rated_power='3 kW' or gear.ratio=31.5. May be
+        repeated.
+    --out FILE
+        Drive file to write, for example mine.toml. Default: print it.
+    --ask
+        Ask for missing values; the default on a terminal without SHEET.
+    --template
+        Print an empty data sheet to fill in.
     """
     if template:
         print(template_text(), end="")
         return
     if out is not None and Path(out).exists():
         raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
-    given = read_changes(typed_settings())
+    settings = read_changes(typed_settings())
     # of what is only printed, the answers are kept as long as they are not complete
     kept = ANSWERS if out is None else Path(out).with_suffix(".sheet.toml")
     asks = sheet is None and (ask or (sys.stdin.isatty() and not as_json))
     if asks:
-        found = asked(given, kept)
+        data_sheet = ask_data_sheet(settings, kept)
     else:
-        found = DataSheet.from_settings(given) if sheet is None else DataSheet.load(sheet, also=given)
-    text, drive = found.drive_toml(), found.drive  # what the drive refuses is said before anything is written
+        data_sheet = (
+            DataSheet.from_settings(settings) if sheet is None else DataSheet.load(sheet, also=settings)
+        )
+    # what the drive refuses is reported before anything is written
+    text, drive = data_sheet.drive_toml(), data_sheet.drive
     if asks and out is None:
         kept.unlink(missing_ok=True)
     if out is not None:
         with named_as_options(output="--out"):
             write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
-        values = {"data_sheet": found.values(), "drive": drive.values(), "at_output": drive.at_output}
-        print_json({**values, "plausibility_warnings": found.plausibility_warnings})
+        values = {"data_sheet": data_sheet.values(), "drive": drive.values(), "at_output": drive.at_output}
+        print_json({**values, "plausibility_warnings": data_sheet.plausibility_warnings})
         return
-    for one in found.plausibility_warnings:
-        print(f"softstart: doubt: {one}", file=sys.stderr)
-    for one in _both_ends(found):
-        print(f"softstart: {one}", file=sys.stderr)
+    for warning in data_sheet.plausibility_warnings:
+        print(f"softstart: warning: {warning}", file=sys.stderr)
+    for warning in _both_ends(data_sheet):
+        print(f"softstart: {warning}", file=sys.stderr)
     if out is None:
         print(text, end="")
         return
     assumed = f" Assumed: {drive.assumed}." if drive.assumed else ""
     shipped = out in (*library.names(), *LIBRARY.names())  # whose name alone would be that machine
     path = shlex.quote(f"./{out}" if shipped else out)
-    if isinstance(found.possible, UnknownStiffness) and (sheet or asks):  # the drive file has one end only
+    # the drive file has one end only
+    if isinstance(data_sheet.possible, UnknownStiffness) and (sheet or asks):
         path = shlex.quote(sheet or str(kept))
     sentence(console(), f"{out} is written.{assumed} What next: softstart compare {path}")
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.completion import one_of
-from softstart.cli.options import check_name, controller_names, drive_names
+from softstart.cli.options import check_name, command, drive_names
 from softstart.cli.running import Answer, answers, attributed, option_value, working
 from softstart.drive import Drive, library
 from softstart.errors import InputError, Mistakes
 from softstart.hints import did_you_mean
-from softstart.plugins import STUDIES, registered
+from softstart.plugins import STUDIES, controller_names, registered
 from softstart.study import Study, StudyResult, find_study
 from softstart.study import Table as Results
 from softstart.views.drawing import PICTURE_ENDINGS
@@ -30,7 +30,7 @@ OWN = (
 )
 
 
-@click.command("drives")
+@command("drives")
 @click.argument("name", required=False, shell_complete=one_of(drive_names))
 @answers()
 def drives_command(*, name: str | None) -> Answer:
@@ -40,8 +40,8 @@ def drives_command(*, name: str | None) -> Answer:
     """
     if name is None:
         shipped = {key: Drive.load(key) for key in drive_names()}
-        rows = [[key, printable(f"{one.name}\n{one.source}")] for key, one in shipped.items()]
-        data = [{"name": key, "title": one.name, "source": one.source} for key, one in shipped.items()]
+        rows = [[key, printable(f"{drive.name}\n{drive.source}")] for key, drive in shipped.items()]
+        data = [{"name": key, "title": drive.name, "source": drive.source} for key, drive in shipped.items()]
         table = TextTable.of_texts(("drive", "what it is, and its source"), rows)
         notes = ["A drive of your own begins as a copy of one of these."]
         shown = Sheet("Drives", ["Shipped drives"], tables=[table], notes=notes, commands=OWN)
@@ -53,7 +53,7 @@ def drives_command(*, name: str | None) -> Answer:
     return lambda: {"name": name, "drive": Drive.load(name).values()}, library.text(name)
 
 
-@click.command("controllers")
+@command("controllers")
 @click.argument("name", required=False, shell_complete=one_of(controller_names))
 @answers()
 def controllers_command(*, name: str | None) -> Answer:
@@ -64,15 +64,15 @@ def controllers_command(*, name: str | None) -> Answer:
     from softstart.controller import controller_class
 
     broken = Mistakes()
-    found: list[dict[str, Any]] = []
+    descriptions: list[dict[str, Any]] = []
     with working("looking at the controllers ..."):
-        for one in [check_name(name, "controller")] if name else controller_names():
-            with broken.collect(), attributed(one):
-                found.append(_described(one, controller_class(one)))
+        for label in [check_name(name, "controller")] if name else controller_names():
+            with broken.collect(), attributed(label):
+                descriptions.append(_described(label, controller_class(label)))
     if name:
         broken.raise_if_any()
-        return lambda: found[0], _one(found[0])
-    return lambda: {"controllers": found}, _all(found, broken.sentences)
+        return lambda: descriptions[0], _one(descriptions[0])
+    return lambda: {"controllers": descriptions}, _all(descriptions, broken.sentences)
 
 
 def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
@@ -91,11 +91,14 @@ def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
     }
 
 
-def _all(found: list[dict[str, Any]], broken: list[str]) -> Sheet:
-    sees = [", ".join(one["sensors"][2:]) for one in found]
+def _all(descriptions: list[dict[str, Any]], broken: list[str]) -> Sheet:
+    sees = [", ".join(description["sensors"][2:]) for description in descriptions]
     rows = [
-        [printable(cell) or "-" for cell in (one["name"], one["summary"], also, one["source"])]
-        for one, also in zip(found, sees, strict=True)
+        [
+            printable(cell) or "-"
+            for cell in (description["name"], description["summary"], also, description["source"])
+        ]
+        for description, also in zip(descriptions, sees, strict=True)
     ]
     table = TextTable.of_texts(("controller", "what it does", "also sees", "source"), rows)
     see = "All see time, the motor's encoder and its torque. Parameters of one: softstart controllers NAME"
@@ -104,7 +107,7 @@ def _all(found: list[dict[str, Any]], broken: list[str]) -> Sheet:
 
 def _one(about: dict[str, Any]) -> Sheet:
     keys = ("name", "unit", "meaning", "default")
-    rows = [[one[key] or "-" for key in keys] for one in about["parameters"]]
+    rows = [[parameter[key] or "-" for key in keys] for parameter in about["parameters"]]
     name, source = about["name"], about["source"]
     command = "softstart simulate crane-4amtkf --controller {} --param {}=VALUE"
     return Sheet(
@@ -120,36 +123,42 @@ def _one(about: dict[str, Any]) -> Sheet:
     )
 
 
-@click.command("study")
+@command("study")
 @click.argument("name", required=False, shell_complete=one_of(lambda: registered(STUDIES)))
-@answers("Write pictures (SVG, PNG), tables (CSV) and report.md into this folder.")
+@answers(out=True)
 def study_command(*, name: str | None) -> Answer:
-    """List the studies, or run one."""
+    """List the studies, or run one.
+
+    Options
+    -------
+    --out DIR
+        Write pictures (SVG, PNG), tables (CSV) and report.md into this folder.
+    """
     out = option_value("out")
     if name is None and out is not None:
         raise InputError(f'--out = "{out}": a list writes no files; name a study: softstart study NAME.')
     if name is None:
         return _studies()
-    found = find_study(name)
+    study = find_study(name)
     # what the study writes itself is put in place first
-    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as progress:
-        result = found.run(folder, lambda doing: progress(f"{found.name}: {doing}"))
-    return lambda: {"study": found.name, "title": found.title} | result.summary(), _study_sheet(found, result)
+    with output_folder(out) as folder, working(f"{study.name}: beginning ...") as progress:
+        result = study.run(folder, lambda doing: progress(f"{study.name}: {doing}"))
+    return lambda: {"study": study.name, "title": study.title} | result.summary(), _study_sheet(study, result)
 
 
 def _studies() -> Answer:
     """All studies as data, and as a table with those that cannot be loaded."""
-    found: list[Study] = []
+    studies: list[Study] = []
     broken = Mistakes()
     for name in registered(STUDIES):
         with broken.collect():
-            found.append(find_study(name))
+            studies.append(find_study(name))
     data = [
-        {"name": one.name, "title": one.title, "pictures": one.pictures,
-         "files": [f"{stem}.{ending}" for stem in one.pictures for ending in PICTURE_ENDINGS]}
-        for one in found
+        {"name": study.name, "title": study.title, "pictures": study.pictures,
+         "files": [f"{stem}.{ending}" for stem in study.pictures for ending in PICTURE_ENDINGS]}
+        for study in studies
     ]  # fmt: skip
-    rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
+    rows = [[study.name, study.title, ", ".join(study.pictures) or "-"] for study in studies]
     run = "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR"
     table = TextTable.of_texts(("study", "question", "pictures, each as .svg and .png"), rows)
     return lambda: {"studies": data}, Sheet(
@@ -157,19 +166,21 @@ def _studies() -> Answer:
     )
 
 
-def _study_sheet(found: Study, result: StudyResult) -> Sheet:
+def _study_sheet(study: Study, result: StudyResult) -> Sheet:
     """Tables, claims with their verdicts and evidence, pictures; each table and the claims as CSV."""
     files: dict[str, Writer] = {}
-    rows = [(one.statement, one.verdict, one.evidence) for one in result.claims]
+    rows = [(claim.statement, claim.verdict, claim.evidence) for claim in result.claims]
     claims = Results("claims", ("statement", "verdict", "evidence"), rows)
     for table in (claims, *result.tables) if rows else result.tables:
         stem = file_stem(table.title.lower(), [name.removesuffix(".csv") for name in files])
         files[f"{stem}.csv"] = rows_file(table.columns, table.rows)
-    told = [[f"{i:2}. {word}", printable(f"{said}\n{why}")] for i, (said, word, why) in enumerate(rows, 1)]
+    claim_rows = [
+        [f"{i:2}. {word}", printable(f"{said}\n{why}")] for i, (said, word, why) in enumerate(rows, 1)
+    ]
     return Sheet(
-        title=f"{found.name}: {found.title}",
-        lines=[f"{found.name}: {found.title}"],
-        tables=[*map(_shown, result.tables), TextTable.of_texts(("claims", ""), told)],
+        title=f"{study.name}: {study.title}",
+        lines=[f"{study.name}: {study.title}"],
+        tables=[*map(_shown, result.tables), TextTable.of_texts(("claims", ""), claim_rows)],
         figures={stem: partial(result.figures.__getitem__, stem) for stem in result.figures},
         files=files,
     )

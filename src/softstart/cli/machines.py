@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import click
-
 from softstart.balancing import Engine
 from softstart.balancing import balance as compute
 from softstart.balancing.engine import LIBRARY as ENGINES
 from softstart.balancing.engine import TABLES
 from softstart.cli import options
 from softstart.cli.completion import one_of
-from softstart.cli.options import count, reading
+from softstart.cli.options import command, count, option
 from softstart.cli.running import Answer, answers, working
 from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.laws import read_law
@@ -36,28 +34,14 @@ def _read_law(text: str, option: str) -> dict[str, Any]:
     return {"law": "table", "law_times": times, "law_torques": torques}
 
 
-@click.command("clutch")
-@click.option(
-    "--law", metavar="NAME|FILE", callback=reading(_read_law), shell_complete=one_of(lambda: LAWS),
-    help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
-    "and friction torque. Default: that of the clutch file.",
-)  # fmt: skip
+@command("clutch")
+@option("--law", _read_law, shell_complete=one_of(lambda: LAWS))
 @options.until_option
-@click.option(
-    "--optimal", is_flag=True,
-    help="Compute the laws with the lowest friction work for a given peak shaft torque, with bounds.",
-)  # fmt: skip
-@click.option(
-    "--points", metavar="N", callback=count(1, 200),
-    help=f"With --optimal: number of peak torques. Default: {DEFAULT_POINTS}.",
-)  # fmt: skip
-@click.option(
-    "--nondecreasing", is_flag=True, help="With --optimal: only laws whose friction torque never decreases."
-)
-@options.of_file(
-    Clutch, "paper-c", CLUTCHES, Clutch.TABLES, "clutch.engagement_time='0.5 s' or shaft.gap='1 deg'",
-)  # fmt: skip
-@answers("Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.")
+@option("--optimal", is_flag=True)
+@option("--points", count(1, 200))
+@option("--nondecreasing", is_flag=True)
+@options.of_file(Clutch, "paper-c", CLUTCHES, Clutch.TABLES)
+@answers(out=True)
 def clutch_command(
     *, clutch: Clutch, law: dict[str, Any] | None, until: float | None, optimal: bool, points: int | None,
     nondecreasing: bool,
@@ -66,6 +50,23 @@ def clutch_command(
 
     CLUTCH is a TOML file or the name of a shipped clutch; by default that of the literature. The driving side
     turns at constant speed. With --optimal, the optimal engagement laws for its engagement time are computed.
+
+    Options
+    -------
+    --law NAME|FILE
+        Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time
+        and friction torque. Default: that of the clutch file.
+    --optimal
+        Compute the laws with the lowest friction work for a given peak shaft torque, with bounds.
+    --points N
+        With --optimal: number of peak torques. Default: 8.
+    --nondecreasing
+        With --optimal: only laws whose friction torque never decreases.
+    --set KEY=VALUE
+        Change a parameter of the clutch, for example clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.
+        May be repeated.
+    --out DIR
+        Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.
     """
     if optimal and until is not None:
         raise InputError("--until: optimal laws are followed to the lock-up; leave it out with --optimal.")
@@ -80,7 +81,7 @@ def clutch_command(
         run = engage(clutch, until=until)
         return run.summary, engagement_sheet(run)
     study: Any = find_study("paper-c")
-    with working("looking for the best laws ...") as progress:
+    with working("optimizing the law ...") as progress:
         law_class, most = "nondecreasing" if nondecreasing else "any", points or DEFAULT_POINTS
         front = study.optimize_engagement(clutch, most, law_class=law_class, progress=progress)
     return front.summary, front.sheet
@@ -92,25 +93,20 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     >>> [round(speed, 3) for speed in _read_speeds(["4500rpm", "100 rad/s"], "--speed")]
     [471.239, 100.0]
     """
-    found = [float(to_si(text, "rad/s", name=option)) for text in texts]
-    for text, speed in zip(texts, found, strict=True):
+    speeds = [float(to_si(text, "rad/s", name=option)) for text in texts]
+    for text, speed in zip(texts, speeds, strict=True):
         if not speed > 0.0:
             raise InputError(f'{option} = "{text}": a speed above 0, as 4500rpm.')
         if bare(text):
             both = f'write "{text} rpm" or, if rad/s is meant, "{text} rad/s"'
             raise InputError(f'{option} = "{text}": no unit; {both}.')
-    return found or None
+    return speeds or None
 
 
-@click.command("balance")
-@click.option(
-    "--speed", "speeds", metavar="SPEED", multiple=True, callback=reading(_read_speeds),
-    help="Speed to show, for example 4500rpm. May be repeated. Default: round values over the speed range.",
-)  # fmt: skip
-@options.of_file(
-    Engine, "vaz-11113", ENGINES, TABLES, "masses.reciprocating='0.6 kg' or operation.load=0.5",
-)  # fmt: skip
-@answers("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")
+@command("balance")
+@option("--speed speeds", _read_speeds, multiple=True)
+@options.of_file(Engine, "vaz-11113", ENGINES, TABLES)
+@answers(out=True)
 def balance_command(*, engine: Engine, speeds: list[float] | None) -> Answer:
     """Compute forces and moments of a piston engine by order, and design a balancer.
 
@@ -118,8 +114,18 @@ def balance_command(*, engine: Engine, speeds: list[float] | None) -> Answer:
     literature, some of whose parameters are assumed. The two-shaft balancer is tuned at one speed,
     balancer.tuning_speed; a first-order couple is balanced by a shaft with two opposite imbalances. The
     pressure ([cycle]) is only needed for the gas torque.
+
+    Options
+    -------
+    --speed SPEED
+        Speed to show, for example 4500rpm. May be repeated. Default: round values over the speed range.
+    --set KEY=VALUE
+        Change a parameter of the engine, for example masses.reciprocating='0.6 kg' or operation.load=0.5.
+        May be repeated.
+    --out DIR
+        Write figures (SVG, PNG), tables (CSV) and report.md into this folder.
     """
     from softstart.views.balances import balance_sheet
 
-    found = compute(engine, speeds)
-    return found.summary, balance_sheet(found)
+    result = compute(engine, speeds)
+    return result.summary, balance_sheet(result)

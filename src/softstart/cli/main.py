@@ -58,7 +58,7 @@ def _open_closed_streams() -> None:
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
-def _main(given: list[str]) -> int:
+def _main(arguments: list[str]) -> int:
     try:
         with warnings.catch_warnings():
             usual = warnings.showwarning
@@ -71,33 +71,33 @@ def _main(given: list[str]) -> int:
 
             warnings.simplefilter("always", DamagedWarning)
             warnings.showwarning = show
-            code = _run(given)
+            code = _run(arguments)
             sys.stdout.flush()
         return code
     except BaseException as error:
-        return INTERRUPTED if STOPPING.is_set() else _failed(error, given)
+        return INTERRUPTED if STOPPING.is_set() else _failed(error, arguments)
 
 
-def _run(given: list[str]) -> int:
+def _run(arguments: list[str]) -> int:
     import click
 
     from softstart.cli.commands import cli
 
     if "_SOFTSTART_COMPLETE" in os.environ:
         with suppress(InputError, click.UsageError):  # the line is wrong before its last word
-            cli.main(given, prog_name="softstart")
+            cli.main(arguments, prog_name="softstart")
         return DONE
     if STOPPING.is_set():
         return INTERRUPTED
     try:
-        with cli.make_context("softstart", list(given), obj=tuple(given)) as context:
+        with cli.make_context("softstart", list(arguments), obj=tuple(arguments)) as context:
             cli.invoke(context)
     except click.exceptions.Exit as done:
         return done.exit_code
     return DONE
 
 
-def _failed(error: BaseException, given: list[str]) -> int:
+def _failed(error: BaseException, arguments: list[str]) -> int:
     """Say what failed; an error that is a bug of softstart is raised again."""
     import click
 
@@ -105,7 +105,7 @@ def _failed(error: BaseException, given: list[str]) -> int:
 
     match error:
         case click.UsageError():
-            return _fail([usage_sentence(error, *given[:1])], BAD_INPUT)
+            return _fail([usage_sentence(error, *arguments[:1])], BAD_INPUT)
         case InputError():
             return _fail(error.sentences, BAD_INPUT)
         case SimulationError():
@@ -131,7 +131,7 @@ def _fail(sentences: Sequence[str], code: int) -> int:
 
     lines = [printable(sentence.strip()) for sentence in sentences]
     if len(lines) > 1:
-        lines = [f"{len(lines)} things are wrong:", *(f"  {n}. {line}" for n, line in enumerate(lines, 1))]
+        lines = [f"{len(lines)} errors:", *(f"  {n}. {line}" for n, line in enumerate(lines, 1))]
     with suppress(OSError):  # standard error is closed; the exit code remains
         print("softstart: " + "\n".join(lines), file=sys.stderr, flush=True)
     return code

@@ -1,8 +1,8 @@
-"""`softstart optimize` and `pareto`: the start with the lowest K_dyn, for one start time and over many."""
+"""`softstart optimize` and `pareto`: the lowest K_dyn for one start time, and over the start time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.options import quantity_callback, reading
+from softstart.cli.options import command, option, quantity
 from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError, SimulationError
 from softstart.input.gear import BEHIND
@@ -38,10 +38,10 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
     """
 
     def read(part: str) -> tuple[float, bool]:
-        found = StartTime.of(part, option)
-        return found.value, found.multiple
+        start_time = StartTime.of(part, option)
+        return start_time.value, start_time.multiple
 
-    return [StartTime(*one) for one in options.read_value_list(text, option, read)]
+    return [StartTime(*pair) for pair in options.read_value_list(text, option, read)]
 
 
 def _start_time(text: str, option: str) -> str:
@@ -50,14 +50,14 @@ def _start_time(text: str, option: str) -> str:
     return text
 
 
-def _each(unit: str) -> Callable[..., Any]:
-    """The callback of an option that is quantities with commas between; "... at output" is read later."""
+def _each(unit: str) -> options.Reader:
+    """Reads quantities with commas between; "... at output" is read later."""
 
     def read(text: str, option: str) -> list[float | str]:
-        each = values_in(text, option)
-        return [one if BEHIND.fullmatch(one) else float(to_si(one, unit, name=option)) for one in each]
+        values = values_in(text, option)
+        return [part if BEHIND.fullmatch(part) else float(to_si(part, unit, name=option)) for part in values]
 
-    return reading(read)
+    return read
 
 
 def _corners(text: str, option: str) -> list[tuple[float, float]]:
@@ -75,22 +75,6 @@ def _corners(text: str, option: str) -> list[tuple[float, float]]:
     ]
 
 
-def _terminal_option(usual: str, default: str | None = None) -> options.Decorator:
-    return click.option(
-        "--terminal", metavar="|".join(TERMINALS), type=click.Choice(TERMINALS), default=default,
-        help="Terminal condition: motor and load at the target speed (synchronous), with the shaft torque "
-        "equal to the load torque as well (steady), or the load alone at the target speed (reached). "
-        f"Default: {usual}.",
-    )  # fmt: skip
-
-
-torque_speed_option = click.option(
-    "--torque-speed", metavar="SPEED:TORQUE,...", callback=reading(_corners),
-    help="Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 "
-    "N*m': two or more, concave, above the load torque up to the target speed; the last piece goes on.",
-)  # fmt: skip
-
-
 @contextmanager
 def _no_solution() -> Iterator[None]:
     """Where there is no optimum: its verdict as the JSON object, one sentence, and exit code 3."""
@@ -104,53 +88,67 @@ def _no_solution() -> Iterator[None]:
         raise SimulationError(str(error)) from error
 
 
-@click.command("optimize")
-@click.option("--start-time", metavar="TIME", callback=reading(_start_time),
-    help="Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x."
-)  # fmt: skip
-@click.option(
-    "--limits", is_flag=True,
-    help="Find the shortest start time that meets the [limits] of the drive instead.",
-)  # fmt: skip
-@_terminal_option("synchronous for one drive at one position, else reached")
-@click.option("--minimise", metavar="|".join(OBJECTIVES), type=click.Choice(OBJECTIVES),
-    help="Objective. Default: k_dyn.")  # fmt: skip
-@click.option("--max-k-dyn", "k_dyn", metavar="NUMBER",
-    callback=quantity_callback("1", above=0.0),
-    help="Upper bound of K_dyn if another objective is minimised.")  # fmt: skip
-@click.option("--max-heat", "heat", metavar="TIME",
-    callback=quantity_callback("s", above=0.0),
-    help="Upper bound of the I2t heat, in s of starting torque.")  # fmt: skip
-@torque_speed_option
-@click.option("--smoothness", metavar="TIME", callback=quantity_callback("s", least=0.0),
-    help="Weight of torque smoothness, for example 0.001 (s). Default: 0.")  # fmt: skip
-@click.option("--confirm", is_flag=True,
-    help="Also solve the CasADi problem from its own initial guess, and show both results.")  # fmt: skip
-@click.option("--gaps", metavar="GAP,...", callback=_each("rad"),
-    help="Compute one profile for the drive with each of these gaps.")  # fmt: skip
-@click.option("--inertias", metavar="INERTIA,...", callback=_each("kg*m^2"),
-    help="Likewise for these load inertias.")  # fmt: skip
-@click.option("--load-torques", metavar="TORQUE,...", callback=_each("N*m"),
-    help="Likewise for these load torques.")  # fmt: skip
+@command("optimize")
+@option("--start-time", _start_time)
+@option("--limits", is_flag=True)
+@option("--terminal", type=click.Choice(TERMINALS))
+@option("--minimise", type=click.Choice(OBJECTIVES))
+@option("--max-k-dyn k_dyn", quantity("1", above=0.0))
+@option("--max-heat heat", quantity("s", above=0.0))
+@option("--torque-speed", _corners)
+@option("--smoothness", quantity("s", least=0.0))
+@option("--confirm", is_flag=True)
+@option("--gaps", _each("rad"))
+@option("--inertias", _each("kg*m^2"))
+@option("--load-torques", _each("N*m"))
 @options.of_drive(options.read_machine)
-@answers("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
+@answers(out=True)
 def optimize_command(
     *, drive: Machine, gaps: Sequence[float | str] | None, inertias: Sequence[float | str] | None,
-    load_torques: Sequence[float | str] | None, **given: Any,
+    load_torques: Sequence[float | str] | None, **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
     default the crane drive of the literature. With --gaps, --inertias or --load-torques, one profile is
     computed for all combinations. For a chain, the largest torque of all its shafts is minimised.
+
+    Options
+    -------
+    --start-time TIME
+        Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x.
+    --limits
+        Find the shortest start time that meets the [limits] of the drive instead.
+    --terminal synchronous|steady|reached
+        Terminal condition: motor and load at the target speed (synchronous), with the shaft torque equal
+        to the load torque as well (steady), or the load alone at the target speed (reached). Default:
+        synchronous for one drive at one position, else reached.
+    --minimise k_dyn|heat|start_time
+        Objective. Default: k_dyn.
+    --max-k-dyn NUMBER
+        Upper bound of K_dyn if another objective is minimised.
+    --max-heat TIME
+        Upper bound of the I2t heat, in s of starting torque.
+    --smoothness TIME
+        Weight of torque smoothness, for example 0.001 (s). Default: 0.
+    --confirm
+        Also solve the CasADi problem from its own initial guess, and show both results.
+    --gaps GAP,...
+        Compute one profile for the drive with each of these gaps.
+    --inertias INERTIA,...
+        Likewise for these load inertias.
+    --load-torques TORQUE,...
+        Likewise for these load torques.
+    --out DIR
+        Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.
     """
-    bounds = {name: value for name, value in given.items() if value is not None}
+    bounds = {name: value for name, value in arguments.items() if value is not None}
     varied = {"gaps": gaps or (), "inertias": inertias or (), "load_torques": load_torques or ()}
-    with _no_solution(), working("looking for the gentlest start ..."):
+    with _no_solution(), working("optimizing the start ..."):
         with options.named_as_options():
             others = softstart.scenarios_of(drive, **varied)[1:]
         best = softstart.optimize(drive, scenarios=others, **bounds)
-    with working("starting the drive under the shipped controllers ..."):
+    with working("simulating the shipped controllers ..."):
         beside = [] if others else _runs_beside(best)
     from softstart.views.optima import controller_summary, optimum_sheet
 
@@ -169,33 +167,42 @@ def _runs_beside(best: Optimum) -> list[Run]:
     return runs
 
 
-@click.command("pareto")
-@click.option("--start-times", metavar="TIME,...", callback=reading(read_start_times),
-    help="Bounds of the start time: 0.25,0.3 (s), a range from:to:count such as 0.25:0.5:12, or multiples "
-    "of that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.")  # fmt: skip
-@_terminal_option("reached", "reached")
-@torque_speed_option
-@options.controller_option(
-    "--controllers", "A,B,...", "Controllers to compare with the curve. Default: all that need no parameter."
-)
-@click.option("--workers", metavar="N", callback=options.count(), default="1",
-    help="Number of optima computed in parallel. Default: 1.")  # fmt: skip
+@command("pareto")
+@option("--start-times", read_start_times)
+@option("--terminal", type=click.Choice(TERMINALS), default="reached")
+@option("--torque-speed", _corners)
+@options.controller_option("--controllers", several=True)
+@option("--workers", options.count(), default="1")
 @options.scheduler_option
 @options.of_drive(options.read_machine)
-@answers(
-    "Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at "
-    "once, so that an interrupted command resumes."
-)
+@answers(out=True)
 def pareto_command(
-    *, drive: Machine, start_times: list[StartTime] | None, controllers: list[str] | None, **given: Any
+    *, drive: Machine, start_times: list[StartTime] | None, controllers: list[str] | None, **arguments: Any
 ) -> Answer:  # fmt: skip
     """Compute the lowest K_dyn over the start time, and compare the controllers with it.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
     default the crane drive of the literature. Each controller is compared with the optimum at its own start
     time.
+
+    Options
+    -------
+    --start-times TIME,...
+        Bounds of the start time: 0.25,0.3 (s), a range from:to:count such as 0.25:0.5:12, or multiples of
+        that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.
+    --terminal synchronous|steady|reached
+        Terminal condition: motor and load at the target speed (synchronous), with the shaft torque equal
+        to the load torque as well (steady), or the load alone at the target speed (reached). Default:
+        reached.
+    --controllers A,B,...
+        Controllers to compare with the curve. Default: all that need no parameter.
+    --workers N
+        Number of optima computed in parallel. Default: 1.
+    --out DIR
+        Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at
+        once, so that an interrupted command resumes.
     """
-    given = {name: value for name, value in given.items() if value is not None}
+    arguments = {name: value for name, value in arguments.items() if value is not None}
     with (
         kept_state(option_value("out"), STATE, "finished points") as state,
         options.named_as_options(start_time="--start-times"),
@@ -205,14 +212,16 @@ def pareto_command(
     ):
         from softstart.optimal.optimize import start_time_of_direct
 
-        made, curve = controllers_from_options(controllers, {}), tuple(given.get("torque_speed", ()))
+        chosen, curve = controllers_from_options(controllers, {}), tuple(arguments.get("torque_speed", ()))
         direct = cache(lambda: start_time_of_direct(drive, curve))
-        times = None if start_times is None else [one.seconds(direct) for one in start_times]
-        found = softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)
-    if not any(point.found for point in found.points):
+        times = None if start_times is None else [time.seconds(direct) for time in start_times]
+        front = softstart.pareto(
+            drive, times, controllers=chosen, save_to=state, progress=progress, **arguments
+        )
+    if not any(point.found for point in front.points):
         if option_value("as_json"):
-            print_json(found.summary())
-        raise SimulationError(found.points[-1].status_text)
+            print_json(front.summary())
+        raise SimulationError(front.points[-1].status_text)
     from softstart.views.optima import front_sheet
 
-    return found.summary, front_sheet(found)
+    return front.summary, front_sheet(front)

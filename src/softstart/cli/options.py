@@ -1,7 +1,31 @@
-"""The options that commands share, and how their texts are read."""
+"""Commands described by their docstrings, the options that they share, and how the texts are read.
+
+Options that several commands have alike; the docstring of a command describes its own, or another meaning:
+
+--allow-code
+    Allow a file of tuned gains to name a Python file, which is then executed.
+--fitted-to DRIVE
+    Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check their
+    robustness. --set changes DRIVE only.
+--json
+    Print the result as one JSON object.
+--scheduler ADDRESS
+    Compute on the dask cluster of this scheduler.
+--set KEY=VALUE
+    Change a parameter of the drive, for example load.inertia=0.07 or shaft.gap='2 rad'. May be repeated.
+--torque-speed SPEED:TORQUE,...
+    Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 N*m':
+    two or more, concave, above the load torque up to the target speed; the last piece goes on.
+--until TIME
+    End of the simulation, for example 0.5 (s) or '500 ms'. Default: one elastic period after the start
+    time (a clutch: after the lock-up).
+--workers N
+    Number of parallel workers. Default: one per processor.
+"""
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import shlex
@@ -9,6 +33,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +52,7 @@ from softstart.input.documents import DocumentTable, parsed
 from softstart.input.files import ABSENT, Library, read_text, refusal_of
 from softstart.input.parameter_set import read_settings
 from softstart.input.parameters import Wording
-from softstart.plugins import CONTROLLERS, registered
+from softstart.plugins import controller_names
 from softstart.quantities import RefusedError, to_si, values_in, whole_number
 
 if TYPE_CHECKING:
@@ -35,6 +60,7 @@ if TYPE_CHECKING:
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 Load = Callable[[str, Sequence[str]], Any]
+Reader = Callable[[Any, str], Any]
 
 DEFAULT_DRIVE = "crane-4amtkf"
 CODE, SETTINGS, TYPED = "softstart.allow_code", "softstart.settings", "softstart.typed"
@@ -43,11 +69,6 @@ CODE, SETTINGS, TYPED = "softstart.allow_code", "softstart.settings", "softstart
 def drive_names() -> tuple[str, ...]:
     """Names of the shipped drives."""
     return tuple(library.names())
-
-
-def controller_names() -> tuple[str, ...]:
-    """Names of the installed controllers, found without importing any."""
-    return tuple(registered(CONTROLLERS))
 
 
 def code_allowed() -> bool:
@@ -64,7 +85,7 @@ def command_line() -> str:
 # reading them --------------------------------------------------------------------------------------------
 
 
-def reading(read: Callable[[Any, str], Any]) -> Callable[..., Any]:
+def reading(read: Reader) -> Callable[..., Any]:
     """The callback of an option or argument: its command is given `read(text, name)`, or None without it."""
 
     def callback(context: click.Context, parameter: click.Parameter, text: Any) -> Any:
@@ -73,8 +94,8 @@ def reading(read: Callable[[Any, str], Any]) -> Callable[..., Any]:
     return callback
 
 
-def quantity_callback(unit: str, least: float = -np.inf, above: float = -np.inf) -> Callable[..., Any]:
-    """The callback of an option that is a quantity in this unit, of `least` or more, or above `above`."""
+def quantity(unit: str, least: float = -np.inf, above: float = -np.inf) -> Reader:
+    """Reads a quantity in this unit, of `least` or more, or above `above`."""
 
     def read(text: str, option: str) -> float:
         value = float(to_si(text, unit, name=option))
@@ -83,18 +104,18 @@ def quantity_callback(unit: str, least: float = -np.inf, above: float = -np.inf)
             raise InputError(f'{option} = "{text}": give {wanted}.')
         return value
 
-    return reading(read)
+    return read
 
 
-def count(least: int = 1, most: int = 10**15) -> Callable[..., Any]:
-    """The callback of an option that is a whole number."""
-    return reading(lambda text, option: whole_number(text, option, least, most))
+def count(least: int = 1, most: int = 10**15) -> Reader:
+    """Reads a whole number."""
+    return lambda text, option: whole_number(text, option, least, most)
 
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
-    found = _drive(name, settings)
-    return found.drive if isinstance(found, UnknownStiffness) else found
+    machine = _drive(name, settings)
+    return machine.drive if isinstance(machine, UnknownStiffness) else machine
 
 
 def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
@@ -107,24 +128,24 @@ def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
         return Drive.load(name).with_settings(settings) if settings else Drive.load(name)
     # its own keys are those of the sheet, at their own parts
     paths = {p.path for p in DataSheet.PARAMETERS.values()}
-    own = [one for one in settings if one.partition("=")[0].strip() in paths]
-    settings = [one for one in settings if one not in own]
-    found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))
+    sheet_settings = [one for one in settings if one.partition("=")[0].strip() in paths]
+    settings = [one for one in settings if one not in sheet_settings]
+    data_sheet = DataSheet.from_toml(sheet, where=name, also=read_changes(sheet_settings))
     print(
-        f'"{name}" is a data sheet, read as the drive that follows from it ({found.motion}); "softstart init '
-        f'{name} --out FILE" writes that drive.',
+        f'"{name}" is a data sheet, converted to a drive ({data_sheet.motion}); "softstart init {name} --out '
+        'FILE" writes the drive.',
         file=sys.stderr,
     )
-    for doubt in found.motion_warnings:
-        print(f"softstart: doubt: {doubt}", file=sys.stderr)
-    given = read_settings(settings, Drive.PARAMETERS)[0]
-    ends = found.possible
+    for warning in data_sheet.motion_warnings:
+        print(f"softstart: warning: {warning}", file=sys.stderr)
+    drive_settings = read_settings(settings, Drive.PARAMETERS)[0]
+    ends = data_sheet.possible
     drives = [
         one.with_settings(settings) if settings else one
         for one in (ends if isinstance(ends, UnknownStiffness) else (ends,))
     ]
-    if "assumed" not in given:
-        drives = [one.replace(assumed=found.assumed_still(given)) for one in drives]
+    if "assumed" not in drive_settings:
+        drives = [one.replace(assumed=data_sheet.assumed_still(drive_settings)) for one in drives]
     # a stiffness that is set as one of the drive leaves one end
     return UnknownStiffness(*drives) if drives[0].stiffness != drives[-1].stiffness else drives[0]
 
@@ -140,8 +161,8 @@ def _data_sheet(name: str) -> str | None:
 
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
-    found = read_as_known(name, settings)
-    return found.drive if isinstance(found, UnknownStiffness) else found
+    machine = read_as_known(name, settings)
+    return machine.drive if isinstance(machine, UnknownStiffness) else machine
 
 
 def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:
@@ -184,13 +205,15 @@ def named_as_options(**also: str) -> Iterator[None]:
     softstart.errors.InputError: --axis = 3: name the axes, or leave --axis out.
     """
     options = click.get_current_context().command.params
-    names = {str(one.name): one.opts[0] for one in options if isinstance(one, click.Option)} | also
+    names = {
+        str(parameter.name): parameter.opts[0] for parameter in options if isinstance(parameter, click.Option)
+    } | also
 
     def renamed(sentence: str) -> str:
-        found = re.match(r"(\w+)(?= =|:|,| \")", sentence)
-        if found is None or found[1] not in names:
+        keyword = re.match(r"(\w+)(?= =|:|,| \")", sentence)
+        if keyword is None or keyword[1] not in names:
             return sentence
-        return re.sub(rf"\b{found[1]}(?= =|:|,| \"| out\b)", names[found[1]], sentence)
+        return re.sub(rf"\b{keyword[1]}(?= =|:|,| \"| out\b)", names[keyword[1]], sentence)
 
     try:
         yield
@@ -260,15 +283,15 @@ def read_params(
     >>> read_params(["torque=15 N*m"])
     {'torque': '15 N*m'}
     """
-    found: dict[str, str] = {}
+    params: dict[str, str] = {}
     for text in texts:
         key, _, value = (part.strip() for part in text.partition("="))
         if not (key and value):
             raise InputError(f'{option} "{text}": write a key, an equals sign and a value, as {example}.')
-        if key in found:
+        if key in params:
             raise InputError(f'{option} "{text}": {key} is given twice; keep one of the two.')
-        found[key] = value
-    return found
+        params[key] = value
+    return params
 
 
 def read_changes(settings: Sequence[str]) -> dict[str, Any]:
@@ -277,16 +300,52 @@ def read_changes(settings: Sequence[str]) -> dict[str, Any]:
     >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
     {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
     """
-    found: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for key, value in read_params(settings, "--set", "load.inertia=0.07").items():
         try:
-            found[key] = tomllib.loads(f"value = {value}")["value"]
+            changes[key] = tomllib.loads(f"value = {value}")["value"]
         except (RecursionError, ValueError):  # no TOML, or an integer of thousands of digits
-            found[key] = value
-    return found
+            changes[key] = value
+    return changes
 
 
-# the options -----------------------------------------------------------------------------------------
+# commands and options --------------------------------------------------------------------------------------
+
+DESCRIBED = re.compile(r"^(--\S+)(?: (\S.*))?\n((?:    .*\n?)+)", re.MULTILINE)
+
+
+def described(text: str) -> dict[str, tuple[str | None, str]]:
+    """Metavar and meaning of each option that a docstring describes.
+
+    >>> described("--until TIME\\n    End of the simulation,\\n    in s.\\n--json\\n    Print JSON.")
+    {'--until': ('TIME', 'End of the simulation, in s.'), '--json': (None, 'Print JSON.')}
+    """
+    return {
+        flag: (metavar or None, " ".join(lines.split())) for flag, metavar, lines in DESCRIBED.findall(text)
+    }
+
+
+SHARED = described(__doc__ or "")
+
+
+class DocumentedCommand(click.Command):
+    """A command whose docstring describes its options too, under *Options*: flag, metavar and meaning."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.help, _, options = inspect.cleandoc(self.help or "").partition("\n\nOptions\n-------\n")
+        meanings = SHARED | described(options)
+        for parameter in self.params:
+            if isinstance(parameter, click.Option):
+                parameter.metavar, parameter.help = meanings.get(parameter.opts[0], (None, None))
+
+
+command = partial(click.command, cls=DocumentedCommand)
+
+
+def option(flag: str, read: Reader | None = None, **settings: Any) -> Decorator:
+    """An option, its text read by `read(text, flag)`; behind the flag may be the name of its parameter."""
+    return click.option(*flag.split(), callback=None if read is None else reading(read), **settings)
 
 
 def typed_settings() -> tuple[str, ...]:
@@ -300,99 +359,74 @@ def typed_machine() -> str:
 
 
 def machine_argument(
-    name: str,
-    read: Callable[[str, Sequence[str]], Any],
-    names: Callable[[], Iterable[str]],
-    default: str | None,
+    name: str, read: Load, names: Callable[[], Iterable[str]], default: str, tables: Iterable[DocumentTable]
 ) -> Decorator:
-    """A TOML file or the name of a shipped one; the command gets `read(name, texts of --set)`."""
+    """A TOML file or the name of a shipped one, with --set; the command gets `read(name, texts of --set)`."""
 
-    def load(given: str, _: str) -> Any:
-        click.get_current_context().meta[TYPED] = given
-        return read(given, typed_settings())
+    def load(typed: str, _: str) -> Any:
+        click.get_current_context().meta[TYPED] = typed
+        return read(typed, typed_settings())
 
-    metavar = name.upper() if default is None else f"[{name.upper()}]"
-    more: dict[str, Any] = {} if default is None else {"default": default}
-    return click.argument(name, metavar=metavar, callback=reading(load), shell_complete=one_of(names), **more)
-
-
-def of_drive(read: Load, needed: bool = False) -> Decorator:
-    """DRIVE, a file or the name of a shipped one, with --set."""
-    argument = machine_argument("drive", read, drive_names, None if needed else DEFAULT_DRIVE)
-    return lambda command: argument(set_option(command))
-
-
-def of_file(
-    kind: Any, default: str, library: Library, tables: Iterable[DocumentTable], example: str
-) -> Decorator:
-    """The argument for a file of another kind, with --set for the keys of its tables."""
-    name = kind.__name__.lower()
-    argument = machine_argument(
-        name, lambda one, settings: kind.load(one, also=read_changes(settings)), library.names, default
+    argument = click.argument(
+        name,
+        metavar=f"[{name.upper()}]",
+        callback=reading(load),
+        shell_complete=one_of(names),
+        default=default,
     )
-    changes = changes_option(tables, f"Change a parameter of the {name}, for example {example}.")
-    return lambda command: argument(changes(command))
+    return lambda command: argument(set_option(tables)(command))
 
 
-def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
+def of_drive(read: Load) -> Decorator:
+    """DRIVE, a file or the name of a shipped one, with --set."""
+    return machine_argument("drive", read, drive_names, DEFAULT_DRIVE, Drive.TABLES)
+
+
+def of_file(kind: Any, default: str, library: Library, tables: Iterable[DocumentTable]) -> Decorator:
+    """The argument for a file of another kind, with --set for the keys of its tables."""
+
+    def read(name: str, settings: Sequence[str]) -> Any:
+        return kind.load(name, also=read_changes(settings))
+
+    return machine_argument(kind.__name__.lower(), read, library.names, default, tables)
+
+
+def controller_option(flag: str, several: bool = False, **settings: Any) -> Decorator:
     """An option that takes one or more controllers, and --allow-code for files of tuned gains among them.
 
-    The command gets a name, or a list of names where the option is in the plural.
+    The command gets a name or, of several, a list of names.
     """
-    given = click.option(
-        name, metavar=metavar, required=required, help=text, shell_complete=one_of(controller_names),
-        callback=reading(read_names if metavar.endswith("...") else check_name),
-    )  # fmt: skip
-    return lambda command: given(_allow_code_option(command))
-
-
-_allow_code_option = click.option(
-    "--allow-code", is_flag=True, expose_value=False,
-    callback=lambda context, _, given: context.meta.update({CODE: given}),
-    help="Allow a file of tuned gains to name a Python file, which is then executed.",
-)  # fmt: skip
+    names = option(
+        flag, read_names if several else check_name, shell_complete=one_of(controller_names), **settings
+    )
+    return lambda command: names(allow_code_option(command))
 
 
 def keys_of(tables: Iterable[DocumentTable]) -> list[str]:
     """The keys of a file as --set names them; the first of a list of tables stands for all."""
-    return [p.path.replace(".", "[1].", 1) if one.many else p.path for one in tables for p in one.parameters]
+    return [
+        p.path.replace(".", "[1].", 1) if table.many else p.path for table in tables for p in table.parameters
+    ]
 
 
-def changes_option(tables: Iterable[DocumentTable], text: str) -> Decorator:
+def set_option(tables: Iterable[DocumentTable]) -> Decorator:
     """--set, for a file with these tables; it is read first, as the machine is loaded with its changes."""
     return click.option(
-        "--set", "settings", metavar="KEY=VALUE", multiple=True, is_eager=True, expose_value=False,
-        callback=lambda context, _, given: context.meta.update({SETTINGS: given}),
-        shell_complete=one_of(lambda: keys_of(tables), end="="), help=f"{text} May be repeated.",
+        "--set", "settings", multiple=True, is_eager=True, expose_value=False,
+        callback=lambda context, _, texts: context.meta.update({SETTINGS: texts}),
+        shell_complete=one_of(lambda: keys_of(tables), end="="),
     )  # fmt: skip
 
 
-set_option = changes_option(
-    Drive.TABLES, "Change a parameter of the drive, for example load.inertia=0.07 or shaft.gap='2 rad'."
-)
-until_option = click.option(
-    "--until", metavar="TIME",
-    callback=quantity_callback("s", above=0.0),
-    help="End of the simulation, for example 0.5 (s) or '500 ms'. Default: one elastic period after the "
-    "start time (a clutch: after the lock-up).",
+allow_code_option = click.option(
+    "--allow-code", is_flag=True, expose_value=False,
+    callback=lambda context, _, allowed: context.meta.update({CODE: allowed}),
 )  # fmt: skip
-fitted_to_option = click.option(
-    "--fitted-to", metavar="DRIVE", shell_complete=one_of(drive_names),
-    callback=reading(lambda name, _: read_drive(name, ())),
-    help="Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check "
-    "their robustness. --set changes DRIVE only.",
-)  # fmt: skip
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-workers_option = click.option(
-    "--workers", metavar="N", callback=count(), help="Number of parallel workers. Default: one per processor."
+until_option = option("--until", quantity("s", above=0.0))
+fitted_to_option = option(
+    "--fitted-to", lambda name, _: read_drive(name, ()), shell_complete=one_of(drive_names)
 )
-scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler."
-)
-
-
-def param_option(text: str, metavar: str = "KEY=VALUE") -> Decorator:
-    """--param: of one controller, or as CONTROLLER.KEY=VALUE of several."""
-    return click.option(
-        "--param", "params", metavar=metavar, multiple=True, callback=reading(read_params), help=text
-    )
+json_option = option("--json as_json", is_flag=True)
+workers_option = option("--workers", count())
+scheduler_option = option("--scheduler")
+param_option = option("--param params", read_params, multiple=True)

@@ -4,41 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
-
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
 from softstart.cli import options
+from softstart.cli.options import command, option
 from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.terminal import print_json
 
 
-@click.command("reduce")
-@click.option(
-    "--factor", metavar="NUMBER", callback=options.quantity_callback("1", above=0.0),
-    help="Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.",
-)  # fmt: skip
-@click.option("--force", is_flag=True, help="Continue where a frequency that is left out is too low.")
-@options.controller_option(
-    "--verify", "A,B,...",
-    "Controllers to set up for the drive and to run on the drive and on the chain. Default: all that need "
-    "no parameter.",
-)  # fmt: skip
-@click.option(
-    "--no-starts", is_flag=True, help="Skip the starts that determine whether two masses are sufficient."
-)
-@options.param_option(
-    "Set a parameter of a controller of --verify, for example ramp.time='0.2 s'. May be repeated.",
-    "CONTROLLER.KEY=VALUE",
-)
-@options.of_file(
-    Chain, "crane-4-mass", LIBRARY, TABLES, "mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2",
-)  # fmt: skip
-@answers("Write scheme, figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder.")
+@command("reduce")
+@option("--factor", options.quantity("1", above=0.0))
+@option("--force", is_flag=True)
+@options.controller_option("--verify", several=True)
+@option("--no-starts", is_flag=True)
+@options.param_option
+@options.of_file(Chain, "crane-4-mass", LIBRARY, TABLES)
+@answers(out=True)
 def reduce_command(
-    *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **asked: Any
+    *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **arguments: Any
 ) -> Answer:  # fmt: skip
     """Compute the natural frequencies of a chain, and reduce it to two masses.
 
@@ -48,6 +33,25 @@ def reduce_command(
     drive has the first frequency, the node and the inertia of the chain and is an input of compare, optimize
     and tune. The error of the reduction in K_dyn is computed from starts of both under the controllers of
     --verify and 128 torque profiles.
+
+    Options
+    -------
+    --factor NUMBER
+        Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.
+    --force
+        Continue where a frequency that is left out is too low.
+    --verify A,B,...
+        Controllers to set up for the drive and to run on the drive and on the chain. Default: all that
+        need no parameter.
+    --no-starts
+        Skip the starts that determine whether two masses are sufficient.
+    --param CONTROLLER.KEY=VALUE
+        Set a parameter of a controller of --verify, for example ramp.time='0.2 s'. May be repeated.
+    --set KEY=VALUE
+        Change a parameter of the chain, for example mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.
+        May be repeated.
+    --out DIR
+        Write scheme, figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder.
     """
     if no_starts and verify is not None:
         raise InputError("--no-starts: it leaves out the starts of --verify; give one of the two.")
@@ -58,7 +62,9 @@ def reduce_command(
 
     try:
         with working("reducing the chain ..."):
-            found = reduce_chain(chain, **{name: one for name, one in asked.items() if one is not None})
+            reduction = reduce_chain(
+                chain, **{name: value for name, value in arguments.items() if value is not None}
+            )
     except InputError as error:
         vibration, refused = natural_vibration(chain), error.sentences
         if option_value("as_json"):
@@ -66,12 +72,12 @@ def reduce_command(
         else:
             sheet.print_sheet(views.vibration_sheet(vibration))
         raise
-    drive = views.drive_of(found) if verify is None else found.to_drive()
+    drive = views.drive_of(reduction) if verify is None else reduction.to_drive()
     off = None
     if drive is not None and not no_starts:
         with working("starting the drive and the chain ..."), attributed():
             from softstart.chain.two_masses import two_mass_error
 
-            made = None if verify is None else controllers_from_options(verify, params)
-            off = two_mass_error(found.chain, drive, made)
-    return lambda: views.summary(found, off), views.reduction_sheet(found, off)
+            chosen = None if verify is None else controllers_from_options(verify, params)
+            off = two_mass_error(reduction.chain, drive, chosen)
+    return lambda: views.summary(reduction, off), views.reduction_sheet(reduction, off)

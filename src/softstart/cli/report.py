@@ -10,9 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from softstart.cli import options
+from softstart.cli.options import command, option
 from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.input.files import write_whole
@@ -31,36 +30,19 @@ BROWSERS = (
 PRINTING = 120.0  # s for a browser to print a report
 
 
-@click.command("report")
-@click.option("--out", "to", metavar="FILE", help="HTML file to write, for example report.html.")
-@click.option("--pdf", metavar="FILE",
-    help="PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.")  # fmt: skip
-@options.controller_option(
-    "--controllers", "A,B,...",
-    "Strategies to compare, including files of tuned gains. Default: all that need no parameter.",
-)  # fmt: skip
-@options.param_option(
-    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "CONTROLLER.KEY=VALUE"
-)
-@click.option("--resolution", metavar="KEY=STEP,...",
-    help="Resolution of the inverter parameters, for example torque=0.5%,time=10ms,speed=1rpm,"
-    "frequency=0.1Hz,share=1%. Torque in % of the rated torque or in N*m. Default: 0.1 %, 1 ms, 1 rpm, "
-    "0.1 Hz and 0.01.")  # fmt: skip
-@click.option("--budget", metavar="TIME",
-    callback=options.quantity_callback("s", least=0.0),
-    help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0 "
-    "disables it.")  # fmt: skip
-@click.option("--project", metavar="FILE",
-    help="TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and "
-    "decimal sign (example in docs/howto/read-a-report.md).")  # fmt: skip
-@options.machine_argument(
-    "drive", options.read_machine_or_identified, options.drive_names, options.DEFAULT_DRIVE
-)
-@options.set_option
+@command("report")
+@option("--out to")
+@option("--pdf")
+@options.controller_option("--controllers", several=True)
+@options.param_option
+@option("--resolution")
+@option("--budget", options.quantity("s", least=0.0))
+@option("--project")
+@options.of_drive(options.read_machine_or_identified)
 @answers()
 def report_command(
     *, drive: Machine | Identification, to: str | None, pdf: str | None, controllers: list[str] | None,
-    params: dict[str, str], **asked: Any,
+    params: dict[str, str], **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Write a report on the start of a drive or a chain as one HTML file.
 
@@ -69,22 +51,43 @@ def report_command(
     drive of the literature. The file opens offline and prints to A4. The report recommends a strategy and
     states its parameters, rounded to the resolution of the inverter and simulated again after rounding. Of a
     chain it gives the figures of each shaft, and no maps.
+
+    Options
+    -------
+    --out FILE
+        HTML file to write, for example report.html.
+    --pdf FILE
+        PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
+    --controllers A,B,...
+        Strategies to compare, including files of tuned gains. Default: all that need no parameter.
+    --param CONTROLLER.KEY=VALUE
+        Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.
+    --resolution KEY=STEP,...
+        Resolution of the inverter parameters, for example
+        torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in
+        N*m. Default: 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.
+    --budget TIME
+        Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0
+        disables it.
+    --project FILE
+        TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and
+        decimal sign (example in docs/howto/read-a-report.md).
     """
     if to is None and pdf is None and not option_value("as_json"):
         raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
-    for option, path in (("--out", to), ("--pdf", pdf)):
+    for flag, path in (("--out", to), ("--pdf", pdf)):
         if path is not None:
-            _check_file(option, path)
+            _check_file(flag, path)
     browser = "" if pdf is None else _browser()
     with working("starting the drive ...") as show, attributed():
         from softstart.reporting import report as compute
 
-        made = compute(
+        report = compute(
             drive, controllers=controllers_from_options(controllers, params), command=options.command_line(),
-            progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **asked,
+            progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **arguments,
         )  # fmt: skip
         show("drawing the figures")
-        page = "" if to is None and pdf is None else made.to_html()
+        page = "" if to is None and pdf is None else report.to_html()
     with options.named_as_options(output="--out"):
         if to is not None:
             write_whole(Path(to), lambda stream: stream.write(page))
@@ -92,8 +95,8 @@ def report_command(
             with working("printing ..."):
                 printed = _printed(page, browser)
             write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
-    sheet, written = made.sheet, " and ".join(filter(None, (to, pdf)))
-    return made.summary, replace(sheet, notes=[*sheet.notes, f"Written to {written}."])
+    sheet, written = report.sheet, " and ".join(filter(None, (to, pdf)))
+    return report.summary, replace(sheet, notes=[*sheet.notes, f"Written to {written}."])
 
 
 def _check_file(option: str, out: str) -> None:

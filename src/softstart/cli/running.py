@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.completion import folders
-from softstart.cli.options import Decorator, code_allowed, command_line, json_option, named_as_options
+from softstart.cli.options import Decorator, code_allowed, command_line, json_option, named_as_options, option
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.parallel import LOADED_FROM_FILE
@@ -107,8 +107,8 @@ def attributed(loading: str = "") -> Iterator[None]:
         raise
 
 
-def answers(text: str = "") -> Decorator:
-    """--json and, with this help, --out; the command returns what is shown.
+def answers(out: bool = False) -> Decorator:
+    """--json and, with `out`, --out; the command returns what is shown.
 
     That is its data for JSON, its sheet or a text and, if there is one, the error to raise at the end. That
     the folder of --out can be written is found before the command begins; it is filled at its end, and then
@@ -117,13 +117,13 @@ def answers(text: str = "") -> Decorator:
 
     def decorate(command: Callable[..., Any]) -> Callable[..., None]:
         @wraps(command)
-        def run(*, as_json: bool, out: str | None = None, **given: Any) -> None:
+        def run(*, as_json: bool, out: str | None = None, **arguments: Any) -> None:
             from softstart.views import sheet
 
             with named_as_options(), output_folder(out) as folder:
                 if out is not None:
                     _check_report(out)
-                data, shown, *failures = command(**given)
+                data, shown, *failures = command(**arguments)
                 if folder is not None:
                     with working("drawing the figures ..."):
                         sheet.export(shown, folder, command_line())
@@ -138,8 +138,7 @@ def answers(text: str = "") -> Decorator:
             for failure in failures:
                 raise failure
 
-        written = click.option("--out", metavar="DIR", help=text, shell_complete=folders)
-        return json_option(written(run) if text else run)
+        return json_option(option("--out", shell_complete=folders)(run) if out else run)
 
     return decorate
 
@@ -170,7 +169,7 @@ def controllers_from_options(
     from softstart import controller
 
     known = names or list(registered(CONTROLLERS))
-    given: dict[str, dict[str, str]] = {} if several else {known[0]: dict(params)}
+    parameters: dict[str, dict[str, str]] = {} if several else {known[0]: dict(params)}
     for whole, value in params.items() if several else ():
         name, _, key = whole.rpartition(".")
         if not (name and key):
@@ -178,15 +177,15 @@ def controllers_from_options(
         if name not in known:
             hint = did_you_mean(name, known)
             raise InputError(f'--param "{whole}={value}": {name} is not compared here; {hint}')
-        given.setdefault(name, {})[key] = value
-    made: list[Controller] = []
-    for name in controller.ready_controller_names(given) if names is None else names:
-        own = given.get(name, {})
+        parameters.setdefault(name, {})[key] = value
+    controllers: list[Controller] = []
+    for name in controller.ready_controller_names(parameters) if names is None else names:
+        values = parameters.get(name, {})
         try:
             with attributed(name):
-                made.append(controller.make_controller(name, own, allow_code=code_allowed()))
+                controllers.append(controller.make_controller(name, values, allow_code=code_allowed()))
         except InputError as error:
             before = f"--param {name}." if several else "--param "
-            lines = [" ".join(one.split())[:1500] for one in error.sentences]
-            raise InputError(before + s if s.startswith(tuple(own)) else s for s in lines) from None
-    return made
+            lines = [" ".join(sentence.split())[:1500] for sentence in error.sentences]
+            raise InputError(before + s if s.startswith(tuple(values)) else s for s in lines) from None
+    return controllers

@@ -6,9 +6,8 @@ import threading
 import webbrowser
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from softstart.cli import options
+from softstart.cli.options import command, option
 from softstart.cli.running import working
 from softstart.errors import InputError
 from softstart.page.serve import Address, check_installed, listening, run_server
@@ -17,28 +16,34 @@ if TYPE_CHECKING:
     from softstart.page.machines import Loaded
 
 
-@click.command("serve")
-@options.machine_argument("drive", options.read_as_known, options.drive_names, options.DEFAULT_DRIVE)
-@options.set_option
-@click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 selects a free one.")
-@click.option(
-    "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen on."
-)
-@click.option(
-    "--token", metavar="TOKEN", help="Token that every client must present; required with --expose."
-)
-@click.option(
-    "--expose", is_flag=True, help="Accept connections from other machines; requires --host and --token."
-)
-@click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def serve_command(*, drive: Loaded, no_browser: bool, **given: Any) -> None:
+@command("serve")
+@options.of_drive(options.read_as_known)
+@option("--port", type=int, default=8765, show_default=True)
+@option("--host", default="127.0.0.1", show_default=True)
+@option("--token")
+@option("--expose", is_flag=True)
+@option("--no-browser", is_flag=True)
+def serve_command(*, drive: Loaded, no_browser: bool, **arguments: Any) -> None:
     """Open the interactive page in the browser.
 
     DRIVE is a TOML file or the name of a shipped drive or chain; by default the crane drive of the
     literature. The server accepts connections from this machine only, unless --expose is given; Ctrl-C stops
     it. Needs NiceGUI: pip install 'softstart[ui]'.
+
+    Options
+    -------
+    --port
+        Port; 0 selects a free one.
+    --host ADDRESS
+        Address to listen on.
+    --token TOKEN
+        Token that every client must present; required with --expose.
+    --expose
+        Accept connections from other machines; requires --host and --token.
+    --no-browser
+        Do not open a browser.
     """
-    address = Address(**given)
+    address = Address(**arguments)
     address.check()
     if address.expose and (address.is_loopback or address.token is None):
         raise InputError(

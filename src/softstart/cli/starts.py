@@ -6,12 +6,11 @@ import shlex
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-import click
-
 import softstart
 from softstart.cli import options
-from softstart.cli.options import reading
+from softstart.cli.options import command, controller_option, option
 from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.plugins import controller_names
 from softstart.quantities import whole_number
 
 if TYPE_CHECKING:
@@ -20,32 +19,19 @@ if TYPE_CHECKING:
     from softstart.identification.result import Identification
     from softstart.start.comparison import Comparison
 
-strategies_option = options.controller_option(
-    "--controllers", "A,B,...",
-    "Strategies, separated by commas. Default: all installed ones that need no parameter.",
-)  # fmt: skip
-params_option = options.param_option(
-    "Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.", "CONTROLLER.KEY=VALUE"
-)
 
-
-@click.command("compare")
-@strategies_option
+@command("compare")
+@controller_option("--controllers", several=True)
 @options.fitted_to_option
-@params_option
+@options.param_option
 @options.until_option
-@click.option(
-    "--worst-case", metavar="A,B,...",
-    callback=reading(lambda text, option: () if text == "none" else options.read_list(text, option)),
-    help="Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. "
-    "Default: both.",
-)  # fmt: skip
-@click.option("--details", is_flag=True, help="Also show times, events, and what each column means.")
+@option("--worst-case", lambda text, name: () if text == "none" else options.read_list(text, name))
+@option("--details", is_flag=True)
 @options.of_drive(options.read_machine_or_identified)
-@answers("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
+@answers(out=True)
 def compare_command(
     *, drive: Machine | Identification, controllers: list[str] | None, params: dict[str, str], details: bool,
-    **asked: Any,
+    **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Compare strategies on a drive or a chain.
 
@@ -53,14 +39,32 @@ def compare_command(
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
     drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, or a
     file of tuned gains.
+
+    Options
+    -------
+    --controllers A,B,...
+        Strategies, separated by commas. Default: all installed ones that need no parameter.
+    --param CONTROLLER.KEY=VALUE
+        Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
+    --worst-case A,B,...
+        Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. Default:
+        both.
+    --details
+        Also show times, events, and what each column means.
+    --out DIR
+        Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.
     """
     with working("starting the drive ..."), attributed():
-        found = softstart.compare(drive, controllers_from_options(controllers, params), **asked)
+        comparison = softstart.compare(drive, controllers_from_options(controllers, params), **arguments)
     from softstart.views.starts import comparison_sheet
 
-    rows = sorted(found.rows, key=lambda row: row.run.k_dyn) if controllers is None else list(found.rows)
-    sheet = comparison_sheet(found, rows, details or option_value("out") is not None)
-    return found.summary, replace(sheet, commands=_next_steps(found))
+    rows = (
+        sorted(comparison.rows, key=lambda row: row.run.k_dyn)
+        if controllers is None
+        else list(comparison.rows)
+    )
+    sheet = comparison_sheet(comparison, rows, details or option_value("out") is not None)
+    return comparison.summary, replace(sheet, commands=_next_steps(comparison))
 
 
 def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
@@ -69,7 +73,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
 
     machine = [
         options.typed_machine(),
-        *(word for one in options.typed_settings() for word in ("--set", one)),
+        *(word for setting in options.typed_settings() for word in ("--set", setting)),
     ]
     chosen = comparison.recommendation
     best = chosen.recommended or (chosen.best[-1] if chosen.best else None)
@@ -77,34 +81,40 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     if not (chosen.recommended or comparison.rows[0].intervals):
         known = len(comparison.drive.positions) == 1
         steps.append(("optimize", [], "the lowest possible K_dyn" if known else "the best fixed profile"))
-    if best is not None and best.name in options.controller_names() and tunable_parameters(best.controller):
+    if best is not None and best.name in controller_names() and tunable_parameters(best.controller):
         steps.append(("tune", ["--controller", best.name], "gains for other gaps and loads"))
     steps.append(("report", ["--out", "report.html"], "all results in one file"))
     return [(shlex.join(["softstart", name, *machine, *more]), gives) for name, more, gives in steps]
 
 
-@click.command("simulate")
-@options.controller_option(
-    "--controller", "NAME",
-    "A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).", required=True,
-)  # fmt: skip
-@options.param_option("Set a parameter of the strategy, for example time='200 ms'. May be repeated.")
+@command("simulate")
+@controller_option("--controller", required=True)
+@options.param_option
 @options.fitted_to_option
 @options.until_option
-@options.of_drive(options.read_machine, needed=True)
-@answers("Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.")
+@options.of_drive(options.read_machine)
+@answers(out=True)
 def simulate_command(
     *, drive: Machine, controller: str, params: dict[str, str], fitted_to: Drive | None, until: float | None
 ) -> Answer:  # fmt: skip
     """Simulate one start of a drive or a chain.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like). For a motor torque over speed (DOL, star-delta) see
-    docs/howto/motor-torque-over-speed.md.
+    tractor-like); by default the crane drive of the literature. For a motor torque over speed (DOL,
+    star-delta) see docs/howto/motor-torque-over-speed.md.
+
+    Options
+    -------
+    --controller NAME
+        A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
+    --param KEY=VALUE
+        Set a parameter of the strategy, for example time='200 ms'. May be repeated.
+    --out DIR
+        Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.
     """
     with working("starting the drive ..."), attributed():
-        (made,) = controllers_from_options([controller], params, several=False)
-        run: Any = softstart.simulate(drive, made, until, fitted_to=fitted_to)
+        (strategy,) = controllers_from_options([controller], params, several=False)
+        run: Any = softstart.simulate(drive, strategy, until, fitted_to=fitted_to)
         _ = run.settled_time  # it may ask the controller on
     from softstart.start.recommendation import margins_of
     from softstart.views.starts import run_sheet
@@ -112,7 +122,7 @@ def simulate_command(
     data = {
         **run.summary(),
         "fitted_to": fitted_to.name if fitted_to else None,
-        "limits": [one.summary() for one in margins_of(run)],
+        "limits": [margin.summary() for margin in margins_of(run)],
         "stages": [{**asdict(stage), "duration": stage.duration} for stage in run.stages],
         "events": [event._asdict() for event in run.events],
     }
@@ -125,30 +135,18 @@ def _numbers(text: str, option: str) -> dict[str, int]:
     return {name: whole_number(number, option, 0) for name, number in pairs.items()}
 
 
-@click.command("fatigue")
-@strategies_option
+@command("fatigue")
+@controller_option("--controllers", several=True)
 @options.fitted_to_option
-@params_option
-@click.option(
-    "--slope", metavar="M", callback=options.quantity_callback("1"),
-    help="Slope of the S-N curve, instead of limits.fatigue.slope. Default: 6.6, pitting of case-hardened "
-    "gears.",
-)  # fmt: skip
-@click.option(
-    "--worn-gap", metavar="GAP",
-    help="Gap at the end of limits.life, for example '2 rad'; it grows in proportion to time, and damage "
-    "accumulates. Of a chain: all gaps together at the motor shaft.",
-)  # fmt: skip
-@click.option(
-    "--estimate-damping", metavar="gears=N,couplings=N", callback=reading(_numbers),
-    help="For shafts without damping: a damping ratio of 1 % per pair of gears and 0.5 % per coupling, at "
-    "most 6 %.",
-)  # fmt: skip
+@options.param_option
+@option("--slope", options.quantity("1"))
+@option("--worn-gap")
+@option("--estimate-damping", _numbers)
 @options.of_drive(options.read_machine)
-@answers("Write the figure (SVG, PNG), cycles and turning points (CSV) and report.md into this folder.")
+@answers(out=True)
 def fatigue_command(
     *, drive: Machine, controllers: list[str] | None, fitted_to: Drive | None, params: dict[str, str],
-    **asked: Any,
+    **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Estimate the fatigue life of the shaft line under each strategy.
 
@@ -157,24 +155,42 @@ def fatigue_command(
     [limits.fatigue] of the file give the S-N curve, the starts per hour and the required life; without them
     lives are relative to that of direct. Every shaft needs damping; those of a chain are evaluated
     separately.
+
+    Options
+    -------
+    --controllers A,B,...
+        Strategies, separated by commas. Default: all installed ones that need no parameter.
+    --param CONTROLLER.KEY=VALUE
+        Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
+    --slope M
+        Slope of the S-N curve, instead of limits.fatigue.slope. Default: 6.6, pitting of case-hardened
+        gears.
+    --worn-gap GAP
+        Gap at the end of limits.life, for example '2 rad'; it grows in proportion to time, and damage
+        accumulates. Of a chain: all gaps together at the motor shaft.
+    --estimate-damping gears=N,couplings=N
+        For shafts without damping: a damping ratio of 1 % per pair of gears and 0.5 % per coupling, at
+        most 6 %.
+    --out DIR
+        Write the figure (SVG, PNG), cycles and turning points (CSV) and report.md into this folder.
     """
     with working("starting the machine ..."), attributed():
-        made = controllers_from_options(controllers, params)
-        found = softstart.fatigue(
-            [softstart.simulate(drive, one, fitted_to=fitted_to) for one in made], **asked
+        strategies = controllers_from_options(controllers, params)
+        result = softstart.fatigue(
+            [softstart.simulate(drive, strategy, fitted_to=fitted_to) for strategy in strategies], **arguments
         )
     from softstart.views.fatigue import fatigue_sheet
 
-    return found.summary, fatigue_sheet(found, found.ranked if controllers is None else found.rows, fitted_to)
+    return result.summary, fatigue_sheet(
+        result, result.ranked if controllers is None else result.rows, fitted_to
+    )
 
 
-@click.command("linear")
-@options.controller_option(
-    "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
-)
-@options.param_option("Set a parameter of the controller, for example period='0.5 ms'. May be repeated.")
+@command("linear")
+@controller_option("--controller", required=True)
+@options.param_option
 @options.of_drive(options.read_machine)
-@answers("Write the Bode and Nyquist diagrams (SVG, PNG), the response (CSV) and report.md into this folder.")
+@answers(out=True)
 def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer:
     """Linearise the control loop: stability margins, modes, limit cycles.
 
@@ -182,10 +198,19 @@ def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -
     drive of the literature. The controller's step function is linearised at an instant of its start at which
     all gaps are closed; the loop is broken at the torque demand. Limit cycles through the gap of a drive are
     predicted by the describing function.
+
+    Options
+    -------
+    --controller NAME
+        A controller's name, or path/to/file.py:ClassName.
+    --param KEY=VALUE
+        Set a parameter of the controller, for example period='0.5 ms'. May be repeated.
+    --out DIR
+        Write the Bode and Nyquist diagrams (SVG, PNG), the response (CSV) and report.md into this folder.
     """
     with working("running and linearising the start ..."), attributed():
-        (made,) = controllers_from_options([controller], params, several=False)
-        view = softstart.linear_view(drive, made)
+        (strategy,) = controllers_from_options([controller], params, several=False)
+        view = softstart.linear_view(drive, strategy)
     from softstart.views.linear import linear_sheet
 
     return view.summary, linear_sheet(view)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ import click
 import softstart
 from softstart.cli import options
 from softstart.cli.completion import one_of
+from softstart.cli.options import command, option
 from softstart.cli.running import Answer, answers, attributed, option_value, working
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -31,47 +33,59 @@ MOST_VALUES = 1_000_000  # of a range
 PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 
 
-@click.command("sweep")
-@options.controller_option(
-    "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp."
-)
-@click.option("--axis", "grid", metavar="KEY=VALUES", multiple=True, required=True,
+@command("sweep")
+@options.controller_option("--controller")
+@option(
+    "--axis grid",
+    multiple=True,
+    required=True,
     shell_complete=one_of(lambda: ["controller", *options.keys_of(Drive.TABLES)], end="="),
-    help="Axis of the grid: a parameter of the drive, shaft.gap=0.25:4:100 (from:to:count, with :log for "
-    "geometric spacing), 1x:4x:7 (multiples of the drive's) or load.kind=active,reactive, or of the "
-    "controller, controller.torque='10 N*m,20 N*m'. Of a chain shaft.gap is the sum of all gaps, "
-    "shaft[2].gap or mass[crane].inertia one part. May be repeated.")  # fmt: skip
-@options.param_option("Set a parameter of the controller for all starts. May be repeated.")
+)
+@options.param_option
 @options.fitted_to_option
 @options.until_option
-@click.option("--figures", metavar="A,B,...", callback=options.reading(options.read_list),
-    help="Figures to save, for example k_dyn,start_time; the status is always saved.")  # fmt: skip
+@option("--figures", options.read_list)
 @options.workers_option
 @options.scheduler_option
-@click.option("--chunk", metavar="N", callback=options.count(),
-    help="Largest number of starts that are computed and written at once.")  # fmt: skip
-@click.option(
-    "--netcdf", metavar="FILE", type=click.Path(path_type=Path), help="Also write the results as netCDF."
-)
+@option("--chunk", options.count())
+@option("--netcdf", type=click.Path(path_type=Path))
 @options.of_drive(options.read_machine)
-@answers(
-    f"Write the results chunk by chunk into DIR/{RESULTS}, with figure, table and report.md; an "
-    "interrupted command resumes. Without it only a summary is printed."
-)
+@answers(out=True)
 def sweep_command(
     *, drive: Machine, controller: str | None, grid: tuple[str, ...], params: dict[str, str],
-    fitted_to: Drive | None, netcdf: Path | None, **asked: Any,
+    fitted_to: Drive | None, netcdf: Path | None, **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Simulate a grid of drives and controllers of any size.
 
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
     drive of the literature. The results are a Zarr store that xarray opens.
+
+    Options
+    -------
+    --controller NAME
+        The controller, unless several are an axis: --axis controller=direct,ramp.
+    --axis KEY=VALUES
+        Axis of the grid: a parameter of the drive, shaft.gap=0.25:4:100 (from:to:count, with :log for
+        geometric spacing), 1x:4x:7 (multiples of the drive's) or load.kind=active,reactive, or of the
+        controller, controller.torque='10 N*m,20 N*m'. Of a chain shaft.gap is the sum of all gaps,
+        shaft[2].gap or mass[crane].inertia one part. May be repeated.
+    --param KEY=VALUE
+        Set a parameter of the controller for all starts. May be repeated.
+    --figures A,B,...
+        Figures to save, for example k_dyn,start_time; the status is always saved.
+    --chunk N
+        Largest number of starts that are computed and written at once.
+    --netcdf FILE
+        Also write the results as netCDF.
+    --out DIR
+        Write the results chunk by chunk into DIR/sweep.zarr, with figure, table and report.md; an
+        interrupted command resumes. Without it only a summary is printed.
     """
     if controller is None and not any(text.partition("=")[0].strip() == "controller" for text in grid):
         raise InputError(
             "controller = None: name a strategy, or make several an axis, as --axis controller=direct,ramp."
         )
-    asked = {name: value for name, value in asked.items() if value is not None}
+    arguments = {name: value for name, value in arguments.items() if value is not None}
     begin, last = time.monotonic(), None
 
     def progress(now: SweepProgress) -> None:
@@ -90,12 +104,12 @@ def sweep_command(
         from softstart.sweeping.summary import summarise
         from softstart.views import sweeps as views
 
-        if netcdf is not None and (netcdf.is_dir() or not os.access(netcdf.parent, os.W_OK)):
-            raise InputError(f"netcdf = {netcdf}: no file can be written there; give another one.")
+        if netcdf is not None:
+            _check_netcdf(netcdf)
         axes = read_axes(grid, Recipe(controller or "", params, code), drive)
         results = softstart.sweep(
             drive, controller, axes, parameters=params, fitted_to=fitted_to, to=to, progress=progress,
-            allow_code=code, **asked,
+            allow_code=code, **arguments,
         )  # fmt: skip
         show("summing up")
         summary = summarise(results)
@@ -121,6 +135,14 @@ def sweep_command(
         pace = views.pace(last)
         click.get_current_context().call_on_close(lambda: print(pace))
     return lambda: data, views.sweep_sheet(results, summary, drive, fitted_to)
+
+
+def _check_netcdf(path: Path) -> None:
+    """Whether the file can be written, found before anything is computed."""
+    if find_spec("h5netcdf") is None:
+        raise InputError("netcdf: h5netcdf is missing; install it: pip install 'softstart[sweep]'.")
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(f"netcdf = {path}: the file cannot be written; choose another one.")
 
 
 def read_axes(texts: Sequence[str], recipe: Recipe, machine: Machine) -> dict[str, Any]:

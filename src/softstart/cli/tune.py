@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import click
 
 import softstart
 from softstart.cli import options
-from softstart.cli.options import reading
+from softstart.cli.options import command, controller_option, option
 from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
 from softstart.drive import PARAMETERS
 from softstart.drive.data_sheet import UnknownStiffness
@@ -38,18 +38,21 @@ def read_axis(text: str, option: str, unit: str) -> list[Any]:
     """
 
     def read(part: str) -> tuple[float, str]:
-        there = BEHIND.fullmatch(part)  # of the gear of the drive, which is read later
-        if (found := read_multiple(part, option, ("x", "J1"))) is not None:
-            return found
-        value = float(to_si(there[1] if there else part, unit, name=option))
-        return value, f" {unit} at output" if there else ""
+        at_output = BEHIND.fullmatch(part)  # of the gear of the drive, which is read later
+        if (multiple := read_multiple(part, option, ("x", "J1"))) is not None:
+            return multiple
+        value = float(to_si(at_output[1] if at_output else part, unit, name=option))
+        return value, f" {unit} at output" if at_output else ""
 
-    found = options.read_value_list(text, option, read, LARGEST_GRID)
-    return [f"{float(f'{one:.12g}')!r}{ending}" if ending else float(f"{one:.12g}") for one, ending in found]
+    values = options.read_value_list(text, option, read, LARGEST_GRID)
+    return [
+        f"{float(f'{value:.12g}')!r}{ending}" if ending else float(f"{value:.12g}")
+        for value, ending in values
+    ]
 
 
-def _grid(unit: str) -> Callable[..., Any]:
-    return reading(lambda text, option: read_axis(text, option, unit))
+def _grid(unit: str) -> options.Reader:
+    return lambda text, name: read_axis(text, name, unit)
 
 
 def read_free(text: str, option: str = "--free") -> dict[str, tuple[str, str] | None]:
@@ -58,16 +61,16 @@ def read_free(text: str, option: str = "--free") -> dict[str, tuple[str, str] | 
     >>> read_free("torque,delay=5 ms:20 ms,time=0.5x:2x")
     {'torque': None, 'delay': ('5 ms', '20 ms'), 'time': ('0.5x', '2x')}
     """
-    found: dict[str, tuple[str, str] | None] = {}
+    ranges: dict[str, tuple[str, str] | None] = {}
     for part in text.split(","):
         match = re.fullmatch(r"\s*([^=:]+?)\s*(?:=([^:]+):([^:]+))?", part)
         if match is None:
             raise InputError(f'{option} "{part.strip()}": write a name, or name=low:high, as time=0.5x:2x.')
         name, low, high = match.groups()
-        if name in found:
+        if name in ranges:
             raise InputError(f'{option} = "{text}": {name} is named twice; name it once.')
-        found[name] = (low.strip(), high.strip()) if low else None
-    return found
+        ranges[name] = (low.strip(), high.strip()) if low else None
+    return ranges
 
 
 def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[str, str | list[str]]:
@@ -83,56 +86,27 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     }
 
 
-@click.command("tune")
-@options.controller_option(
-    "--controller", "NAME", "The controller to tune, or path/to/file.py:ClassName.", required=True
-)
-@click.option("--gaps", metavar="GAP,...", callback=_grid("rad"),
-    help="Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as "
-    "0.5:2:7; with a gear also '9 arcmin at output'; of a chain the sum of all gaps. Default: "
-    "0.5x,1x,2x,4x.")  # fmt: skip
-@click.option("--inertias", metavar="INERTIA,...", callback=_grid("kg*m^2"),
-    help="Load inertias, likewise; also multiples of the motor's, 2J1:5J1:4. Default: 0.4x,1x,2x."
-)  # fmt: skip
-@click.option("--free", metavar="NAME[=LOW:HIGH],...", callback=reading(read_free),
-    help="Parameters to tune, with or without a range: torque,delay='5 ms:20 ms',rise=0.5x:2x (multiples "
-    "of the default). Default: all that the controller declares tunable.")  # fmt: skip
-@options.param_option("Fix a parameter of the controller, which is then not tuned. May be repeated.")
-@click.option("--metric", metavar="NAME", default="k_dyn",
-    help="Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits].")  # fmt: skip
-@click.option("--start-time", metavar="TIME",
-    help="Upper bound of the start time: 0.3 (s), or 1.2x that of direct in the same cell. Default: that "
-    "of the controller with its default gains.")  # fmt: skip
-@click.option("--tolerance", "tolerances", metavar="KEY=SPREAD", multiple=True,
-    callback=reading(read_tolerances),
-    help="Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover, "
-    "encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.")  # fmt: skip
-@click.option("--quantile", metavar="SHARE", callback=options.quantity_callback("1"), default="1",
-    help="Quantile of the starts that is minimised. Default: 1, the worst case.")  # fmt: skip
-@click.option("--only", metavar="schedule|robust", type=click.Choice(["schedule", "robust"]),
-    help="Compute the gain schedule or the robust set only.")  # fmt: skip
-@click.option("--optimum/--no-optimum", "certified", default=None,
-    help="Compute or skip the optimum of each cell, which takes longest. Default: compute that of drives."
-)  # fmt: skip
-@click.option(
-    "--seed",
-    metavar="N",
-    callback=options.count(0),
-    default="0",
-    help="Seed of the random search. Default: 0.",
-)
-@click.option("--restarts", metavar="N", callback=options.count(0), default="3",
-    help="Number of independent searches. Default: 3.")  # fmt: skip
+@command("tune")
+@controller_option("--controller", required=True)
+@option("--gaps", _grid("rad"))
+@option("--inertias", _grid("kg*m^2"))
+@option("--free", read_free)
+@options.param_option
+@option("--metric", default="k_dyn")
+@option("--start-time")
+@option("--tolerance tolerances", read_tolerances, multiple=True)
+@option("--quantile", options.quantity("1"), default="1")
+@option("--only", type=click.Choice(["schedule", "robust"]))
+@option("--optimum/--no-optimum certified", default=None)
+@option("--seed", options.count(0), default="0")
+@option("--restarts", options.count(0), default="3")
 @options.workers_option
 @options.scheduler_option
 @options.of_drive(options.read_machine_or_identified)
-@answers(
-    "Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished "
-    "parts are saved at once, so that an interrupted command resumes."
-)
+@answers(out=True)
 def tune_command(
     *, drive: Machine | Identification | UnknownStiffness, controller: str, params: dict[str, str],
-    only: str | None, **asked: Any,
+    only: str | None, **arguments: Any,
 ) -> Answer:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
@@ -141,8 +115,45 @@ def tune_command(
     stiffness are judged at both ends of what is usual. Of a chain the torques of all shafts
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
+
+    Options
+    -------
+    --controller NAME
+        The controller to tune, or path/to/file.py:ClassName.
+    --gaps GAP,...
+        Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as
+        0.5:2:7; with a gear also '9 arcmin at output'; of a chain the sum of all gaps. Default:
+        0.5x,1x,2x,4x.
+    --inertias INERTIA,...
+        Load inertias, likewise; also multiples of the motor's, 2J1:5J1:4. Default: 0.4x,1x,2x.
+    --free NAME[=LOW:HIGH],...
+        Parameters to tune, with or without a range: torque,delay='5 ms:20 ms',rise=0.5x:2x (multiples of
+        the default). Default: all that the controller declares tunable.
+    --param KEY=VALUE
+        Fix a parameter of the controller, which is then not tuned. May be repeated.
+    --metric NAME
+        Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits].
+    --start-time TIME
+        Upper bound of the start time: 0.3 (s), or 1.2x that of direct in the same cell. Default: that of
+        the controller with its default gains.
+    --tolerance KEY=SPREAD
+        Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover,
+        encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.
+    --quantile SHARE
+        Quantile of the starts that is minimised. Default: 1, the worst case.
+    --only schedule|robust
+        Compute the gain schedule or the robust set only.
+    --optimum
+        Compute or skip the optimum of each cell, which takes longest. Default: compute that of drives.
+    --seed N
+        Seed of the random search. Default: 0.
+    --restarts N
+        Number of independent searches. Default: 3.
+    --out DIR
+        Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished
+        parts are saved at once, so that an interrupted command resumes.
     """
-    asked |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
+    arguments |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
     with (
         kept_state(option_value("out"), STATE, "finished parts") as state,
         working("starting the drive ...") as progress,
@@ -150,7 +161,7 @@ def tune_command(
         _as_typed(),
     ):
         controllers_from_options([controller], params, several=False)
-        tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
+        tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **arguments)
     from softstart.views.tuning import any_in_time, tuning_sheet
 
     if any_in_time(tuning):

@@ -116,7 +116,7 @@ class Engagement(Result, view="clutches.engagement_sheet"):
 
     References
     ----------
-    [C], the paper on friction clutches; see docs/paper-c.md.
+    [C], the paper on friction clutches.
 
     Examples
     --------
@@ -162,13 +162,13 @@ class Engagement(Result, view="clutches.engagement_sheet"):
         """
         when = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
         names = ("M", "F", "T", "theta", "v", "wM", "wc")
-        which = np.searchsorted([step.start for step in self.steps[1:]], when, side="right")
+        indices = np.searchsorted([step.start for step in self.steps[1:]], when, side="right")
         out = {name: np.empty(when.size) for name in names}
-        for index in np.unique(which):
-            step, here = self.steps[index], which == index
-            u = np.clip((when[here] - step.start) / step.length, 0.0, 1.0)
+        for index in np.unique(indices):
+            step, inside = self.steps[index], indices == index
+            u = np.clip((when[inside] - step.start) / step.length, 0.0, 1.0)
             for name in names:
-                out[name][here] = values(getattr(step, name), u)
+                out[name][inside] = values(getattr(step, name), u)
         out["slip"] = self.clutch.drive_speed - out["wM"]
         return out
 
@@ -224,7 +224,7 @@ def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None
 
     References
     ----------
-    [C] (1)-(5); see docs/paper-c.md.
+    [C] (1)-(5).
 
     Examples
     --------
@@ -304,10 +304,10 @@ def _first_event(clutch: Clutch, step: Step) -> tuple[Step, str]:
     """The step up to the first event within it, and the event function; the whole step without one."""
     name, share = "", math.inf
     jitter = ROUNDING * step.start / step.length
-    for one, a in event_functions(clutch, step):
+    for function, a in event_functions(clutch, step):
         u = first_crossing(a, jitter)
         if u is not None and u < share:
-            name, share = one, u
+            name, share = function, u
     return (step.cut(share) if name else step), name
 
 

@@ -44,17 +44,17 @@ class Piece:
         [6.0, 8.0, 3.0, 0.0]
         """
         s = t - self.start
-        found = [0.0] * (order + 1)
-        found[0] = self.a + (self.b + self.q * s) * s
-        found[1] = self.b + 2.0 * self.q * s
-        found[2] = self.q
+        coefficients = [0.0] * (order + 1)
+        coefficients[0] = self.a + (self.b + self.q * s) * s
+        coefficients[1] = self.b + 2.0 * self.q * s
+        coefficients[2] = self.q
         if self.e != 0.0:
-            found[0] += self.e * math.expm1(s / self.T)
+            coefficients[0] += self.e * math.expm1(s / self.T)
             term = self.e * math.exp(s / self.T)
             for n in range(1, order + 1):
                 term /= n * self.T
-                found[n] += term
-        return found
+                coefficients[n] += term
+        return coefficients
 
     def torque(self, t: float) -> float:
         """M(t) in N m."""
@@ -93,7 +93,7 @@ class Law:
         [0.0, 30.0, 60.0]
         """
         times = np.asarray(t, dtype=np.float64)
-        values = [self.piece_at(one)[0].torque(one) for one in times.ravel().tolist()]
+        values = [self.piece_at(time)[0].torque(time) for time in times.ravel().tolist()]
         return np.array(values).reshape(times.shape)
 
 

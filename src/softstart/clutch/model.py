@@ -37,7 +37,7 @@ class Clutch(ParameterSet, kw_only=False):
 
     References
     ----------
-    [C] (1); see docs/paper-c.md.
+    [C] (1).
 
     Examples
     --------

@@ -240,8 +240,8 @@ def roots(a: Vector) -> Vector:
     if 2.0 * sizes[0] > sizes.sum() or not sizes.any():
         return np.empty(0)
     a = a[: np.flatnonzero(sizes > 1e-18 * sizes.max())[-1] + 1]
-    found = polyroots(a)
-    u = found.real[np.abs(found.imag) < NEARLY_REAL]
+    candidates = polyroots(a)
+    u = candidates.real[np.abs(candidates.imag) < NEARLY_REAL]
     u = u[(u > -NEARLY_REAL) & (u < 1.0 + NEARLY_REAL)]
     slopes = a[1:] * np.arange(1, a.size)
     for _ in range(3):  # eigenvalues of the companion matrix, improved by Newton
@@ -270,7 +270,7 @@ def first_crossing(a: Vector, jitter: float = 0.0) -> float | None:
     a = a[int(np.argmax(counts)) :]
     if a[0] > 0.0:
         return 0.0
-    found = roots(a)
-    after = np.append(0.5 * (found[:-1] + found[1:]), 0.5 * (found[-1:] + 1.0))
+    zeros = roots(a)
+    after = np.append(0.5 * (zeros[:-1] + zeros[1:]), 0.5 * (zeros[-1:] + 1.0))
     rises = values(a, after) > 0.0
-    return float(found[np.argmax(rises)]) if rises.any() else None
+    return float(zeros[np.argmax(rises)]) if rises.any() else None

@@ -14,11 +14,11 @@ from softstart.controller.base import (
 from softstart.controller.compiled import compiled_step
 from softstart.controller.finding import (
     controller_class,
-    controller_names,
     make_controller,
     ready_controller_names,
 )
 from softstart.controller.parameters import declared_parameters, parameter
+from softstart.plugins import controller_names
 
 __all__ = [
     "NEVER",

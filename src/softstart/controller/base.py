@@ -40,10 +40,6 @@ class Sensor(IntFlag):
     --------
     >>> Sensor.STAGE | Sensor.LOAD_SPEED
     <Sensor.STAGE|LOAD_SPEED: 5>
-
-    References
-    ----------
-    docs/theory/feedback.md, what can be measured.
     """
 
     NONE = 0
@@ -68,10 +64,6 @@ class Effort(Enum):
     --------
     >>> Effort.RAMPS.meaning, Effort.RAMPS.order < Effort.CODE.order
     ('an inverter with torque ramps', True)
-
-    References
-    ----------
-    docs/howto/choose-a-strategy.md.
     """
 
     CONTACTOR = "contactor"
@@ -119,7 +111,7 @@ class Measured(NamedTuple):
 
     References
     ----------
-    docs/theory/feedback.md, what can be measured; the stages: [G], docs/theory/stages.md.
+    The stages: [G].
     """
 
     time: float
@@ -158,10 +150,6 @@ class Command(NamedTuple):
     --------
     >>> Command(62.0)
     Command(torque=62.0, ask_again=inf, state=(), slope=0.0)
-
-    References
-    ----------
-    docs/howto/add-a-controller.md, what a controller answers.
     """
 
     torque: float
@@ -203,10 +191,6 @@ class Controller:
     >>> ramp = make_controller("ramp", {"time": "120 ms"})
     >>> ramp.parameters["time"], ramp.fitted(Drive.load("crane-4amtkf")).parameters["full_torque"]
     (0.12, 62.0)
-
-    References
-    ----------
-    The strategies and their sources: docs/controllers.md; to write one: docs/howto/add-a-controller.md.
     """
 
     name: ClassVar[str] = ""
@@ -321,10 +305,6 @@ class PlainController(Controller, ABC):
     ...     name = "half"
     ...     def step(self, measured, state):
     ...         return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.001)
-
-    References
-    ----------
-    docs/howto/add-a-controller.md.
     """
 
     initial_state: ClassVar[tuple[float, ...]] = ()
@@ -382,10 +362,6 @@ class CompiledController(Controller):
     >>> crane = Drive.load("crane-4amtkf")
     >>> make_controller("direct").fitted(crane).vector(crane).tolist()
     [62.0]
-
-    References
-    ----------
-    docs/howto/add-a-controller.md, the compiled form.
     """
 
     kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]

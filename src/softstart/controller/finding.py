@@ -25,17 +25,8 @@ from softstart.controller.tuned import (
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.files import refusal_of
-from softstart.plugins import CONTROLLERS, load, registered
+from softstart.plugins import CONTROLLERS, controller_names, load
 from softstart.quantities import show
-
-
-def controller_names() -> tuple[str, ...]:
-    """Names of all installed controllers, the built-in ones and those of other packages.
-
-    >>> "direct" in controller_names()
-    True
-    """
-    return tuple(registered(CONTROLLERS))
 
 
 def ready_controller_names(given: Collection[str] = ()) -> tuple[str, ...]:

@@ -131,8 +131,7 @@ class DataSheet(ParameterSet):
 
     References
     ----------
-    docs/howto/own-drive.md derives the same numbers by hand. Metallic cross-section of a rope: EN 12385-4,
-    class 6x36 with steel core, C = 0.46.
+    Metallic cross-section of a rope: EN 12385-4, class 6x36 with steel core, C = 0.46.
 
     Examples
     --------

@@ -89,7 +89,7 @@ class Drive(ParameterSet, Machine):
 
     References
     ----------
-    Equations of motion: [G] (1), docs/theory/stages.md; contact laws: docs/theory/contact-laws.md.
+    Equations of motion: [G] (1).
     """
 
     WHAT: ClassVar[str] = "a drive"

@@ -79,10 +79,6 @@ class Records:
     >>> worn = records(Drive.load("crane-4amtkf"), gap=["30 deg", "60 deg"])
     >>> worn.shape, worn.fields["gap"].round(3).tolist(), [drive.load_inertia for drive in worn.elements()]
     ((2,), [0.524, 1.047], [0.175, 0.175])
-
-    References
-    ----------
-    docs/howto/python-in-a-notebook.md.
     """
 
     machine: Any

@@ -75,8 +75,7 @@ class Spot(NamedTuple):
 
     def variance(self, sizes: ErrorScales) -> Vector:
         """The diagonal of V."""
-        found: Vector = sizes.noise**2 + sizes.ripple**2 * self.eigenvalues
-        return found
+        return sizes.noise**2 + sizes.ripple**2 * self.eigenvalues
 
     def innovations(self, sizes: ErrorScales) -> Vector:
         """What is left in each sample that the samples before it did not tell, of unit size."""
@@ -103,20 +102,20 @@ class Point(NamedTuple):
     @property
     def errors(self) -> list[Vector]:
         """The torque error of each log."""
-        return [one.error for one in self.spots]
+        return [spot.error for spot in self.spots]
 
     @property
     def likelihood(self) -> float:
         """L."""
-        variances = [(one.residual, one.variance(self.sizes)) for one in self.spots]
+        variances = [(spot.residual, spot.variance(self.sizes)) for spot in self.spots]
         return sum(float(np.log(v).sum() + r @ (r / v)) for r, v in variances)
 
     @property
     def white(self) -> tuple[Vector, Matrix]:
         """Residual and derivatives of all logs, independent and of unit size."""
-        roots = [np.sqrt(one.variance(self.sizes)) for one in self.spots]
-        residuals = [one.residual / root for one, root in zip(self.spots, roots, strict=True)]
-        jacobians = [one.jacobian / root[:, None] for one, root in zip(self.spots, roots, strict=True)]
+        roots = [np.sqrt(spot.variance(self.sizes)) for spot in self.spots]
+        residuals = [spot.residual / root for spot, root in zip(self.spots, roots, strict=True)]
+        jacobians = [spot.jacobian / root[:, None] for spot, root in zip(self.spots, roots, strict=True)]
         return np.concatenate(residuals), np.vstack(jacobians)
 
 
@@ -131,17 +130,19 @@ class Fitter:
     @property
     def bounds(self) -> tuple[Vector, Vector]:
         """The least and the largest x."""
-        return np.array([one.lower for one in self.unknowns]), np.array([one.upper for one in self.unknowns])
+        return np.array([unknown.lower for unknown in self.unknowns]), np.array(
+            [unknown.upper for unknown in self.unknowns]
+        )
 
     @property
     def weights(self) -> Matrix:
         """What is known beforehand, as the curvature of L/2."""
-        return np.diag([one.weight for one in self.unknowns])
+        return np.diag([unknown.weight for unknown in self.unknowns])
 
     @property
     def largest_torque(self) -> float:
         """The largest torque of the logs, N m."""
-        return max(float(np.max(np.abs(one.log.torque))) for one in self.models)
+        return max(float(np.max(np.abs(model.log.torque))) for model in self.models)
 
     # ---- one log at one x --------------------------------------------------------------------------------
 
@@ -161,18 +162,24 @@ class Fitter:
         unit = np.eye(x.size)
         points = [x, *(x + step * unit[i] for i, step in zip(moved, steps, strict=True))]
         residuals = self.residuals(points, log, error)
-        found = np.zeros((residuals.shape[1], x.size))
-        found[:, moved] = ((residuals[1:] - residuals[0]) / np.array(steps)[:, None]).T
+        jacobian = np.zeros((residuals.shape[1], x.size))
+        jacobian[:, moved] = ((residuals[1:] - residuals[0]) / np.array(steps)[:, None]).T
         for i in self._offset(log):
-            found[:, i] = 1.0 / self.models[log].root
-        return found
+            jacobian[:, i] = 1.0 / self.models[log].root
+        return jacobian
 
     def _moved(self, log: int) -> list[int]:
         """Which numbers the motion of a log depends on."""
-        return [i for i, one in enumerate(self.unknowns) if one.kind != "offset" and one.log in (None, log)]
+        return [
+            i
+            for i, unknown in enumerate(self.unknowns)
+            if unknown.kind != "offset" and unknown.log in (None, log)
+        ]
 
     def _offset(self, log: int) -> list[int]:
-        return [i for i, one in enumerate(self.unknowns) if one.kind == "offset" and one.log == log]
+        return [
+            i for i, unknown in enumerate(self.unknowns) if unknown.kind == "offset" and unknown.log == log
+        ]
 
     def response(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """G: how the samples that count answer to a torque error, in units of their rounding."""
@@ -189,13 +196,13 @@ class Fitter:
 
     def left(self, point: Point) -> list[Vector]:
         """Model minus log in each sample of each log, in its unit."""
-        found = []
+        residuals = []
         for log, (model, error) in enumerate(zip(self.models, point.errors, strict=True)):
             values = model_parameters(self.unknowns, point.x, log)
-            one = model.signals([values], error)[0] - model.responses(values, error) @ error
-            one += sum(point.x[i] for i in self._offset(log)) - model.log.values
-            found.append(one[np.isfinite(one)])
-        return found
+            residual = model.signals([values], error)[0] - model.responses(values, error) @ error
+            residual += sum(point.x[i] for i in self._offset(log)) - model.log.values
+            residuals.append(residual[np.isfinite(residual)])
+        return residuals
 
     # ---- the search --------------------------------------------------------------------------------------
 
@@ -208,7 +215,7 @@ class Fitter:
         guess = np.array([one.guess for one in self.unknowns])
         free = [i for i, one in enumerate(self.unknowns) if one.kind != "offset"]
         draws = qmc.Sobol(len(free), seed=0).random_base2(max(1, (most - 1).bit_length()))
-        found: list[tuple[Vector, float]] = []
+        minima: list[tuple[Vector, float]] = []
         for number in range(most):
             start = guess.copy()
             if number:
@@ -217,23 +224,23 @@ class Fitter:
                 ]
             self.progress(f"search {number + 1}")
             try:
-                found.append(self._followed(np.clip(start, *self.bounds)))
+                minima.append(self._followed(np.clip(start, *self.bounds)))
             except (InputError, SimulationError):
                 continue
-            found.sort(key=lambda one: one[1])
-            if agreeing(found) >= AGREED:
+            minima.sort(key=lambda one: one[1])
+            if agreeing(minima) >= AGREED:
                 break
-        if not found:
+        if not minima:
             raise InputError("The logs cannot be computed with any of the values tried; check their units.")
-        return found
+        return minima
 
     def _followed(self, x: Vector) -> tuple[Vector, float]:
         cost, logs = math.inf, range(len(self.models))
         for share in HORIZONS:
             last = share == HORIZONS[-1]
             pull = np.zeros((0, x.size)) if last else np.eye(x.size)
-            part = replace(self, models=[one.first(share) for one in self.models])
-            found = least_squares(
+            part = replace(self, models=[model.first(share) for model in self.models])
+            fit = least_squares(
                 lambda at, x=x, pull=pull, part=part: np.concatenate(
                     [*(part.residuals([at], i)[0] for i in logs), pull @ (at - x)]
                 ),
@@ -241,14 +248,14 @@ class Fitter:
                 jac=lambda at, pull=pull, part=part: np.vstack([*(part.jacobian(at, i) for i in logs), pull]),
                 bounds=self.bounds, max_nfev=60 if last else 25, xtol=1e-10,
             )  # fmt: skip
-            x, cost = found.x, float(2.0 * found.cost)
+            x, cost = fit.x, float(2.0 * fit.cost)
         return x, cost
 
     # ---- the most likely x -------------------------------------------------------------------------------
 
     def refined(self, x: Vector, held: int | None = None) -> Point:
         """The most likely x near this one. `held`: the number that stays."""
-        errors = [np.zeros(one.blocks) for one in self.models]
+        errors = [np.zeros(model.blocks) for model in self.models]
         return self.descended(self.settled(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque)), held)
 
     def settled(self, x: Vector, errors: Sequence[Vector], sizes: ErrorScales) -> Point:
@@ -288,8 +295,8 @@ class Fitter:
     def derived(self, point: Point, best: Point | None = None) -> Point:
         """The point with the derivatives of its spots, and with sizes and drift unless those of the best."""
         spots = tuple(
-            one._replace(jacobian=one.rotation @ self.jacobian(point.x, i, one.error))
-            for i, one in enumerate(point.spots)
+            spot._replace(jacobian=spot.rotation @ self.jacobian(point.x, i, spot.error))
+            for i, spot in enumerate(point.spots)
         )
         if best is not None:
             return point._replace(spots=spots, drift=best.drift)
@@ -313,7 +320,7 @@ class Fitter:
 
     def drift(self, point: Point) -> Vector:
         """D ln|V|/dx, halved; the most likely torque error follows x, by how much, the response says."""
-        found, ripple = np.zeros(point.x.size), point.sizes.ripple
+        drift, ripple = np.zeros(point.x.size), point.sizes.ripple
         deviations = np.sqrt(np.diag(self.covariance(point)))
         for log, spot in enumerate(point.spots):
             turned = spot.rotation @ spot.response / spot.variance(point.sizes)[:, None]
@@ -324,8 +331,8 @@ class Fitter:
                 at[i] += move
                 error = spot.error + move * spot.likely_error(spot.jacobian[:, i], point.sizes)
                 more = self.response(at, log, error) - spot.response
-                found[i] += ripple**2 * float(np.sum(inverse * more)) / move
-        return found
+                drift[i] += ripple**2 * float(np.sum(inverse * more)) / move
+        return drift
 
     def covariance(self, point: Point) -> Matrix:
         """Of x; what the logs do not tell is as uncertain as it was beforehand."""
@@ -343,13 +350,13 @@ class Fitter:
         """
         value = (math.log(sizes.ripple / (RIPPLE * self.largest_torque)) / math.log(RIPPLE_FACTOR)) ** 2
         information, pull = np.zeros_like(self.weights), np.zeros(len(self.weights))
-        for one, other in zip(spots, about or spots, strict=True):
-            variance = one.variance(sizes)
-            value += float(np.log(variance).sum() + one.residual @ (one.residual / variance))
+        for spot, other in zip(spots, about or spots, strict=True):
+            variance = spot.variance(sizes)
+            value += float(np.log(variance).sum() + spot.residual @ (spot.residual / variance))
             weighted = other.jacobian / other.variance(sizes)[:, None]
             information += other.jacobian.T @ weighted
             if about is None:
-                pull += weighted.T @ one.residual
+                pull += weighted.T @ spot.residual
         values, vectors = np.linalg.eigh(information)
         kept = values > 1e-12 * values[-1]
         along = (vectors.T @ pull)[kept]
@@ -367,11 +374,11 @@ class Fitter:
         begin = np.log([math.sqrt(max(before.noise**2 - 1.0, 0.01)), before.ripple])
         simplex = begin + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
         options = {"xatol": 3e-3, "fatol": 1e-3, "initial_simplex": simplex}
-        found = minimize(
+        minimum = minimize(
             lambda logs: self.restricted(spots, sizes_at(logs), about), begin,
             method="Nelder-Mead", options=options,
         )  # fmt: skip
-        return sizes_at(found.x)
+        return sizes_at(minimum.x)
 
     # ---- intervals ---------------------------------------------------------------------------------------
 
@@ -387,7 +394,9 @@ class Fitter:
         freedom: were f linear, the ends are those of Student's t. It is 1.96^2 if the size is known. Minus
         twice the log likelihood of the logarithm of a deviation with nu of them has the curvature 4 nu.
         """
-        low, middle, high = (self.restricted(best.spots, one) for one in _ripples(best, [-0.1, 0.0, 0.1]))
+        low, middle, high = (
+            self.restricted(best.spots, scales) for scales in _ripples(best, [-0.1, 0.0, 0.1])
+        )
         freedom = max((low - 2.0 * middle + high) / 0.04, 2.0)
         quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
         return freedom * math.log1p(quantile**2 / freedom)
@@ -484,9 +493,9 @@ class Fitter:
 
 def _ripples(best: Point, logs: Sequence[float]) -> list[ErrorScales]:
     """The sizes of the best point with the ripple so many e-folds larger."""
-    return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(one)) for one in logs]
+    return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(log)) for log in logs]
 
 
-def agreeing(found: Sequence[tuple[Vector, float]]) -> int:
+def agreeing(minima: Sequence[tuple[Vector, float]]) -> int:
     """How many searches ended at the best minimum."""
-    return sum(cost <= 1.01 * found[0][1] + 1e-300 for _, cost in found)
+    return sum(cost <= 1.01 * minima[0][1] + 1e-300 for _, cost in minima)

@@ -76,24 +76,24 @@ class LogTable(NamedTuple):
 
 def read_log(where: str, columns: Mapping[str, str]) -> tuple[dict[str, Vector], list[str]]:
     """Time, torque, and angle or speed of a file in SI, and what was taken for granted."""
-    asked = asked_columns(columns)
+    wanted_columns = asked_columns(columns)
     place = f"log = {where}"
     try:
         text = read_text(Path(where), also="cp1252")
         if "\0" in text:
             raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
-        sheet, places = _sheet(text, asked, place)
+        sheet, places = _sheet(text, wanted_columns, place)
         notes: list[str] = []
-        time = _seconds(sheet, places["time"], asked.get("time"), place, notes)
-        found = {"time": time}
+        time = _seconds(sheet, places["time"], wanted_columns.get("time"), place, notes)
+        signals = {"time": time}
         for key in [key for key in places if key != "time"]:
-            _, factor, unit = asked.get(key, WantedColumn("", 1.0, ""))
+            _, factor, unit = wanted_columns.get(key, WantedColumn("", 1.0, ""))
             raw = _numbers(sheet, places[key], key, place)
-            size = _size(sheet, places, key, unit, found["time"], raw, notes)
-            found[key] = factor * size * raw
+            size = _size(sheet, places, key, unit, signals["time"], raw, notes)
+            signals[key] = factor * size * raw
     except RefusedError as refusal:
         raise InputError(f"{place}: {refusal.reason}.") from None
-    return found, notes
+    return signals, notes
 
 
 def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
@@ -104,7 +104,7 @@ def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
     """
     number = r"(?:[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)"
     form = rf"\s*(-?)\s*(?:({number})\s*(?:/\s*({number}))?\s*\*)?\s*(.+?)\s*(?:\[([^\]]*)\])?\s*"
-    found = {}
+    columns_found = {}
     for key, text in columns.items():
         part = re.fullmatch(form, text)
         if key not in SIGNALS or part is None:
@@ -115,14 +115,16 @@ def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
         factor = float(f"{minus}{above or 1}") / (float(below or 1) or math.nan)
         if not (math.isfinite(factor) and factor):
             raise InputError(f"columns: {key} = {show(text)}: its factor is 0 or none.")
-        found[key] = WantedColumn(name, factor, unit)
-    return found
+        columns_found[key] = WantedColumn(name, factor, unit)
+    return columns_found
 
 
 # ---- where the numbers are, and what they are called ---------------------------------------------------
 
 
-def _sheet(text: str, asked: Mapping[str, WantedColumn], where: str) -> tuple[LogTable, dict[str, int]]:
+def _sheet(
+    text: str, wanted_columns: Mapping[str, WantedColumn], where: str
+) -> tuple[LogTable, dict[str, int]]:
     """The columns of a text, and in which of them each signal stands."""
     lines = text.splitlines()
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
@@ -149,7 +151,7 @@ def _sheet(text: str, asked: Mapping[str, WantedColumn], where: str) -> tuple[Lo
     for names, units in headings:
         sheet = LogTable(names, units, CellTable(numbers, width, mark))
         try:
-            places = _places(names, asked)
+            places = _places(names, wanted_columns)
             _check_clocks(sheet, places)
             return sheet, places
         except RefusedError as refusal:
@@ -183,8 +185,8 @@ def _first_row(lines: Sequence[tuple[int, str]], mark: str) -> tuple[int, int, i
             widths[i] = len(cells)
     if not widths:
         return 0, 0, 0
-    each = list(widths.values())
-    width = max(each, key=each.count)
+    counts = list(widths.values())
+    width = max(counts, key=counts.count)
     order = [i for i, _ in lines]
     alike = [i for i in order if widths.get(i) == width]
     # a line of numbers alone, among lines of words, is none of them
@@ -251,20 +253,22 @@ def _tail(name: str) -> tuple[str, str]:
     return (part[1], part[3]) if are_units([part[3]]) else (name, "")
 
 
-def _places(names: Sequence[str], asked: Mapping[str, WantedColumn]) -> dict[str, int]:
+def _places(names: Sequence[str], wanted_columns: Mapping[str, WantedColumn]) -> dict[str, int]:
     """In which column each signal stands."""
-    found: dict[str, list[int]] = {}
-    for key, one in SIGNALS.items():
-        known = [name.lower() for name in ([asked[key].name] if key in asked else one.names)]
+    places: dict[str, list[int]] = {}
+    for key, signal in SIGNALS.items():
+        known = [
+            name.lower() for name in ([wanted_columns[key].name] if key in wanted_columns else signal.names)
+        ]
         whole = [i for i, name in enumerate(names) if name.lower() in known]
-        found[key] = whole or [i for i, name in enumerate(names) if _tail(name)[0].lower() in known]
-    motions = [key for key in ("angle", "speed") if key in asked]
-    motions = motions or [key for key in ("angle", "speed") if found[key]]
+        places[key] = whole or [i for i, name in enumerate(names) if _tail(name)[0].lower() in known]
+    motions = [key for key in ("angle", "speed") if key in wanted_columns]
+    motions = motions or [key for key in ("angle", "speed") if places[key]]
     wanted, wrong = ("time", "torque", *motions), list[str]()
     for key in wanted:
-        if len(found[key]) != 1:
-            many = f"{len(found[key])} are" if found[key] else "none is"
-            wrong.append(f"{many} called {asked[key].name if key in asked else key}")
+        if len(places[key]) != 1:
+            many = f"{len(places[key])} are" if places[key] else "none is"
+            wrong.append(f"{many} called {wanted_columns[key].name if key in wanted_columns else key}")
     if len(motions) != 1:
         wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
     if wrong:
@@ -272,7 +276,7 @@ def _places(names: Sequence[str], asked: Mapping[str, WantedColumn]) -> dict[str
             f"there are the columns {', '.join(filter(None, names))}; {' and '.join(wrong)}; write --columns "
             '"time=NAME [ms],torque=NAME,speed=NAME [rpm]" with names of this file'
         )
-    return {key: found[key][0] for key in wanted}
+    return {key: places[key][0] for key in wanted}
 
 
 # ---- numbers and units ----------------------------------------------------------------------------------
@@ -283,9 +287,11 @@ def _numbers(sheet: LogTable, place: int, name: str, where: str) -> Vector:
     return read_numbers(sheet.table, where, [Wanted((name,), "1")], [place], [""], missing=True).values[0]
 
 
-def _seconds(sheet: LogTable, place: int, asked: WantedColumn | None, where: str, notes: list[str]) -> Vector:
+def _seconds(
+    sheet: LogTable, place: int, wanted_columns: WantedColumn | None, where: str, notes: list[str]
+) -> Vector:
     """The times, of a clock or in a unit, s."""
-    _, factor, unit = asked or WantedColumn("", 1.0, "")
+    _, factor, unit = wanted_columns or WantedColumn("", 1.0, "")
     cells = [row[place].strip() if place < len(row) else "" for _, row in sheet.table.rows]
     clocks = [CLOCK.fullmatch(cell) for cell in cells]
     if any(clocks):

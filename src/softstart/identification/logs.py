@@ -74,10 +74,6 @@ class Log:
     >>> Log(t, np.full(100, -40.0), speed=1000.0 * t)
     Traceback (most recent call last):
     softstart.errors.InputError: log: the speed rises where the torque is below 0; one of the two has the ...
-
-    References
-    ----------
-    docs/identification.md.
     """
 
     time: Vector
@@ -105,8 +101,8 @@ class Log:
         if torque_is not in ("measured", "demand"):
             raise InputError(f'{name}: torque_is = {show(torque_is)}: write "measured" or "demand".')
         kind: Kind = "speed" if angle is None else "angle"
-        given = {"time": time, "torque": torque, kind: speed if angle is None else angle}
-        columns = {key: np.array(value, dtype=np.float64) for key, value in given.items()}
+        arrays = {"time": time, "torque": torque, kind: speed if angle is None else angle}
+        columns = {key: np.array(value, dtype=np.float64) for key, value in arrays.items()}
         for key, column in columns.items():
             if column.ndim != 1 or column.size != columns["time"].size:
                 raise InputError(f"{name}: {key} has the shape {column.shape}; give one number a sample.")
@@ -183,9 +179,9 @@ class Log:
 
     def changed(self, **fields: Any) -> Log:
         """The log with other fields, which are not checked again."""
-        one = object.__new__(Log)
-        vars(one).update(vars(self) | fields)
-        return one
+        log = object.__new__(Log)
+        vars(log).update(vars(self) | fields)
+        return log
 
     def first(self, count: int) -> Log:
         """The first samples of the log, as they are."""
@@ -195,9 +191,9 @@ class Log:
         """The log with torque and motion turned round, if the motor first turns backward in it."""
         if float(np.sum(self.moved[0][self._early])) >= 0.0:
             return self
-        told = "the drive first turns backward, and torque and motion were both turned round"
+        note = "the drive first turns backward, and torque and motion were both turned round"
         return self.changed(
-            torque=-self.torque, values=-self.values, sign=-self.sign, notes=(*self.notes, told)
+            torque=-self.torque, values=-self.values, sign=-self.sign, notes=(*self.notes, note)
         )
 
     def summed(self, lines: float) -> Log:
@@ -214,9 +210,9 @@ class Log:
         if self.kind != "speed" or not even or abs(counts - 1.0) > 0.01:
             return self
         angle = np.concatenate([[0.0], np.cumsum(self.values[1:] * steps)])
-        one = Log(self.time, self.torque, angle=angle, torque_is=self.torque_is, name=self.name)
-        told = "the speed is the difference of encoder counts, and was summed to the angle"
-        return one.changed(notes=(*self.notes, told))
+        log = Log(self.time, self.torque, angle=angle, torque_is=self.torque_is, name=self.name)
+        note = "the speed is the difference of encoder counts, and was summed to the angle"
+        return log.changed(notes=(*self.notes, note))
 
     @property
     def scale(self) -> float:
@@ -258,8 +254,8 @@ class Log:
             raise InputError(f"{name}: the {kind} never changes; log a start in which the motor moves.")
         period = float(np.diff(self.time[seen])[0])
         first = float(speed[0])
-        one = self.count if kind == "speed" else self.count / period  # a motor at rest may be
-        if abs(first) - 1.01 * one > 0.2 * fastest:  # just below the next count
+        step = self.count if kind == "speed" else self.count / period  # a motor at rest may be
+        if abs(first) - 1.01 * step > 0.2 * fastest:  # just below the next count
             raise InputError(
                 f"{name}: the motor turns at {first:.3g} rad/s where the log begins; begin the log at "
                 "standstill."
@@ -383,12 +379,16 @@ def _width(
     at = np.flatnonzero(jumps)
     nearest_before = steps[places[np.maximum(np.searchsorted(places, at) - 1, 0)]]
     nearest_after = steps[places[np.minimum(np.searchsorted(places, at), places.size - 1)]]
-    each = np.abs(steps[at] - 0.5 * (nearest_before + nearest_after))
-    width = float(np.median(each))
+    widths = np.abs(steps[at] - 0.5 * (nearest_before + nearest_after))
+    width = float(np.median(widths))
     room = max(room, float(np.median(np.abs(nearest_after - nearest_before))), 1e-6 * width)
     known = [*(unit * 2.0**bits for unit in units for bits in WIDTHS), other * max(1, round(width / other))]
-    fits = [one for one in known if abs(one - width) <= room and one > (1.0 - 1e-9) * float(np.ptp(values))]
-    return min(fits, key=lambda one: abs(one - width), default=None)
+    fits = [
+        candidate
+        for candidate in known
+        if abs(candidate - width) <= room and candidate > (1.0 - 1e-9) * float(np.ptp(values))
+    ]
+    return min(fits, key=lambda candidate: abs(candidate - width), default=None)
 
 
 def _count(steps: Vector) -> float:
@@ -404,10 +404,10 @@ def _count(steps: Vector) -> float:
         return 0.0
     count = 0.0
     for step in steps.tolist():  # Euclid's greatest common divisor, but for rounding
-        one, other = max(step, count), min(step, count)
-        while other > LEAST_COUNT * largest:
-            one, other = other, abs(one - other * round(one / other))
-        count = one
+        larger, smaller = max(step, count), min(step, count)
+        while smaller > LEAST_COUNT * largest:
+            larger, smaller = smaller, abs(larger - smaller * round(larger / smaller))
+        count = larger
         if count < 5.0 * LEAST_COUNT * largest:
             return 0.0
     multiples = np.round(steps / count)

@@ -126,13 +126,13 @@ class LogModel:
         """D signal/d error, a row for each sample and a column for each block, about this torque error."""
         knots, owners = knots_of(self.log, values.get(DEAD_TIME, self.dead_time))
         lag = values.get(FILTER, 0.0)  # of a speed
-        found = self.motion(values, error).sensitivities(
+        response = self.motion(values, error).sensitivities(
             knots, marks=self._fine if lag else self.times, owners=owners // self.block,
             parts=slice(1, 2) if self.log.kind == "speed" else slice(4, 5),
         )[1][:, 0]  # fmt: skip
         if lag:
-            found = filtered(self._fine, found.T, lag).T[::FINE]
-        return np.asarray(found / math.sqrt(self.block))
+            response = filtered(self._fine, response.T, lag).T[::FINE]
+        return np.asarray(response / math.sqrt(self.block))
 
     def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Trajectory:
         """The start under the torque of the log and this error of it."""
@@ -179,8 +179,7 @@ class LogModel:
     @property
     def _fine(self) -> Vector:
         count = self.times.size
-        fine: Vector = np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
-        return fine
+        return np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
 
 
 def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
@@ -216,11 +215,11 @@ def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     >>> angle.round(2).tolist(), (12.0 * variance).round(2).tolist()
     ([0.0, 0.21, 1.0, 1.28, 2.0, 2.0, 2.0], [1.0, 0.44, inf, 0.25, inf, inf, 1.0])
     """
-    told, variance = angle.copy(), np.full(angle.size, math.inf)
+    angles, variance = angle.copy(), np.full(angle.size, math.inf)
     ends = np.flatnonzero(np.abs(np.diff(angle)) > 0.5 * count)
     variance[[0, -1]] = count**2 / 12.0
     if ends.size == 0:
-        return told, variance
+        return angles, variance
     steps, passed = angle[ends + 1] - angle[ends], time[ends + 1] - time[ends]
     at = np.concatenate([[time[0]], 0.5 * (time[ends] + time[ends + 1]), [time[-1]]])
     before, after = np.diff(at)[:-1], np.diff(at)[1:]
@@ -228,6 +227,6 @@ def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     most = np.minimum(count * passed / np.maximum(np.minimum(before, after), 1e-300), count)
     single = (np.abs(steps) < 1.5 * count) & (moved < count)
     inner = np.where(single, 0.5 * (count - moved), 0.0)
-    told[ends] += np.sign(steps) * inner
+    angles[ends] += np.sign(steps) * inner
     variance[ends] = np.where(single, most, count) ** 2 / 12.0
-    return told, variance
+    return angles, variance

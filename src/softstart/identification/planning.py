@@ -79,12 +79,12 @@ class ExperimentPlan(Result, view="identification.plan_sheet"):
 
     def __getitem__(self, name: str) -> Experiment:
         """The experiment of this name."""
-        return next(one for one in self.experiments if one.name == name)
+        return next(experiment for experiment in self.experiments if experiment.name == name)
 
     @property
     def best(self) -> Experiment:
         """The one that tells most."""
-        return min(self.experiments, key=lambda one: one.score)
+        return min(self.experiments, key=lambda experiment: experiment.score)
 
     def summary(self) -> dict[str, Any]:
         """Everything as numbers and words, for JSON."""
@@ -95,15 +95,15 @@ class ExperimentPlan(Result, view="identification.plan_sheet"):
             "encoder_lines": float(self.drive.encoder_lines),
             "experiments": [
                 {
-                    "name": one.name,
-                    "half_width_percent": {name: 100.0 * width for name, width in one.widths.items()},
-                    "peak_shaft_torque": one.peak,
-                    "travel": one.travel,
-                    "time": one.profile.time.tolist(),
-                    "torque": one.profile.torque.tolist(),
-                    "end": one.end,
+                    "name": experiment.name,
+                    "half_width_percent": {name: 100.0 * width for name, width in experiment.widths.items()},
+                    "peak_shaft_torque": experiment.peak,
+                    "travel": experiment.travel,
+                    "time": experiment.profile.time.tolist(),
+                    "torque": experiment.profile.torque.tolist(),
+                    "end": experiment.end,
                 }
-                for one in self.experiments
+                for experiment in self.experiments
             ],
             "best": self.best.name,
         }
@@ -173,7 +173,7 @@ def plan_experiments(
 
     References
     ----------
-    A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992; docs/identification.md.
+    A. C. Atkinson, A. N. Donev, Optimum Experimental Designs, 1992.
     """
     drive = object_of(drive, Drive, Drive.load, "drive: give one Drive")
     standard = standard_levels(drive)
@@ -182,28 +182,31 @@ def plan_experiments(
     error = RIPPLE * _level(drive)
     if ripple is not None:
         error = _between("ripple", ripple, "N*m", float(drive.Ms), "more is no error of the torque")
-    asked = _asked(free, drive)
-    aims = chosen(wanted, asked, asked, "this plan", key="wanted")
-    bench = VirtualTest(drive, period, error, asked, tuple(aims), progress or (lambda _: None))
-    experiments = [bench.experiment(name, *levels) for name, levels in standard.items()]
+    names = _asked(free, drive)
+    aims = chosen(wanted, names, names, "this plan", key="wanted")
+    test = VirtualTest(drive, period, error, names, tuple(aims), progress or (lambda _: None))
+    experiments = [test.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
-        torque, travel = drive.limits.shaft_torque or max(one.peak for one in experiments), math.inf
+        torque, travel = (
+            drive.limits.shaft_torque or max(experiment.peak for experiment in experiments),
+            math.inf,
+        )
         if max_torque is not None:
             # a limit, as that of the drive: "at output" without losses
             most = quantity_of(drive, "permissible_torque", max_torque, "max_torque")
             torque = _between("max_torque", most, "N*m")
         if max_travel is not None:
             travel = _between("max_travel", quantity_of(drive, "gap", max_travel, "max_travel"), "rad")
-        experiments.append(bench.designed(standard, torque, travel))
+        experiments.append(test.designed(standard, torque, travel))
     return ExperimentPlan(drive, tuple(experiments), period, error)
 
 
-def _between(name: str, given: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
+def _between(name: str, quantity: float | str, unit: str, most: float = math.inf, why: str = "") -> float:
     """A number above 0 and at most this."""
-    value = number_in(unit, given, name)
+    value = number_in(unit, quantity, name)
     if not 0.0 < value <= most:
         limit = f" and at most {most:.3g} {unit}: {why}" if why else ""
-        raise InputError(f"{name} = {show(given)}: give a value above 0{limit}.")
+        raise InputError(f"{name} = {show(quantity)}: give a value above 0{limit}.")
     return value
 
 
@@ -363,9 +366,8 @@ class VirtualTest:
         log = Log.planned(time, profile.at(time))
         unknowns = unknowns_of(self.free, drive, [log], [position_is_unknown(drive)])
         numbers = {POSITION: PLACE, "offset": 0.0}
-        x = np.array([
-            one.number(float(numbers.get(one.name, getattr(drive, one.name, 0.0)))) for one in unknowns
-        ])  # fmt: skip
+        values = [numbers.get(one.name, getattr(drive, one.name, 0.0)) for one in unknowns]
+        x = np.array([one.number(float(value)) for one, value in zip(unknowns, values, strict=True)])
         signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([model_parameters(unknowns, x, 0)])[0]
         if count := _count_of(drive):
             signal = np.round(signal / count) * count
@@ -377,12 +379,12 @@ class VirtualTest:
         sizes = ErrorScales(1.0, self.ripple * math.sqrt(self.period / period))
         variances = np.diag(fitter.covariance(Point(x, sizes, (spot,))))
         reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
-        found = {}
-        for one, number, half in zip(unknowns, x.tolist(), reach, strict=True):
-            if one.log is None:
-                share = math.sinh(half) if one.kind == "logarithm" else one.share(number, half)
-                found[one.name] = share if vague or one.known(number, half) else math.inf
-        return found
+        widths = {}
+        for unknown, number, half in zip(unknowns, x.tolist(), reach, strict=True):
+            if unknown.log is None:
+                share = math.sinh(half) if unknown.kind == "logarithm" else unknown.share(number, half)
+                widths[unknown.name] = share if vague or unknown.known(number, half) else math.inf
+        return widths
 
     def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
@@ -402,12 +404,12 @@ class VirtualTest:
             times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
         model = LogModel.of(Log.planned(times, profile.at(times)), _at_rest(self.drive))
         starts = [{POSITION: place} if position_is_unknown(self.drive) else {} for place in places.tolist()]
-        found = np.empty((3, places.size))
+        loads = np.empty((3, places.size))
         for i, motion in enumerate(model.motions(starts)):
             angles = motion.states[:, S_PHI]
             travel = np.max(np.abs(angles - angles[0]))
-            found[:, i] = abs(motion.shafts["peak"][0]), travel, motion.notes.gap_events
-        return found
+            loads[:, i] = abs(motion.shafts["peak"][0]), travel, motion.notes.gap_events
+        return loads
 
     def over(self, durations: Vector, levels: Vector, torque: float, travel: float) -> float:
         """The worst of some positions over the limits."""
@@ -420,10 +422,10 @@ class VirtualTest:
         while share > LEAST:
             over = self.over(durations, share * levels, torque, travel)
             if over <= 1.0:
-                found = self.experiment("planned", durations, share * levels)
-                over = max(found.peak / torque, found.travel / travel)
+                experiment = self.experiment("planned", durations, share * levels)
+                over = max(experiment.peak / torque, experiment.travel / travel)
                 if over <= 1.0:
-                    return found
+                    return experiment
             share *= (1.0 - NEAR) / over
         return None
 
@@ -431,8 +433,8 @@ class VirtualTest:
         self, standard: dict[str, tuple[Vector, Vector]], torque: float, travel: float
     ) -> Experiment:
         """The torque within the limits that tells most, from the best of the standard ones."""
-        each = {name: self.within(*levels, torque, travel) for name, levels in standard.items()}
-        kept = {name: one for name, one in each.items() if one is not None}
+        experiments = {name: self.within(*levels, torque, travel) for name, levels in standard.items()}
+        kept = {name: experiment for name, experiment in experiments.items() if experiment is not None}
         if not kept:
             raise InputError(
                 f"max_torque = {torque:.4g} N m, max_travel = {travel:.4g} rad: no experiment keeps them, "
@@ -465,6 +467,9 @@ class VirtualTest:
         generator = np.random.default_rng(0)
         draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
         minimize(score, min(draws, key=score), method="COBYLA", options={"rhobeg": SPREAD, "maxiter": TRIALS})
-        tried.sort(key=lambda one: one[0])
+        tried.sort(key=lambda experiment: experiment[0])
         exact = (self.within(durations, played, torque, travel) for _, played in tried[:EXACTLY])
-        return min((one for one in (kept[seed], *exact) if one is not None), key=lambda one: one.score)
+        return min(
+            (experiment for experiment in (kept[seed], *exact) if experiment is not None),
+            key=lambda experiment: experiment.score,
+        )

@@ -63,13 +63,13 @@ class Estimate:
         >>> Estimate("motor_friction", 0.2, 0.0, 0.5, known=True).moved([-2.0, 0.0, 1.0]).tolist()
         [0.0, 0.2, 0.5]
         """
-        given = np.asarray(shares, dtype=np.float64)
+        steps_asked = np.asarray(shares, dtype=np.float64)
         if self.name in FRICTIONS:
-            sides = np.where(given > 0.0, self.upper - self.value, self.value - self.lower)
-            return np.asarray(np.maximum(self.value + sides * np.minimum(given, 2.0), 0.0))
+            sides = np.where(steps_asked > 0.0, self.upper - self.value, self.value - self.lower)
+            return np.asarray(np.maximum(self.value + sides * np.minimum(steps_asked, 2.0), 0.0))
         near, far = sorted((abs(self.lower), abs(self.upper)))
         size = abs(self.value)
-        steps = np.where(given > 0.0, math.log(far / size), math.log(size / near)) * given
+        steps = np.where(steps_asked > 0.0, math.log(far / size), math.log(size / near)) * steps_asked
         return np.asarray(self.value * np.exp(np.clip(steps, -math.log(WIDEST), math.log(WIDEST))))
 
 
@@ -103,10 +103,6 @@ class Identification(Result, view="identification.identification_sheet"):
     >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
     >>> [one.name for one in found.estimates if not one.known]
     []
-
-    References
-    ----------
-    docs/identification.md.
     """
 
     drive: Drive
@@ -122,17 +118,17 @@ class Identification(Result, view="identification.identification_sheet"):
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter."""
-        return next(one for one in self.estimates if one.name == name)
+        return next(estimate for estimate in self.estimates if estimate.name == name)
 
     @property
     def shared(self) -> tuple[Estimate, ...]:
         """The estimates of the drive, without the positions of the logs."""
-        return tuple(one for one in self.estimates if one.name in PARAMETERS)
+        return tuple(estimate for estimate in self.estimates if estimate.name in PARAMETERS)
 
     @property
     def stated(self) -> bool:
         """Whether intervals are stated: not where the drive does not explain the logs."""
-        return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
+        return all(math.isfinite(estimate.upper - estimate.lower) for estimate in self.estimates)
 
     def draws(self, count: int = 200, seed: int = 0) -> Records:
         """Drives that the logs leave possible, drawn from the joint distribution of the estimates."""
@@ -141,9 +137,9 @@ class Identification(Result, view="identification.identification_sheet"):
                 f"{self.drive.name}: its identification states no intervals ({self.notes[0]}) Give "
                 f"{DRIVE_FILE} alone, as a drive without intervals."
             )
-        which = [i for i, one in enumerate(self.estimates) if one.name in PARAMETERS]
-        values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
-        normal = np.random.default_rng(seed).standard_normal((count, len(which)))
+        rows = [i for i, one in enumerate(self.estimates) if one.name in PARAMETERS]
+        values, vectors = np.linalg.eigh(self.correlations[np.ix_(rows, rows)])
+        normal = np.random.default_rng(seed).standard_normal((count, len(rows)))
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
         moved = {one.name: one.moved(move) for one, move in zip(self.shared, moves.T, strict=True)}
         return records(self.drive, **moved)
@@ -153,18 +149,18 @@ class Identification(Result, view="identification.identification_sheet"):
 
         What was identified stays: a value of one's own has no interval.
         """
-        given = list(settings)
-        changed = replace(self, drive=self.drive.with_settings(given)) if given else self
-        changed._check(f"--set {', '.join(given)}")
+        texts = list(settings)
+        changed = replace(self, drive=self.drive.with_settings(texts)) if texts else self
+        changed._check(f"--set {', '.join(texts)}")
         return changed
 
     def _check(self, where: str) -> None:
-        for one in self.shared:
-            if (value := float(getattr(self.drive, one.name))) != one.value:
+        for estimate in self.shared:
+            if (value := float(getattr(self.drive, estimate.name))) != estimate.value:
                 raise InputError(
-                    f"{where}: {PARAMETERS[one.name].path} = {value:.6g}, and the logs say {one.value:.6g} "
-                    f"({one.lower:.6g} to {one.upper:.6g}); leave it as it is, or take "
-                    f"{DRIVE_FILE} alone, as a drive without intervals."
+                    f"{where}: {PARAMETERS[estimate.name].path} = {value:.6g}, but it was identified as "
+                    f"{estimate.value:.6g} ({estimate.lower:.6g} to {estimate.upper:.6g}); leave it as it "
+                    f"is, or use {DRIVE_FILE} alone, as a drive without intervals."
                 )
 
     def save(self, folder: str | os.PathLike[str]) -> None:

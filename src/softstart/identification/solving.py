@@ -104,21 +104,21 @@ def identify(
     References
     ----------
     D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; D. M. Bates, D. G. Watts, Nonlinear Regression
-    Analysis, 1988; docs/identification.md.
+    Analysis, 1988.
     """
     machine = as_machine(drive)
     drive = reduced_drive(machine)
-    each = [logs] if isinstance(logs, Log) else logs
-    read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in each]
+    given_logs = [logs] if isinstance(logs, Log) else logs
+    read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in given_logs]
     if not read or searches < 1:
         raise InputError("logs, searches: there is none; give a log and a whole number of 1 or more.")
-    asked, moving = _free(free, drive, read)
+    names, moving = _free(free, drive, read)
     for one in read:
         _check_inertia(one, drive)
         _check_step(one, float(drive.encoder_lines))
     base = drive if moving else drive.design_drive
     base = base.replace(**({"start_position": "mid-gap"} if moving else {"initial_speed": 0.0}))
-    unknowns = unknowns_of(asked, drive, read, [moving for _ in read])
+    unknowns = unknowns_of(names, drive, read, [moving for _ in read])
     fitter = Fitter([LogModel.of(one, base) for one in read], unknowns, progress or (lambda _: None))
     minima = fitter.search(searches)
     fitter.progress("weights and fit")
@@ -133,17 +133,17 @@ def identify(
     estimates = _without_intervals(unknowns, best.x) if misfit_warnings else _estimates(fitter, best, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     source = f"identified from {', '.join(one.name for one in read)}"
-    found = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))
+    identified = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *_left_out(machine),
         *(misfit_warnings or _unknown(estimates)),
-        *_other_scale(drive, found),
+        *_other_scale(drive, identified),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
     ]
     return Identification(
-        drive=found,
+        drive=identified,
         guess=drive,
         logs=tuple(read),
         estimates=tuple(estimates),
@@ -161,11 +161,11 @@ def _directed(log: Log, drive: Drive) -> Log:
     turned = log.forward()
     if turned is log or float(drive.active_torque) == 0.0:
         return turned
-    told = (
+    note = (
         "the drive first turns backward, where the active load drives it; if the log counts the other way "
         "than the drive file, turn both round: --columns torque=-NAME,angle=-NAME"
     )
-    return log.changed(notes=(*log.notes, told.replace("angle", log.kind)))
+    return log.changed(notes=(*log.notes, note.replace("angle", log.kind)))
 
 
 def reduced_drive(machine: Any) -> Drive:
@@ -188,8 +188,7 @@ def reduced_drive(machine: Any) -> Drive:
             f"drive = {machine.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
             "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
         )
-    drive: Drive = machine.two_masses
-    return drive
+    return machine.two_masses
 
 
 def _left_out(chain: Any) -> list[str]:
@@ -206,23 +205,23 @@ def _left_out(chain: Any) -> list[str]:
 
 def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[list[str], bool]:
     """The parameters to find, and whether the position of each log is among them."""
-    demand = any(one.torque_is == "demand" for one in logs)
+    demand = any(log.torque_is == "demand" for log in logs)
     names = usual(drive, lag=demand) + ([POSITION] if position_is_unknown(drive) else [])
-    asked = chosen(free, names, (*FREE, POSITION), "logs")
+    chosen_names = chosen(free, names, (*FREE, POSITION), "logs")
     reasons = {}
-    if any(one.kind == "angle" for one in logs):
+    if any(log.kind == "angle" for log in logs):
         reasons[FILTER] = "an angle has no filter of the speed; leave it out."
     if not demand:
         already = "with a measured torque it is in the samples already; leave it out, or log the demand "
         reasons |= dict.fromkeys(("torque_lag", "computing_delay"), already + '(torque_is = "demand").')
     if not float(drive.load_torque):
         reasons["load_torque"] = "the guess is 0; give one that has the right sign."
-    if wrong := [name for name in asked if name in reasons and free is not None]:
+    if wrong := [name for name in chosen_names if name in reasons and free is not None]:
         raise InputError(f"free = {show(wrong[0])}: {reasons[wrong[0]]}")
-    if asked in ([], [POSITION]):
+    if chosen_names in ([], [POSITION]):
         raise InputError("free: there is nothing to find; name parameters, as gap and stiffness.")
     # the filter, which is not the drive's, last
-    return [name for name in FREE if name in asked], POSITION in asked
+    return [name for name in FREE if name in chosen_names], POSITION in chosen_names
 
 
 def _check_inertia(log: Log, drive: Drive) -> None:
@@ -258,46 +257,50 @@ def _check_step(log: Log, lines: float) -> None:
 
 def _untold(fitter: Fitter, best: Point) -> bool:
     """Whether there is a number that the logs do not tell, were all intervals symmetric."""
-    each = zip(fitter.unknowns, best.x.tolist(), fitter.halves(best).tolist(), strict=True)
-    return any(one.kind != "offset" and not one.known(x, half, one.guess) for one, x, half in each)
+    fits = zip(fitter.unknowns, best.x.tolist(), fitter.halves(best).tolist(), strict=True)
+    return any(
+        unknown.kind != "offset" and not unknown.known(x, half, unknown.guess) for unknown, x, half in fits
+    )
 
 
 def _without_intervals(unknowns: Sequence[Unknown], x: Vector) -> list[Estimate]:
     """The best fit, of which no number is called known."""
     return [
-        Estimate(one.title, one.value(number), math.nan, math.nan, False, "no interval is stated")
-        for one, number in zip(unknowns, x.tolist(), strict=True)
-        if one.kind != "offset"
+        Estimate(unknown.title, unknown.value(number), math.nan, math.nan, False, "no interval is stated")
+        for unknown, number in zip(unknowns, x.tolist(), strict=True)
+        if unknown.kind != "offset"
     ]
 
 
 def _correlations(fitter: Fitter, best: Point) -> Matrix:
     """Of the estimates; the further forward a position, the smaller its number in the fit."""
     covariance = fitter.covariance(best)
-    signs = [-1.0 if one.kind == "position" else 1.0 for one in fitter.unknowns]
+    signs = [-1.0 if unknown.kind == "position" else 1.0 for unknown in fitter.unknowns]
     sizes = np.sqrt(np.diag(covariance)) * signs
-    kept = sum(one.kind != "offset" for one in fitter.unknowns)
+    kept = sum(unknown.kind != "offset" for unknown in fitter.unknowns)
     return np.asarray((covariance / np.outer(sizes, sizes))[:kept, :kept])
 
 
 def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
-    found, lost = [], set[str]()
+    estimates, lost = [], set[str]()
     halves, covariance = fitter.halves(best), fitter.covariance(best)
-    for i, (one, x, half) in enumerate(zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)):
-        if one.kind == "offset":
+    for i, (unknown, x, half) in enumerate(
+        zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)
+    ):
+        if unknown.kind == "offset":
             continue
-        fitter.progress(f"interval of {one.title}")
+        fitter.progress(f"interval of {unknown.title}")
         ends = [fitter.end(i, sign, half, best, others) for sign in (-1.0, 1.0)]
-        known = one.known(x, half, one.guess) and one.known(x, 0.5 * (ends[1] - ends[0]))
-        known = known and not (one.kind == "position" and "gap" in lost)  # a share of the gap
-        limited = one.limited(x) or (known and any(map(one.limited, ends)))
+        known = unknown.known(x, half, unknown.guess) and unknown.known(x, 0.5 * (ends[1] - ends[0]))
+        known = known and not (unknown.kind == "position" and "gap" in lost)  # a share of the gap
+        limited = unknown.limited(x) or (known and any(map(unknown.limited, ends)))
         reason = AT_LIMIT if limited else "" if known else _why(i, covariance, fitter.unknowns)
         if reason:
-            lost.add(one.name)
-        lower, upper = sorted(map(one.value, ends))
-        found.append(Estimate(one.title, one.value(x), lower, upper, not reason, reason))
-    return found
+            lost.add(unknown.name)
+        lower, upper = sorted(map(unknown.value, ends))
+        estimates.append(Estimate(unknown.title, unknown.value(x), lower, upper, not reason, reason))
+    return estimates
 
 
 def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
@@ -315,21 +318,21 @@ def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
 def _unknown(estimates: Sequence[Estimate]) -> list[str]:
     """What is unknown, why, and what helps."""
     reasons: dict[str, list[str]] = {}
-    for one in estimates:
-        if not one.known and not one.name.startswith(POSITION):
-            reasons.setdefault(one.reason, []).append(one.name)
+    for estimate in estimates:
+        if not estimate.known and not estimate.name.startswith(POSITION):
+            reasons.setdefault(estimate.reason, []).append(estimate.name)
     if not reasons:
         return []
     remedy = "a log of an experiment that tells it (softstart plan)"
     if AT_LIMIT in reasons:
         remedy = f"begin from another guess of {listed(reasons[AT_LIMIT])} (--set)"
-    told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
-    return [f"Unknown: {told}. Remedy: {remedy}."]
+    groups = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
+    return [f"Unknown: {groups}. Remedy: {remedy}."]
 
 
-def _other_scale(guess: Drive, found: Drive) -> list[str]:
+def _other_scale(guess: Drive, identified: Drive) -> list[str]:
     """A wrong unit of speed or angle is explained by another drive: only the guess can tell."""
-    ratio = float((found.J1 + found.J2) / (guess.J1 + guess.J2))
+    ratio = float((identified.J1 + identified.J2) / (guess.J1 + guess.J2))
     if 1.0 / DOUBTFUL < ratio < DOUBTFUL:
         return []
     return [
@@ -389,8 +392,8 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     logs = []  # of each the shape of each effect in what is left
     for i, (model, spot) in enumerate(zip(fitter.models, best.spots, strict=True)):
         values = model_parameters(fitter.unknowns, best.x, i) | had
-        each = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
-        signals = model.signals(each, spot.error)[:, model.rows] / model.root
+        points = [values, *(values | {name: had[name] + step} for name, step in steps.items())]
+        signals = model.signals(points, spot.error)[:, model.rows] / model.root
         shapes = [(one - signals[0]) / step for one, step in zip(signals[1:], steps.values(), strict=True)]
         shapes.append(model.log.sign * math.sqrt(model.block) * spot.response.sum(axis=1))
         logs.append(np.array(shapes) @ spot.rotation.T / np.sqrt(spot.variance(best.sizes)))
@@ -405,17 +408,17 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         far = name == "offset" and abs(size) > fitter.largest_torque  # of a small effect alone J tells
         if not drives and not far:
             sure.append((abs(size) / deviation, name, size, deviation))
-    _, found, amount, error = max(sure)
-    if not found:
+    _, effect, amount, error = max(sure)
+    if not effect:
         return []
     what, unit, remedy = "an offset of the torque signal", "N m", ""
-    if found != "offset":
-        one = PARAMETERS[found]
+    if effect != "offset":
+        one = PARAMETERS[effect]
         what, unit, remedy = one.meaning, one.unit, f" Remedy: find it too, --free +{one.path}."
-    given = had.get(found, 0.0)
+    value = had.get(effect, 0.0)
     return [
-        f"The logs show {what} of {given + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
-        f"{given:.3g}: gap and load torque may be far off.{remedy}"
+        f"The logs show {what} of {value + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
+        f"{value:.3g}: gap and load torque may be far off.{remedy}"
     ]
 
 

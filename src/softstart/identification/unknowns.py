@@ -134,12 +134,12 @@ def unknowns_of(
     """
     # the unit of a friction takes a tenth of the torque that accelerates, if viscous at the target speed
     torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
-    found = []
+    unknowns = []
     for name in names:
         value, power = float(getattr(drive, name, 0.0)), POWERS.get(name)
         if name in FRICTIONS:
             unit = torque / float(drive.target_speed) if "viscous" in name else torque
-            found.append(Unknown(name, "power", value / unit, 0.0, MOST_FRICTION, unit))
+            unknowns.append(Unknown(name, "power", value / unit, 0.0, MOST_FRICTION, unit))
             continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
             value = 0.04 * math.sqrt(float(drive.c * drive.J1 * drive.J2 / (drive.J1 + drive.J2)))
@@ -147,26 +147,28 @@ def unknowns_of(
         reach = 100.0 if name in LESS_KNOWN else 3.0 * FACTOR
         if power is None:
             middle, end, sign = math.log(abs(value)), math.log(reach), math.copysign(1.0, value)
-            found.append(Unknown(name, "logarithm", middle, middle - end, middle + end, sign))
+            unknowns.append(Unknown(name, "logarithm", middle, middle - end, middle + end, sign))
         else:
             room = MOST_LOAD * float(drive.Ms) - float(drive.load_friction)  # which is kept as it is
             most = max(room / abs(value), 1.0) if name == "load_torque" else reach
-            found.append(Unknown(name, "power", 1.0, reach**-power, min(reach, most) ** power, value, power))
+            unknowns.append(
+                Unknown(name, "power", 1.0, reach**-power, min(reach, most) ** power, value, power)
+            )
     half = math.sqrt(0.5)
-    found += [Unknown(POSITION, "position", half, 0.0, 1.0, log=i) for i, one in enumerate(moving) if one]
+    unknowns += [Unknown(POSITION, "position", half, 0.0, 1.0, log=i) for i, one in enumerate(moving) if one]
     for i, log in enumerate(logs):
         if log.kind == "angle":
             room = max(20.0 * log.count, 100.0 * log.scale)
-            found.append(Unknown("offset", "offset", 0.0, -room, room, log=i))
-    return tuple(found)
+            unknowns.append(Unknown("offset", "offset", 0.0, -room, room, log=i))
+    return tuple(unknowns)
 
 
 def model_parameters(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, float]:
     """The parameters of the model of one log at x."""
     return {
-        one.name: one.value(number)
-        for one, number in zip(unknowns, x.tolist(), strict=True)
-        if one.kind != "offset" and one.log in (None, log)
+        unknown.name: unknown.value(number)
+        for unknown, number in zip(unknowns, x.tolist(), strict=True)
+        if unknown.kind != "offset" and unknown.log in (None, log)
     }
 
 
@@ -183,7 +185,7 @@ def usual(drive: Drive, *, lag: bool) -> list[str]:
     """
     others = ["load_torque", *(["torque_lag"] if lag else []), *FRICTIONS]
     needed = {"gap", *others}
-    return [one for one in (*USUAL, *others) if one not in needed or float(getattr(drive, one))]
+    return [name for name in (*USUAL, *others) if name not in needed or float(getattr(drive, name))]
 
 
 def chosen(
@@ -202,13 +204,13 @@ def chosen(
     """
     if free is None:
         return list(usual)
-    asked, paths = list(free), {one.path: name for name, one in PARAMETERS.items()}
-    found = list(usual) if any(name.startswith("+") for name in asked) else []
-    for given in asked:
-        name = paths.get(given.removeprefix("+"), given.removeprefix("+"))
+    texts, paths = list(free), {parameter.path: name for name, parameter in PARAMETERS.items()}
+    names = list(usual) if any(name.startswith("+") for name in texts) else []
+    for text in texts:
+        name = paths.get(text.removeprefix("+"), text.removeprefix("+"))
         if name not in possible:
             near = nearest(name, possible)
             hint = f"did you mean {near}?" if near else f"those are {', '.join(possible)}."
-            raise InputError(f"{key} = {show(given)}: it is no parameter that {where} can tell; {hint}")
-        found.append(name)
-    return list(dict.fromkeys(found))
+            raise InputError(f"{key} = {show(text)}: it is no parameter that {where} can tell; {hint}")
+        names.append(name)
+    return list(dict.fromkeys(names))

@@ -104,7 +104,7 @@ class Wear(Result, view="identification.wear_sheet"):
     @property
     def gaps(self) -> tuple[Estimate, ...]:
         """The gap of each identification."""
-        return tuple(one["gap"] for one in self.found)
+        return tuple(identification["gap"] for identification in self.found)
 
     @property
     def worn(self) -> tuple[date | None, date | None, date | None] | None:
@@ -173,8 +173,7 @@ def follow_wear(
 
     References
     ----------
-    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
-    docs/identification.md.
+    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185.
     """
     if isinstance(found, Identification | str | os.PathLike) or len(found) < 2:
         raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
@@ -209,16 +208,16 @@ def follow_wear(
     return Wear(each, names, days, line, worn, tuple(_notes(each, line)))
 
 
-def _deviation(one: Estimate) -> float:
+def _deviation(gap: Estimate) -> float:
     """The standard deviation of an estimate."""
-    return 0.5 * (one.upper - one.lower) / INTERVAL.quantile
+    return 0.5 * (gap.upper - gap.lower) / INTERVAL.quantile
 
 
-def _date_of(given: str | date) -> date:
+def _date_of(text: str | date) -> date:
     try:
-        return given if isinstance(given, date) else date.fromisoformat(given)
+        return text if isinstance(text, date) else date.fromisoformat(text)
     except ValueError:
-        raise InputError(f"dates: {show(given)} is no date; write one as 2026-05-31.") from None
+        raise InputError(f"dates: {show(text)} is no date; write one as 2026-05-31.") from None
 
 
 def _date_after(first: date, years: float) -> date | None:
@@ -229,7 +228,7 @@ def _date_after(first: date, years: float) -> date | None:
     return date.fromordinal(round(day)) if 1.0 <= day <= date.max.toordinal() else None
 
 
-def _notes(each: Sequence[Identification], line: Line) -> list[str]:
+def _notes(identifications: Sequence[Identification], line: Line) -> list[str]:
     """What else has changed, and what the line cannot tell."""
     notes = []
     if line.chance < CROOKED:
@@ -237,7 +236,10 @@ def _notes(each: Sequence[Identification], line: Line) -> list[str]:
             f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
             "runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the intervals."
         )
-    first, last = ({one.name: one for one in found.shared if one.known} for found in (each[0], each[-1]))
+    first, last = (
+        {estimate.name: estimate for estimate in identification.shared if estimate.known}
+        for identification in (identifications[0], identifications[-1])
+    )
     for name in (name for name in first if name in last and name != "gap"):
         both = first[name], last[name]
         if abs(both[1].value - both[0].value) > NOT_BY_CHANCE * math.hypot(*map(_deviation, both)):

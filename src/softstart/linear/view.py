@@ -73,7 +73,6 @@ class LinearView(Result, view="linear.linear_sheet"):
 
     References
     ----------
-    docs/linear-view.md.
     M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
     1633-1649, doi:10.1016/S0005-1098(02)00047-X.
     """
@@ -210,10 +209,6 @@ def linear_view(
         If the input is wrong (an unknown controller).
     SimulationError
         If the start cannot be simulated.
-
-    References
-    ----------
-    docs/linear-view.md.
 
     Examples
     --------

@@ -170,10 +170,6 @@ class Front(Result, view="optima.front_sheet"):
     >>> front = pareto(crane, [0.2883042], terminal="synchronous", controllers=[])
     >>> [round(point.k_dyn, 4) for point in front.points], front.shortest_start_time
     ([0.9092], nan)
-
-    References
-    ----------
-    docs/optimal-starts.md; the optimum at each start time: docs/theory/optimum.md.
     """
 
     drive: Machine
@@ -295,10 +291,6 @@ def pareto(
     >>> front = pareto(crane, [0.2883042, 0.33], terminal="synchronous", controllers=[])
     >>> [round(point.k_dyn, 4) for point in front.points]
     [0.9092, 0.8081]
-
-    References
-    ----------
-    docs/optimal-starts.md; each point: `optimize`.
     """
     options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
     options["base"] = base = Problem(drive, 1.0, terminal, **options).base

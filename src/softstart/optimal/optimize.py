@@ -142,10 +142,9 @@ def optimize(
 
     References
     ----------
-    Why it is optimal, the descent and the bounds: docs/theory/optimum.md.
-    HiGHS: Huangfu and Hall, Math. Prog. Comp. 10 (2018), doi 10.1007/s12532-017-0130-5.
-    IPOPT: Waechter and Biegler, Math. Prog. 106 (2006), doi 10.1007/s10107-004-0559-y.
-    CasADi: Andersson et al., Math. Prog. Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
+    HiGHS: Huangfu and Hall, Math. Prog. Comp. 10 (2018), doi 10.1007/s12532-017-0130-5. IPOPT: Waechter and
+    Biegler, Math. Prog. 106 (2006), doi 10.1007/s10107-004-0559-y. CasADi: Andersson et al., Math. Prog.
+    Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
     """
     machine = as_machine(drive)
     usual = start_time is None and minimise != "start_time" and not limits
@@ -731,10 +730,6 @@ def scenarios_of(
     [0.5, 0.3, 1.0]
     >>> len(scenarios_of(nominal, gaps=[0.3, 1.0], inertias=[0.07, 0.175]))
     5
-
-    References
-    ----------
-    docs/optimal-starts.md.
     """
     drive = as_machine(drive)
     given = {"gap": gaps, "load_inertia": inertias, "load_torque": load_torques}

@@ -146,10 +146,6 @@ class Problem:
     >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
     >>> problem.terminal, problem.highest_torque, round(problem.base_torque, 2)
     ('synchronous', 62.0, 52.86)
-
-    References
-    ----------
-    The mathematics: docs/theory/optimum.md.
     """
 
     drive: Any

@@ -148,10 +148,6 @@ class Optimum(Result, view="optima.optimum_sheet"):
     >>> best = optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
     >>> round(best.k_dyn, 4), round(best.heat, 4), best.run.contacts
     (0.9092, 0.2153, 1)
-
-    References
-    ----------
-    The methods, their proofs and the lower bounds: docs/theory/optimum.md.
     """
 
     problem: Problem

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 from softstart.chain.elements import LIBRARY
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
-from softstart.controller.finding import controller_names, ready_controller_names
+from softstart.controller.finding import ready_controller_names
 from softstart.controller.parameters import declared_parameters
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
 from softstart.drive.machine import Machine
 from softstart.page.sentences import changes
+from softstart.plugins import controller_names
 from softstart.quantities import shortest
 
 if TYPE_CHECKING:

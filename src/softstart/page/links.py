@@ -17,10 +17,11 @@ from dataclasses import fields
 from typing import Any
 
 from softstart.controller.base import Controller
-from softstart.controller.finding import controller_names, make_controller
+from softstart.controller.finding import make_controller
 from softstart.errors import InputError, Mistakes
 from softstart.page.machines import machine_from, startable
 from softstart.page.session import SOFT, Inputs, Reference, Session
+from softstart.plugins import controller_names
 
 MAX_STORED = 64  # inputs of tabs that may be reloaded
 LONGEST = 16_384  # characters of a link

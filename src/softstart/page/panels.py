@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.controller.finding import controller_class, controller_names
+from softstart.controller.finding import controller_class
 from softstart.controller.parameters import declared_parameters
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
@@ -14,6 +14,7 @@ from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, text_field, upload
 from softstart.page.sentences import clipped
+from softstart.plugins import controller_names
 from softstart.quantities import values_in
 from softstart.tuning.question import gaps_of, inertias_of
 from softstart.views.numbers import units_of

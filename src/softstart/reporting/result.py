@@ -105,7 +105,7 @@ class Report(Result):
 
     References
     ----------
-    docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
+    K_dyn: [G] (16).
     """
 
     drive: Any
@@ -309,7 +309,7 @@ def report(
 
     References
     ----------
-    docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
+    K_dyn: [G] (16).
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
     known, drawn, soft = as_far_as_known(drive)

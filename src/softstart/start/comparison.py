@@ -117,7 +117,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
 
     References
     ----------
-    K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
+    K_dyn: [G] (16).
     """
 
     drive: Any
@@ -216,7 +216,7 @@ def compare(
 
     References
     ----------
-    K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
+    K_dyn: [G] (16).
     """
     known, drawn, soft = as_far_as_known(drive)
     drive = as_machine(known)

@@ -160,7 +160,7 @@ class Fatigue(Result, view="fatigue.fatigue_sheet"):
 
     References
     ----------
-    Rainflow counting: ASTM E1049; docs/fatigue.md.
+    Rainflow counting: ASTM E1049.
     """
 
     drive: Any
@@ -260,7 +260,7 @@ def fatigue(
     References
     ----------
     ASTM E1049, rainflow counting; ISO 6336-2, life factors; H. R. Simmons, A. J. Smalley on damping of geared
-    trains, J. Eng. Gas Turbines Power 106 (1984) 946; docs/fatigue.md.
+    trains, J. Eng. Gas Turbines Power 106 (1984) 946.
     """
     asked = _runs(runs)
     machine, estimate = asked[0].drive, _read_estimate(estimate_damping)

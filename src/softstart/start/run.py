@@ -155,8 +155,7 @@ class Run(Result, view="starts.run_sheet"):
 
     References
     ----------
-    [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); docs/theory/stages.md.
-    Everything at one shaft: [R], docs/theory/reduction.md; accuracy: docs/theory/numerics.md.
+    [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); everything at one shaft: [R].
     """
 
     drive: Any

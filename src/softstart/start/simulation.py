@@ -128,8 +128,7 @@ def simulate(
 
     References
     ----------
-    K_dyn: [G] (16), docs/theory/stages.md; everything at one shaft: [R], docs/theory/reduction.md; why no
-    event is missed, and accuracy: docs/theory/numerics.md.
+    K_dyn: [G] (16); everything at one shaft: [R].
     """
     if isinstance(drive, str | os.PathLike):
         drive = load_machine(drive)

@@ -23,10 +23,6 @@ class Status(Enum):
     'The load reached its target speed.'
     >>> [status.name for status in Status if status.finished]
     ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'NOT_RELEASED']
-
-    References
-    ----------
-    How events are located, and accuracy: docs/theory/numerics.md.
     """
 
     REACHED = "The load reached its target speed."

@@ -51,20 +51,22 @@ def compute(task: Task) -> Block:
     gaps = np.full(task.starts, question.drive.gap_and_inertia[0])
     machines = varied(question.drive, {"gap": gaps, **drive})
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
-    found = prepared(machines).figures(
+    results = prepared(machines).figures(
         question.recipe.make(parameters, name).set_ups(fitted_to or machines),
         machines.mean_torque,
         until=question.until,
     )
-    figures = {name: np.ascontiguousarray(found[name][0], dtype=np.float64) for name in question.figures}
-    return figures | {"status": np.array([CODES[one] for one in found["status"][0]], dtype=np.int8)}
+    figures = {name: np.ascontiguousarray(results[name][0], dtype=np.float64) for name in question.figures}
+    return figures | {"status": np.array([CODES[one] for one in results["status"][0]], dtype=np.int8)}
 
 
 def _sorted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any], str]:
     """Values of the machine, parameters of the controller, and its name if that is from an axis."""
-    own = {name.removeprefix(f"{PREFIX}_"): one for name, one in values.items() if name.startswith(PREFIX)}
-    name = own.pop(PREFIX, "")
-    return {name: one for name, one in values.items() if not name.startswith(PREFIX)}, own, name
+    controller = {
+        name.removeprefix(f"{PREFIX}_"): one for name, one in values.items() if name.startswith(PREFIX)
+    }
+    name = controller.pop(PREFIX, "")
+    return {name: one for name, one in values.items() if not name.startswith(PREFIX)}, controller, name
 
 
 def check_corners(question: SweepSettings, grid: Grid) -> None:

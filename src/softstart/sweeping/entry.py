@@ -28,7 +28,7 @@ from softstart.start.engine import check_limits
 from softstart.start.results import has_margin
 from softstart.sweeping.compute import SweepSettings, Task, check_corners, compute, first_start
 from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths, grid_values, read_grid
-from softstart.sweeping.store import STATUS, Store
+from softstart.sweeping.store import STATUS, FolderStore, MemoryStore
 
 if TYPE_CHECKING:
     import xarray
@@ -115,10 +115,6 @@ def sweep(
     >>> found = sweep(Drive.load("crane-4amtkf"), "direct", {"gap": [0.5, 2], "load.inertia": [0.07, 0.175]})
     >>> found.k_dyn.sel(gap=2, load_inertia=0.175).item().__round__(4)
     4.8654
-
-    References
-    ----------
-    docs/sweeps.md; each start: see `simulate`.
     """
     drive, recipe, axes, kept, wrong = as_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
     if fitted_to is not None and not isinstance(fitted_to, Machine):
@@ -144,7 +140,8 @@ def sweep(
     plan = ChunkGrid.of(shape, texts, chunk)
     threads = first_start(question, axes)
     count = sharing(recipe.given, "the controller", workers, scheduler, threads)
-    with Store(None if to is None else Path(to), plan, axes, question) as store:
+    chunks = MemoryStore(plan, axes, question) if to is None else FolderStore(Path(to), plan, axes, question)
+    with chunks as store:
         begin, before = time.monotonic(), sum(map(plan.size, store.finished))
         done = before
 

@@ -35,16 +35,16 @@ PREFIX = "controller"
 
 def axis_lengths(grid: Grid) -> dict[str, int]:
     """The axes in order, with their lengths."""
-    return {str(one.dims[0]): one.size for one in grid.values()}
+    return {str(axis.dims[0]): axis.size for axis in grid.values()}
 
 
 def grid_values(grid: Grid) -> dict[str, Any]:
     """Each coordinate with its value for every start of a grid; the one text of a coordinate of texts."""
     sizes = axis_lengths(grid)
-    spread = {name: one.set_dims(sizes) for name, one in grid.items()}  # type: ignore[no-untyped-call]
+    spread = {name: axis.set_dims(sizes) for name, axis in grid.items()}  # type: ignore[no-untyped-call]
     return {
-        name: one.values.ravel() if one.dtype.kind == "f" else str(one.values.flat[0])
-        for name, one in spread.items()
+        name: axis.values.ravel() if axis.dtype.kind == "f" else str(axis.values.flat[0])
+        for name, axis in spread.items()
     }
 
 
@@ -70,9 +70,9 @@ class Subject:
         wrong, tables = Mistakes(), list[Mapping[str, ControllerParameter]]()
         for name in self.controllers or ("",):
             with wrong.collect():
-                found = self.recipe.class_of(name) if name or self.recipe.given else Tuned
+                cls = self.recipe.class_of(name) if name or self.recipe.given else Tuned
                 # the fields of tuned gains are what stands in their file
-                tables.append({} if issubclass(found, Tuned) else declared_parameters(found))
+                tables.append({} if issubclass(cls, Tuned) else declared_parameters(cls))
         wrong.raise_if_any()
         return {
             name: one
@@ -87,12 +87,18 @@ class Subject:
         """The coordinate that a key of the grid names; InputError for an unknown one."""
         if key == PREFIX or key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
             return key.replace(".", "_", 1)
-        if (found := self.machine.parameter_value(key)) is not None:
-            return found.name
-        own = {name: f"{PREFIX}.{name}" for name in self.parameters}
-        words = {word: word for word in (*self.machine.parameter_keys(), PREFIX, *own.values())} | own
+        if (parameter := self.machine.parameter_value(key)) is not None:
+            return parameter.name
+        of_controller = {name: f"{PREFIX}.{name}" for name in self.parameters}
+        words = {
+            word: word for word in (*self.machine.parameter_keys(), PREFIX, *of_controller.values())
+        } | of_controller
         like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
-        meant = [own[key]] if key in own else [p.name for p in like if self.machine.parameter_value(p.name)]
+        meant = (
+            [of_controller[key]]
+            if key in of_controller
+            else [p.name for p in like if self.machine.parameter_value(p.name)]
+        )
         if not meant and (close := nearest(key, words)):
             meant = [words[close]]
         other = f"take a parameter of the {self.machine.KIND} or {PREFIX}.NAME."
@@ -117,11 +123,11 @@ class Subject:
             read, unit, meaning = self._of_controller(key, name.removeprefix(f"{PREFIX}_"), values)
         else:
             read, unit, meaning = self._of_machine(key, name, values)
-        found = np.array(read)
-        if found.ndim != 1:
-            raise InputError(f"{key}: its values have shape {found.shape}; give them in one row.")
-        about = {} if found.dtype.kind == "U" else {"units": unit}
-        return DataArray(found, dims=name, name=name, attrs=about | {"long_name": meaning})
+        array = np.array(read)
+        if array.ndim != 1:
+            raise InputError(f"{key}: its values have shape {array.shape}; give them in one row.")
+        about = {} if array.dtype.kind == "U" else {"units": unit}
+        return DataArray(array, dims=name, name=name, attrs=about | {"long_name": meaning})
 
     def _of_controller(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
         if name not in self.parameters:
@@ -140,25 +146,29 @@ class Subject:
         return read, declared.unit, declared.meaning or name
 
     def _of_machine(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
-        found = self.machine.parameter_value(name)
-        assert found is not None
-        parameter: Parameter = found.parameter
+        current = self.machine.parameter_value(name)
+        assert current is not None
+        parameter: Parameter = current.parameter
         if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
             raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
-        given: Any = values
+        typed: Any = values
         try:
             if not parameter.unit or any(isinstance(one, str) and one in parameter.choices for one in values):
                 texts = _texts(key, values)
-                for given in texts:
-                    read_value(parameter, given)
+                for typed in texts:
+                    read_value(parameter, typed)
                 return texts, "", parameter.meaning
-            own = {"x": found.value} if isinstance(found.value, float) and not parameter.many else {}
+            multiples = (
+                {"x": current.value} if isinstance(current.value, float) and not parameter.many else {}
+            )
             alike(values)
-            given = [multiplied(value, key, own) for value in values]
-            there = [at_motor(parameter, one, self.machine.gear_with(**{found.name: one})) for one in given]
-            read = np.float64(read_value(parameter, there, batch=True))
+            typed = [multiplied(value, key, multiples) for value in values]
+            at_shaft = [
+                at_motor(parameter, one, self.machine.gear_with(**{current.name: one})) for one in typed
+            ]
+            read = np.float64(read_value(parameter, at_shaft, batch=True))
         except RefusedError as reason:
-            raise InputError(Wording(written={name: key}).refused(parameter, given, reason)) from None
+            raise InputError(Wording(written={name: key}).refused(parameter, typed, reason)) from None
         return read, parameter.unit, parameter.meaning
 
 
@@ -175,7 +185,7 @@ def _texts(key: str, values: Any) -> tuple[str, ...]:
     return listed
 
 
-def read_grid(given: object, recipe: Recipe, machine: Machine) -> Grid:
+def read_grid(axes: object, recipe: Recipe, machine: Machine) -> Grid:
     """The coordinates in the order of the grid, or one InputError for all that is wrong with them.
 
     >>> from softstart import Drive
@@ -186,23 +196,23 @@ def read_grid(given: object, recipe: Recipe, machine: Machine) -> Grid:
     """
     from xarray import DataArray, Variable
 
-    if not isinstance(given, Mapping) or not given:
+    if not isinstance(axes, Mapping) or not axes:
         raise InputError(
-            f'grid = {show(given)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
+            f'grid = {show(axes)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
         )
-    if (PREFIX in given) == bool(recipe.given):
+    if (PREFIX in axes) == bool(recipe.given):
         raise InputError("controller: name one, or make several an axis of the grid; one of the two.")
-    if PREFIX in given and recipe.values:
+    if PREFIX in axes and recipe.values:
         raise InputError(
             f"parameters = {show(dict(recipe.values))}: with several controllers give each parameter as "
             "an axis, of one value if need be."
         )
-    names = given.get(PREFIX, ())
+    names = axes.get(PREFIX, ())
     listed = () if isinstance(names, str) or not isinstance(names, Sequence) else names
     subject = Subject(machine, recipe, tuple(name for name in listed if isinstance(name, str)))
     _ = subject.parameters  # wrong controllers are told first
     wrong, grid = Mistakes(), Grid()
-    for key, values in given.items():
+    for key, values in axes.items():
         paired, read = isinstance(values, Mapping), list[DataArray]()
         for name, own in values.items() if paired else [(key, values)]:
             with wrong.collect():
@@ -217,11 +227,11 @@ def read_grid(given: object, recipe: Recipe, machine: Machine) -> Grid:
 
 def _repeated(read: list[DataArray]) -> Iterator[str]:
     """An axis names each place once, so that results can be looked up by value."""
-    for one in read:
-        found, counts = np.unique(one.values, return_counts=True)
+    for axis in read:
+        distinct, counts = np.unique(axis.values, return_counts=True)
         if counts.max() > 1:
-            twice = show(found[counts.argmax()].item())
-            yield f"{one.name} = {twice}: this value is given twice; give each once."
+            twice = show(distinct[counts.argmax()].item())
+            yield f"{axis.name} = {twice}: this value is given twice; give each once."
 
 
 def _wrong_samples(name: str, columns: list[DataArray], count: int) -> Iterator[str]:
@@ -288,8 +298,8 @@ class ChunkGrid:
 
     def place(self, index: Sequence[int]) -> tuple[slice, ...]:
         """The part of the grid that is a chunk's."""
-        each = zip(index, self.chunk, self.shape, strict=True)
-        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in each)
+        axes = zip(index, self.chunk, self.shape, strict=True)
+        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in axes)
 
     def size(self, index: Sequence[int]) -> int:
         """How many starts a chunk has."""

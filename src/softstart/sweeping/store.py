@@ -27,7 +27,7 @@ from softstart.errors import InputError
 from softstart.start.batch import figure_columns
 from softstart.start.status import Status
 from softstart.stopping import at_stop
-from softstart.store import PartStore, Target, fresh_folder, warn_of_damage
+from softstart.store import PartStore, Target, fresh_folder
 from softstart.sweeping.compute import Block, SweepSettings
 from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths
 
@@ -70,7 +70,7 @@ def empty_results(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> xarra
 
 def inputs_of(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
-    found: dict[str, Any] = {
+    inputs: dict[str, Any] = {
         "drive": question.drive.to_toml(),
         "controller": question.recipe.about(),
         "order of the axes": list(axis_lengths(grid)),
@@ -80,49 +80,69 @@ def inputs_of(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> dict[str,
         "softstart": __version__,
         "chunk": math.prod(plan.chunk),
     }
-    for name, one in grid.items():
-        found[f"axis {name}"] = (
-            [about_name(text) for text in one.values.tolist()]
-            if one.dtype.kind == "U"
-            else [one.size, hashlib.sha256(one.values.tobytes()).hexdigest()]
+    for name, axis in grid.items():
+        inputs[f"axis {name}"] = (
+            [about_name(text) for text in axis.values.tolist()]
+            if axis.dtype.kind == "U"
+            else [axis.size, hashlib.sha256(axis.values.tobytes()).hexdigest()]
         )
-    return found
+    return inputs
 
 
-class Store:
-    """The figures of a sweep, in memory or in a folder, new or with the same inputs. Use it in a `with`.
+class MemoryStore:
+    """The figures of a sweep in memory. Use it in a `with`; `finished` holds the chunks that are finished."""
 
-    `finished` holds the chunks that are finished and as they were written.
-    """
-
-    def __init__(self, path: Path | None, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
-        self.path, self.plan, self.finished = path, plan, set[tuple[int, ...]]()
+    def __init__(self, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
+        self.plan, self.finished = plan, set[tuple[int, ...]]()
         self._empty = empty_results(plan, grid, question)
-        self._target = None if path is None else Target("to", path, "sweep", LIST)
-        self._list = PartStore(self._target, inputs_of(plan, grid, question), ["part"])
         self._arrays: dict[str, Any] = {}
-        self._exit = ExitStack()
 
     def __enter__(self) -> Self:
-        if self._target is None and self.plan.starts > MOST_IN_MEMORY:
+        if self.plan.starts > MOST_IN_MEMORY:
             raise InputError(
                 f"grid: {self.plan.starts:,} starts are too many to keep in memory ({MOST_IN_MEMORY:,} at "
                 "most); give to=FOLDER (--out DIR), where a sweep may have any size."
             )
+        self._arrays = {str(name): np.array(values) for name, values in self._empty.data_vars.items()}
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def keep(self, index: Sequence[int], block: Block) -> None:
+        """Take in a finished chunk."""
+        place = self.plan.place(index)
+        for name, values in block.items():
+            self._arrays[name][place] = values.reshape([part.stop - part.start for part in place])
+
+    def results(self) -> xarray.Dataset:
+        """The results; those not yet computed are NaN."""
+        return self._empty.assign({n: self._empty[n].copy(data=v) for n, v in self._arrays.items()})
+
+
+class FolderStore(MemoryStore):
+    """The figures of a sweep in a folder, new or with the same inputs.
+
+    `finished` holds the chunks that are finished and as they were written.
+    """
+
+    def __init__(self, path: Path, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
+        super().__init__(plan, grid, question)
+        self.path, self._target = path, Target("to", path, "sweep", LIST)
+        self._list = PartStore(self._target, inputs_of(plan, grid, question), ["part"])
+        self._exit = ExitStack()
+
+    def __enter__(self) -> Self:
         with ExitStack() as stack:
-            if self.path is not None and self._target is not None:
-                others = (one for one in self.path.rglob("*") if not one.is_dir())
-                if not (self.path / LIST).exists() and any(others):
-                    raise self._target.foreign()
+            files = (path for path in self.path.rglob("*") if not path.is_dir())
+            if not (self.path / LIST).exists() and any(files):
+                raise self._target.foreign()
             stack.enter_context(self._list)
-            if self._target is None:
-                self._arrays = {str(name): np.array(one) for name, one in self._empty.data_vars.items()}
-            else:
-                stack.callback(self._clear)
-                stack.callback(self._sweep_up)
-                stack.enter_context(at_stop(self._sweep_up))
-                with self._target.errors():
-                    self._open(self._target.path)
+            stack.callback(self._clear)
+            stack.callback(self._sweep_up)
+            stack.enter_context(at_stop(self._sweep_up))
+            with self._target.errors():
+                self._open(self.path)
             self._exit = stack.pop_all()
         return self
 
@@ -131,7 +151,7 @@ class Store:
 
     def _clear(self) -> None:
         """If no chunk is finished: as if it had not begun. A stopped process leaves all to the next one."""
-        if self.path is not None and not self._list.parts():
+        if not self._list.parts():
             (self.path / "zarr.json").unlink(missing_ok=True)
             for folder in (self.path / str(name) for name in self._empty.variables):
                 shutil.rmtree(folder / "c", ignore_errors=True)
@@ -142,8 +162,6 @@ class Store:
 
     def _check_place(self, name: Path) -> None:
         """Raise InputError if a file of the sweep is a folder that is not empty."""
-        assert self.path is not None
-        assert self._target is not None
         place = self.path / name
         if place.is_dir() and not place.is_symlink() and any(place.iterdir()):
             reason = "is a folder, where a file of the sweep is to go; move it away"
@@ -151,7 +169,6 @@ class Store:
 
     def _make_way(self, name: Path) -> None:
         """Remove what stands where a file of the sweep is to go and is none, as a link or an empty folder."""
-        assert self.path is not None
         self._check_place(name)
         for parent in (self.path / one for one in [*name.parents][-2::-1]):  # not the folder itself
             if not parent.is_dir():
@@ -163,28 +180,21 @@ class Store:
             place.unlink(missing_ok=True)
 
     def keep(self, index: Sequence[int], block: Block) -> None:
-        """Take in a finished chunk and list it."""
-        place = self.plan.place(index)
-        with ExitStack() as stack:
-            if self._target is not None:
-                stack.enter_context(self._target.errors())
-            for name, values in block.items():
-                if self.path is not None:  # Zarr reads a chunk at the edge before it writes it
-                    self._make_way(_file(name, index))
-                self._arrays[name][place] = values.reshape([part.stop - part.start for part in place])
+        """Write a finished chunk and list it."""
+        with self._target.errors():
+            for name in block:  # Zarr reads a chunk at the edge before it writes it
+                self._make_way(_file(name, index))
+            super().keep(index, block)
         self._list.add({"part": list(index), "checksums": {name: zlib.crc32(v) for name, v in block.items()}})
 
     def results(self) -> xarray.Dataset:
-        """The results; those in a folder are read when they are looked at, not yet computed ones are NaN."""
+        """The results; each is read from the folder when it is used."""
         import xarray
 
-        if self.path is None:
-            return self._empty.assign({n: self._empty[n].copy(data=v) for n, v in self._arrays.items()})
-        found: xarray.Dataset = xarray.open_zarr(self.path, chunks=None)[list(self._arrays)]
-        return found
+        return xarray.open_zarr(self.path, chunks=None)[list(self._arrays)]
 
     def _open(self, folder: Path) -> None:
-        """The arrays to write to, and what is finished; what is damaged is named, and made again."""
+        """The arrays to write to, and what is finished; what is damaged is reported, and recomputed."""
         import zarr
 
         self._sweep_up()
@@ -210,11 +220,11 @@ class Store:
             else:
                 self.finished.add(index)
         if self._list.parts():
-            warn_of_damage(folder, [name.as_posix() for name in damaged])
+            self._list.damaged += [name.as_posix() for name in damaged]
+        self._target.warn_of_damage(self._list.damaged)
 
     def _changed(self, index: tuple[int, ...], checksums: dict[str, int]) -> Path | None:
         """A file of a finished chunk that does not hold what was written."""
-        assert self.path is not None
         for name, checksum in checksums.items():
             file = _file(name, index)
             try:
@@ -227,7 +237,6 @@ class Store:
 
     def _sweep_up(self) -> None:
         """Remove what a process that was killed left beside the place it was writing to."""
-        assert self.path is not None
         for file in self.path.rglob("*.partial"):
             file.unlink(missing_ok=True)
 
@@ -250,23 +259,23 @@ def _describe(folder: Path, empty: xarray.Dataset, plan: ChunkGrid) -> None:
     if samples := [str(name) for name in empty.coords if name not in empty.dims]:
         attributes["coordinates"] = " ".join(samples)  # how xarray tells coordinates from data
     group = zarr.create_group(folder, attributes=attributes)
-    for name, one in empty.variables.items():
+    for name, variable in empty.variables.items():
         figure = name in empty.data_vars
-        text = one.dtype.kind == "U"
+        text = variable.dtype.kind == "U"
         array = group.create_array(
             str(name),
-            shape=one.shape,
-            chunks=plan.chunk if figure else one.shape,
-            dtype=str if text else one.dtype,
-            fill_value=one.values.flat[0] if figure else "" if text else 0,
-            dimension_names=[str(dim) for dim in one.dims],
-            attributes=one.attrs,
+            shape=variable.shape,
+            chunks=plan.chunk if figure else variable.shape,
+            dtype=str if text else variable.dtype,
+            fill_value=variable.values.flat[0] if figure else "" if text else 0,
+            dimension_names=[str(dim) for dim in variable.dims],
+            attributes=variable.attrs,
             # whoever else reads the folder notices damage too
             compressors=(codecs.ZstdCodec(), codecs.Crc32cCodec()),
             config={"write_empty_chunks": True},
         )
         if not figure:
-            array[...] = one.values.astype(object) if text else one.values
+            array[...] = variable.values.astype(object) if text else variable.values
     with warnings.catch_warnings():
         # All metadata in one file is a convention that Zarr 3 has not adopted; xarray asks for it.
         warnings.filterwarnings("ignore", "Consolidated metadata", errors.ZarrUserWarning)

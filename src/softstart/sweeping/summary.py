@@ -105,8 +105,8 @@ def spread(parts: Iterable[Any], thin: int = 1) -> dict[str, float]:
             kept.append(good if thin == 1 else np.sort(good)[min(thin // 2, good.size - 1) :: thin])
     if not count:
         return {"count": 0} | dict.fromkeys(("min", *SHARES, "mean", "max"), math.nan)
-    found = np.quantile(np.concatenate(kept), list(SHARES.values()), method="inverted_cdf").tolist()
-    quantiles = dict(zip(SHARES, found, strict=True))
+    values = np.quantile(np.concatenate(kept), list(SHARES.values()), method="inverted_cdf").tolist()
+    quantiles = dict(zip(SHARES, values, strict=True))
     return {"count": count, "min": least, **quantiles, "mean": math.fsum(total) / count, "max": most}
 
 

@@ -104,10 +104,6 @@ class Tuning(Result, view="tuning.tuning_sheet"):
     >>> tuned = tune("crane-4amtkf", "reduced-first-stage", ["1x"], ["1x"], **options)
     >>> tuned.controller, tuned.metric, dict(tuned.schedule.sizes)
     ('reduced-first-stage', 'k_dyn', {'gap': 1, 'load_inertia': 1})
-
-    References
-    ----------
-    docs/tuning.md; the search: see `tune`.
     """
 
     question: TuningProblem

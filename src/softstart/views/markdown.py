@@ -134,7 +134,7 @@ def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
     except InputError as error:
         raise InputError(
             [
-                s.replace("save_to = ", "--out: ", 1).replace("name another file", "give another folder")
+                s.replace("save_to = ", "--out: ", 1).replace("choose another file", "choose another folder")
                 if s.startswith("save_to = ")
                 else s
                 for s in error.sentences

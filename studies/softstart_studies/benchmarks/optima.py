@@ -323,4 +323,4 @@ def figure(outcomes: Sequence[Outcome]) -> Figure:
             axes.margins(x=0.25, y=0.12)
             head(axes, f"start within {start_time:g} s", "", "processor time, s")
         grid[0][0].set_ylabel(f"{K_DYN} re-simulated (hollow: a condition is not kept)")
-    return drawn  # type: ignore[no-any-return]
+    return drawn

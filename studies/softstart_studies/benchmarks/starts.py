@@ -333,4 +333,4 @@ def ratio_figure(outcomes: Sequence[Outcome]) -> Figure:
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("starts/s of softstart : starts/s of the peer     (black tick: wanted)")
         axes.set_title("Same starts, same end, in one run", loc="left")
-    return figure  # type: ignore[no-any-return]
+    return figure

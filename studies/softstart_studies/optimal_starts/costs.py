@@ -102,4 +102,4 @@ def endings_figure(found: Sequence[Endings]) -> Figure:
         panels[0, 0].set_ylim(bottom=0.5)
         panels[1, 0].set_ylabel(f"{K_DYN} above that of reached, %")
         panels[0, -1].legend(loc="upper right", handlelength=3.2)
-    return figure  # type: ignore[no-any-return]
+    return figure

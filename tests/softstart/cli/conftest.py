@@ -134,7 +134,7 @@ def refused(run, place):
         if mistakes == 1:
             assert rest == []
         else:
-            assert first == f"softstart: {mistakes} things are wrong:"
+            assert first == f"softstart: {mistakes} errors:"
             assert [line.split(". ")[0].strip() for line in rest] == [str(1 + k) for k in range(mistakes)]
         assert snapshot(place) == before
         return err

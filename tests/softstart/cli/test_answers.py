@@ -25,10 +25,11 @@ from softstart import (
     tune,
 )
 from softstart.chain import Mass, Shaft
-from softstart.cli.options import controller_names, drive_names, read_value_list
+from softstart.cli.options import drive_names, read_value_list
 from softstart.clutch import Clutch, engage
 from softstart.identification.planning import made_up_log
 from softstart.optimal.front import pareto
+from softstart.plugins import controller_names
 from softstart.quantities import to_si
 from softstart.views.starts import share_lost
 

@@ -18,7 +18,7 @@ REFUSED = [
     ("compre", '"compre"', "did you mean softstart compare?"),
     ("zzzzzz", "there are init, plan, identify, wear, drives, reduce, compare,", "study and completion"),
     ("compare --jsno", "compare:", "'--jsno'", "Did you mean '--json'?"),
-    ("simulate --controller direct", "Missing argument 'DRIVE'"),
+    ("simulate good.toml", "Missing option '--controller'"),
     ("report good.toml --pdf --json", "--pdf", "this is an option"),
     # the machine
     ("compare nowhere.toml", '"nowhere.toml"', "no such file"),
