@@ -27,7 +27,7 @@ from softstart import Drive, identify
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.identification.logs import Log
-from softstart.identification.planning import Experiment, made_up_log
+from softstart.identification.planning import Experiment, simulated_log
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 
@@ -158,7 +158,7 @@ def logs(off: float, count: int) -> list[tuple[Log, Drive]]:
     for number in range(count):
         rng = np.random.default_rng(number)
         truth = drive()
-        log = made_up_log(
+        log = simulated_log(
             truth, reversal, log_period=PERIOD, ripple=RIPPLE, position=rng.uniform(-1.0, 1.0),
             phase=rng.uniform(), seed=int(rng.integers(2**31)),
         )  # fmt: skip

@@ -11,7 +11,7 @@ import pytest
 
 from softstart import Drive, Identification, identify
 from softstart.drive import FRICTIONS
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
@@ -45,7 +45,7 @@ def test_intervals_hold_the_truth(drive: Drive, lines: float, pytestconfig: pyte
     for number in range(1, 1 + pytestconfig.getoption("size")):
         generator = np.random.default_rng([number, 4000, round(lines)])
         position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
-        log = made_up_log(
+        log = simulated_log(
             truth, REVERSE, log_period=4e-3, ripple=RIPPLE, position=position, phase=phase,
             seed=int(generator.integers(2**31)),
         )  # fmt: skip

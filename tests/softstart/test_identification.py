@@ -30,7 +30,7 @@ from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.identification.fitting import ErrorScales, Fitter
 from softstart.identification.model import FILTER, LogModel, filtered
-from softstart.identification.planning import Experiment, VirtualTest, made_up_log, steps_of
+from softstart.identification.planning import Experiment, VirtualTest, simulated_log, stepped_torque
 from softstart.identification.unknowns import unknowns_of
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
@@ -52,7 +52,7 @@ NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_t
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    return made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
+    return simulated_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
 
 
 def played(profile: TorqueProfile, position: float, until: float) -> Run:
@@ -134,12 +134,12 @@ def test_the_truth_is_as_likely_as_the_covariance_says(experiment: str, lines: f
     for seed in range(16):
         generator = np.random.default_rng([seed, 5])
         position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
-        log = made_up_log(
+        log = simulated_log(
             drive, experiment, log_period=4e-3, ripple=1.0, position=position, phase=phase, seed=seed
         )
         fitter, x = fit_of(log, drive, position, (phase - 0.5) * log.count)
-        point = fitter.settled(x, (np.zeros(log.time.size),), ErrorScales(1.0, 1.0))
-        point = fitter.derived(point, point)
+        point = fitter.linearized(x, (np.zeros(log.time.size),), ErrorScales(1.0, 1.0))
+        point = fitter.with_derivatives(point, point)
         residual, jacobian = point.white
         covariance, pull = fitter.covariance(point), jacobian.T @ residual
         squares.append(residual @ residual)
@@ -180,7 +180,7 @@ def test_other_units_of_torque_scale_what_they_must_and_nothing_else(log: Log) -
 
 @pytest.mark.slow
 def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> None:
-    start = made_up_log(TRUTH, "start", log_period=2e-3, ripple=1.0, seed=4)
+    start = simulated_log(TRUTH, "start", log_period=2e-3, ripple=1.0, seed=4)
     alone = identify(start, GUESS, searches=3)
     assert not alone["gap"].known
     assert alone["gap"].lower < 0.08 < alone["gap"].upper
@@ -191,7 +191,7 @@ def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> 
 
 @pytest.mark.slow
 def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it() -> None:
-    rubbed = made_up_log(
+    rubbed = simulated_log(
         TRUTH.replace(motor_friction=1.0), REVERSE, log_period=2e-3, ripple=1.0, seed=7, position=0.2
     )
     notes = identify(rubbed, TRUTH, searches=1).notes
@@ -213,9 +213,9 @@ def test_the_lift_and_the_friction_of_an_inclined_belt_are_told_apart_by_a_rever
         start_position="mid-gap",
     )  # fmt: skip
     there_and_back = Experiment(
-        "", *steps_of(np.array([0.15, 0.15, 0.25]), np.array([40.0, 15.0, -30.0])), {}, 0.0, 0.0
+        "", *stepped_torque(np.array([0.15, 0.15, 0.25]), np.array([40.0, 15.0, -30.0])), {}, 0.0, 0.0
     )
-    log = made_up_log(belt, there_and_back, log_period=3e-3, ripple=1.0)
+    log = simulated_log(belt, there_and_back, log_period=3e-3, ripple=1.0)
     notes = identify(log, belt.replace(load_friction=0.0, load_torque=12.0), searches=1).notes
     assert any("--free +load.friction" in note for note in notes)
     found = identify(log, belt.replace(load_friction=2.0, load_torque=12.0), searches=2)
@@ -228,21 +228,21 @@ def test_the_lift_and_the_friction_of_an_inclined_belt_are_told_apart_by_a_rever
 def test_the_ends_of_an_interval_are_where_the_log_is_less_likely(log: Log) -> None:
     """Against fits at fixed values from the best x: at each end L is larger by that of Student's t."""
     fitter, x = fit_of(log, TRUTH, -0.6, -float(log.values[0]))
-    best = fitter.refined(x)
-    best = fitter.valued(best, best)
+    best = fitter.most_likely(x)
+    best = fitter.with_likelihood(best, best)
     names = [one.name for one in fitter.unknowns]
     for i, sign in itertools.product((names.index("gap"), names.index("position")), (-1.0, 1.0)):
-        half = float(fitter.halves(best)[i])
+        half = float(fitter.half_widths(best)[i])
         x = best.x.copy()
         x[i] = fitter.end(i, sign, half, best, ())
-        begin = fitter.settled(x, best.errors, best.sizes)
-        other = fitter.valued(fitter.descended(begin, i, best), best)
+        begin = fitter.linearized(x, best.errors, best.sizes)
+        other = fitter.with_likelihood(fitter.minimized(begin, i, best), best)
         assert other.value - best.value == pytest.approx(fitter.threshold(best), rel=0.12)
 
 
 @pytest.fixture(scope="module")
 def coarse() -> Log:
-    return made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
+    return simulated_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
 
 
 def test_where_another_machine_made_the_log_no_interval_is_stated(coarse: Log, tmp_path: Path) -> None:
@@ -303,8 +303,8 @@ def test_an_angle_may_wrap_and_lack_samples(log: Log) -> None:
 
 
 def test_a_speed_of_encoder_differences_is_summed_to_the_angle(log: Log) -> None:
-    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
-    read = speed.summed(float(TRUTH.encoder_lines))
+    speed = simulated_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
+    read = speed.integrated(float(TRUTH.encoder_lines))
     assert (speed.kind, read.kind) == ("speed", "angle")
     assert np.diff(read.values) == pytest.approx(np.diff(log.values), abs=1e-9)
     assert "summed to the angle" in " ".join(read.notes)
@@ -383,20 +383,23 @@ def test_peak_and_travel_are_those_of_the_worst_position() -> None:
     bench = VirtualTest(drive, 1e-3, 1.0, NAMES[:5])
     generator = np.random.default_rng(9)
     durations = np.full(11, 0.8 * float(drive.elastic_period))
-    played = steps_of(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
+    played = stepped_torque(durations, generator.uniform(-1.0, 1.0, 11) * float(drive.Ms))
     places = np.concatenate([np.linspace(-1.0, 1.0, 1501), generator.uniform(-1.0, 1.0, 500)])
-    found, coarse = bench.loads(*played, places), bench.loads(*played, np.linspace(-1.0, 1.0, 65))
-    most = bench.load(*played)
+    found, coarse = (
+        bench.peaks_and_travels(*played, places),
+        bench.peaks_and_travels(*played, np.linspace(-1.0, 1.0, 65)),
+    )
+    most = bench.worst_peak_and_travel(*played)
     for i in range(len(most)):
         assert 0.998 * most[i] <= found[i].max() <= (1.0 + 1e-9) * most[i]
     assert max(1.0 - float(coarse[i].max()) / most[i] for i in range(len(most))) > 0.005  # of an even grid
 
 
 def test_peak_and_travel_are_those_of_a_simulation() -> None:
-    profile, end = steps_of(np.full(4, 0.1), np.array([30.0, -20.0, -40.0, 25.0]))
+    profile, end = stepped_torque(np.full(4, 0.1), np.array([30.0, -20.0, -40.0, 25.0]))
     run = played(profile, 0.0, end)
     angles = run.at(np.linspace(0.0, end, 20001))["phi2"]
-    peak, travel, _ = VirtualTest(TRUTH, 1e-3, 1.0, NAMES).loads(profile, end, np.zeros(1))
+    peak, travel, _ = VirtualTest(TRUTH, 1e-3, 1.0, NAMES).peaks_and_travels(profile, end, np.zeros(1))
     assert peak[0] == pytest.approx(run.peak_torque, rel=1e-12)
     assert travel[0] == pytest.approx(np.max(np.abs(angles - angles[0])), rel=1e-4)
 

@@ -9,8 +9,8 @@ import pytest
 
 from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
 from softstart.controller import make_controller
-from softstart.identification.model import knots_of, unlimited
-from softstart.identification.planning import made_up_log
+from softstart.identification.model import knots_of, without_limits
+from softstart.identification.planning import simulated_log
 from softstart.identification.solving import reduced_drive
 from softstart.profile import TorqueProfile
 from softstart_studies.paper_r.lever import lever
@@ -30,11 +30,11 @@ def stiff_behind_the_gap(**changes: object) -> Chain:
 
 def logged(chain: Chain, drive: Drive) -> Log:
     """A reversal planned for a drive, played on the whole chain with a torque error of 1 N m."""
-    plan = made_up_log(drive, REVERSE, log_period=4e-3)
+    plan = simulated_log(drive, REVERSE, log_period=4e-3)
     error = np.random.default_rng(5).standard_normal(plan.time.size)
     knots, owners = knots_of(plan)
     profile = TorqueProfile(knots, (plan.torque + error)[owners])
-    whole = replace(chain, motor=replace(chain.motor, **unlimited(plan)))
+    whole = replace(chain, motor=replace(chain.motor, **without_limits(plan)))
     run = simulate(whole, make_controller("profile", {"profile": profile}), until=float(plan.time[-1]))
     phi = run.at(plan.time)["phi"][:, chain.motor_index]
     count = 2.0 * np.pi / (4.0 * 4096.0)

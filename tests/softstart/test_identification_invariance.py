@@ -14,7 +14,7 @@ from softstart import Identification, InputError, Log, identify
 from softstart.arrays import Vector
 from softstart.identification.fitting import Fitter
 from softstart.identification.model import LogModel
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.identification.solving import _directed
 from softstart.identification.unknowns import unknowns_of
 
@@ -23,7 +23,7 @@ COUNT = 2.0 * math.pi / 4096.0  # of the encoder
 
 
 def made(seed: int, position: float, period: float = 4e-3) -> Log:
-    return made_up_log(TRUTH, REVERSE, log_period=period, ripple=1.0, position=position, seed=seed)
+    return simulated_log(TRUTH, REVERSE, log_period=period, ripple=1.0, position=position, seed=seed)
 
 
 LOG = made(3, -0.6)

@@ -15,13 +15,13 @@ from tests.softstart.test_identification import GUESS, NAMES, REVERSE, TRUTH
 
 from softstart import InputError, Log, identify
 from softstart.identification.model import LogModel
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.identification.solving import _check_step
 
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    return made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
+    return simulated_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
 
 
 # ---- the clock ------------------------------------------------------------------------------------------
@@ -38,7 +38,7 @@ def test_the_origin_of_the_clock_does_not_matter(log: Log) -> None:
 def test_logs_with_clocks_and_sampling_of_their_own_are_fitted_together() -> None:
     each = []
     for seed, period, origin, position in ((4, 2e-3, 0.0, -0.7), (5, 5e-3, 1000.0, 0.5)):
-        made = made_up_log(TRUTH, REVERSE, log_period=period, ripple=1.0, position=position, seed=seed)
+        made = simulated_log(TRUTH, REVERSE, log_period=period, ripple=1.0, position=position, seed=seed)
         each.append(Log(made.time + origin, made.torque, angle=made.values, torque_is="demand"))
     both = identify(each, GUESS, searches=3)
     alone = identify(each[1], GUESS, searches=3)
@@ -81,7 +81,7 @@ def test_columns_have_factors_signs_and_units_of_their_own(log: Log, tmp_path: P
 def test_steps_of_the_encoder_in_another_unit_are_noticed(unit: str) -> None:
     """Turns or degrees that are called rad, rpm that are called rad/s."""
     kind, size = next((kind, sizes[unit]) for kind, sizes in SIZES.items() if unit in sizes)
-    log = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal=kind)  # type: ignore[arg-type]
+    log = simulated_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal=kind)  # type: ignore[arg-type]
     wrong = Log(log.time, log.torque, **{kind: 1.0005 * log.values / size}, torque_is="demand")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=rf"counts of 1024 encoder lines in {unit}; .*{kind}=NAME\[{unit}\]"):
         _check_step(wrong, 1024.0)

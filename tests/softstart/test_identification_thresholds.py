@@ -16,17 +16,17 @@ from tests.softstart.test_identification import REVERSE, TRUTH, fit_of
 from softstart import InputError, Log
 from softstart.arrays import Vector
 from softstart.identification import solving
-from softstart.identification.fitting import RIPPLE, ErrorScales, Fitter, Point, Spot
+from softstart.identification.fitting import RIPPLE, ErrorScales, FitPoint, Fitter, LogLinearization
 from softstart.identification.model import LogModel
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.identification.solving import (
     _check_inertia,
     _correlations,
     _effects,
-    _other_scale,
+    _scale_warning,
     _slow_torque,
     _whiteness,
-    misfits,
+    model_mismatch,
 )
 from softstart.identification.unknowns import Unknown, unknowns_of
 
@@ -40,7 +40,7 @@ def gaussian(shape: tuple[int, ...], seed: int = 7) -> Vector:
 # ---- a straight line, whose intervals are known ---------------------------------------------------------
 
 
-def line(count: int, width: int, size: float) -> tuple[Fitter, Point]:
+def line(count: int, width: int, size: float) -> tuple[Fitter, FitPoint]:
     """Least squares with errors of one unknown size, as a fit whose V is the ripple squared.
 
     `largest_torque` is such that the size expected beforehand is the true one.
@@ -49,10 +49,10 @@ def line(count: int, width: int, size: float) -> tuple[Fitter, Point]:
     residual = gaussian((count,), 8)
     residual -= jacobian @ np.linalg.lstsq(jacobian, residual, rcond=None)[0]
     residual *= size * math.sqrt((count - width) / float(residual @ residual))
-    spot = Spot(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), jacobian)
+    spot = LogLinearization(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), jacobian)
     model: Any = SimpleNamespace(log=SimpleNamespace(torque=np.array([size / RIPPLE])))
     fitter = Fitter([model], [Unknown("gap", "power", 0.0, -9.0, 9.0)] * width)
-    return fitter, Point(np.zeros(width), ErrorScales(0.0, size), (spot,))
+    return fitter, FitPoint(np.zeros(width), ErrorScales(0.0, size), (spot,))
 
 
 @pytest.mark.parametrize(("count", "width"), [(12, 3), (60, 5)])
@@ -72,7 +72,9 @@ def test_intervals_of_a_straight_line_are_those_of_student(count: int, width: in
     assert more == pytest.approx(1.0 + (count - width) * (2.0 * math.log(3.0) - 8.0 / 9.0), rel=1e-6)
     jacobian = best.spots[0].jacobian
     deviations = size * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-    assert fitter.halves(best) == pytest.approx(quantile * deviations, rel=0.02)  # sizes in steps of 10 %
+    assert fitter.half_widths(best) == pytest.approx(
+        quantile * deviations, rel=0.02
+    )  # sizes in steps of 10 %
     assert np.sqrt(np.diag(fitter.covariance(best))) == pytest.approx(deviations, rel=1e-3)
 
 
@@ -102,7 +104,9 @@ def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
     """Least squares of r + G e over the noise and of e over the ripple, with r about e = 0."""
     response, residual, sizes = gaussian((9, 6)), gaussian((9,), 3), ErrorScales(1.3, 0.4)
     eigenvalues, vectors = np.linalg.eigh(response @ response.T)
-    spot = Spot(np.zeros(6), vectors.T @ residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
+    spot = LogLinearization(
+        np.zeros(6), vectors.T @ residual, vectors.T, np.maximum(eigenvalues, 0.0), response
+    )
     normal = response.T @ response / 1.3**2 + np.eye(6) / 0.4**2
     expected = -np.linalg.solve(normal, response.T @ residual / 1.3**2)
     assert spot.likely_error(spot.residual, sizes) == pytest.approx(expected, rel=1e-9)
@@ -111,7 +115,7 @@ def test_the_most_likely_torque_error_is_that_of_the_normal_equations() -> None:
 def test_innovations_are_independent_of_unit_size_and_of_what_came_before() -> None:
     response, sizes = gaussian((9, 6)), ErrorScales(1.3, 0.4)
     eigenvalues, vectors = np.linalg.eigh(response @ response.T)
-    spot = Spot(np.zeros(6), np.zeros(9), vectors.T, np.maximum(eigenvalues, 0.0), response)
+    spot = LogLinearization(np.zeros(6), np.zeros(9), vectors.T, np.maximum(eigenvalues, 0.0), response)
     each = np.array([spot._replace(residual=column).innovations(sizes) for column in vectors]).T
     covariance = 1.3**2 * np.eye(9) + 0.4**2 * response @ response.T
     assert each @ covariance @ each.T == pytest.approx(np.eye(9), abs=1e-9)
@@ -157,7 +161,7 @@ def test_an_inertia_is_believed_within_a_factor_of_25(share: float, refused: boo
 @pytest.mark.parametrize(("ratio", "doubted"), [(0.199, True), (0.201, False), (4.98, False), (5.02, True)])
 def test_inertias_five_times_off_are_doubted(ratio: float, doubted: bool) -> None:
     found = TRUTH.replace(motor_inertia=ratio * TRUTH.J1, load_inertia=ratio * TRUTH.J2)
-    assert bool(_other_scale(TRUTH, found)) == doubted
+    assert bool(_scale_warning(TRUTH, found)) == doubted
 
 
 # ---- what the model has not -----------------------------------------------------------------------------
@@ -166,21 +170,21 @@ def test_inertias_five_times_off_are_doubted(ratio: float, doubted: bool) -> Non
 @pytest.mark.parametrize(("share", "stated"), [(0.055, True), (0.065, False)])
 def test_a_torque_error_above_six_per_cent_is_no_ripple(share: float, stated: bool) -> None:
     """Of 40.3 N m, at the true drive; 146 samples tell its size within 6 %."""
-    log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=40.3 * share, seed=4)
+    log = simulated_log(TRUTH, REVERSE, log_period=4e-3, ripple=40.3 * share, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 2.0))
-    point = fitter.derived(point)
+    point = fitter.linearized(x, [np.zeros(log.time.size)], ErrorScales(1.0, 2.0))
+    point = fitter.with_derivatives(point)
     assert point.sizes.ripple == pytest.approx(40.3 * share, rel=0.1)
-    assert any("a torque error of" in note for note in misfits(fitter, point)) != stated
+    assert any("a torque error of" in note for note in model_mismatch(fitter, point)) != stated
 
 
 @pytest.mark.parametrize(("count", "size", "named"), [(3, 5.1, True), (3, 4.9, False), (2, 5.1, False)])
 def test_samples_five_deviations_off_are_named_from_three_on(count: int, size: float, named: bool) -> None:
     """Of 73 samples, of which 2 + 0.5 % may be: what is left is half a deviation, but in some of them."""
-    log = made_up_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
+    log = simulated_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
-    point = fitter.derived(point)
+    point = fitter.linearized(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
+    point = fitter.with_derivatives(point)
     spot = point.spots[0]
     left = 0.5 * gaussian((spot.residual.size,))
     left[[20, 37, 60][:count]] = size
@@ -188,8 +192,8 @@ def test_samples_five_deviations_off_are_named_from_three_on(count: int, size: f
     covariance = spot.rotation.T * spot.variance(point.sizes) @ spot.rotation
     spot = spot._replace(residual=spot.rotation @ np.linalg.cholesky(covariance) @ left)
     assert spot.innovations(point.sizes) == pytest.approx(left, abs=1e-6)
-    told = f"made-up log: {count} samples more than 5 standard deviations off"
-    assert any(told in note for note in misfits(fitter, point._replace(spots=(spot,)))) == named
+    told = f"simulated log: {count} samples more than 5 standard deviations off"
+    assert any(told in note for note in model_mismatch(fitter, point._replace(spots=(spot,)))) == named
 
 
 @pytest.mark.parametrize(
@@ -199,23 +203,23 @@ def test_samples_five_deviations_off_are_named_from_three_on(count: int, size: f
 def test_what_has_a_chance_below_its_limit_is_named(
     chance: str, limit: float, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log = made_up_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
+    log = simulated_log(TRUTH, REVERSE, log_period=8e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
+    point = fitter.with_derivatives(fitter.linearized(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
     for share, named in ((0.99, True), (1.01, False)):
         monkeypatch.setattr(solving, chance, lambda *_, share=share: share * limit)
-        assert any(words in note for note in misfits(fitter, point)) == named
+        assert any(words in note for note in model_mismatch(fitter, point)) == named
 
 
 @pytest.mark.parametrize(("deviations", "named"), [(3.9, False), (4.1, True)])
 def test_an_effect_of_four_deviations_is_named_with_its_size(deviations: float, named: bool) -> None:
     """An offset of the torque: what is left is its shape, so many deviations of its size."""
-    log = made_up_log(PLACED, REVERSE, log_period=8e-3, ripple=1.0, seed=3)
+    log = simulated_log(PLACED, REVERSE, log_period=8e-3, ripple=1.0, seed=3)
     unknowns = unknowns_of(["gap", "load_inertia"], PLACED, [log], [False])
     fitter = Fitter([LogModel.of(log, PLACED)], unknowns)
     x = np.array([one.guess for one in unknowns])
-    point = fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
-    point = fitter.derived(point, point)
+    point = fitter.linearized(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0))
+    point = fitter.with_derivatives(point, point)
     spot = point.spots[0]
     root = np.sqrt(spot.variance(point.sizes))
     jacobian = point.white[1]
@@ -237,13 +241,13 @@ def test_an_effect_of_four_deviations_is_named_with_its_size(deviations: float, 
 @pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
 def test_a_fit_that_another_step_makes_better_by_four_is_none(gain: float, named: bool) -> None:
     """What is left is a multiple of the first derivative: a step along it gains its whole square."""
-    log = made_up_log(TRUTH, REVERSE, log_period=16e-3, ripple=1.0, seed=4)
+    log = simulated_log(TRUTH, REVERSE, log_period=16e-3, ripple=1.0, seed=4)
     fitter, x = fit_of(log, TRUTH, -0.6, -0.2 * log.count)
-    point = fitter.derived(fitter.settled(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
+    point = fitter.with_derivatives(fitter.linearized(x, [np.zeros(log.time.size)], ErrorScales(1.0, 1.0)))
     spot, derivative = point.spots[0], point.white[1][:, 0]
     root = np.sqrt(spot.variance(point.sizes))
     left = spot._replace(residual=math.sqrt(gain) * derivative / np.linalg.norm(derivative) * root)
-    notes = misfits(fitter, point._replace(spots=(left,), drift=np.zeros(x.size)))
+    notes = model_mismatch(fitter, point._replace(spots=(left,), drift=np.zeros(x.size)))
     assert any("The fit would be better" in note for note in notes) == named
 
 
@@ -259,5 +263,7 @@ def test_the_chance_of_a_slow_torque_is_that_of_its_waves() -> None:
     waves = np.cos(math.pi * np.outer(np.arange(count) + 0.5, [3.0, 50.0]) / count)
     waves /= np.linalg.norm(waves, axis=0)
     residual = 2.0 * (5.0 * waves[:, 0] + 30.0 * waves[:, 1])
-    spot = Spot(np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), waves[:, 1:])
+    spot = LogLinearization(
+        np.zeros(count), residual, np.eye(count), np.ones(count), np.eye(count), waves[:, 1:]
+    )
     assert _slow_torque(spot, sizes) == pytest.approx(float(chi2.sf(25.0, 20)), rel=1e-6)

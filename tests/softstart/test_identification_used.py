@@ -24,7 +24,7 @@ from softstart import (
     simulate,
     tune,
 )
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.start.comparison import LEFT_POSSIBLE, intervals
 from softstart.tuning.question import scenarios_drawn, tuning_scenarios
 
@@ -33,7 +33,7 @@ TRUTH = UNKNOWN.replace(start_position="mid-gap")
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
+    log = simulated_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
     return identify(log, TRUTH, searches=1)
 
 

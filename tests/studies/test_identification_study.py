@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softstart.identification.planning import Experiment, made_up_log
+from softstart.identification.planning import Experiment, simulated_log
 from softstart.profile import TorqueProfile
 from softstart_studies import identification as peers
 
@@ -16,7 +16,7 @@ def exact_log(position: float, lines: float = 0.0) -> peers.Log:
         "reversal", TorqueProfile.steps(peers.EDGES, peers.LEVELS), peers.EDGES[-1], {}, 0, 0
     )
     drive = peers.drive().replace(encoder_lines=lines)
-    return made_up_log(drive, reversal, log_period=peers.PERIOD, position=position)
+    return simulated_log(drive, reversal, log_period=peers.PERIOD, position=position)
 
 
 @pytest.mark.parametrize("position", [-0.8, 0.5])

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+from functools import cache
 from importlib import import_module
+from pkgutil import get_data
 
 import click
 from click.shell_completion import CompletionItem
@@ -10,46 +13,23 @@ from click.shell_completion import CompletionItem
 from softstart import __version__
 from softstart.hints import did_you_mean
 
-# by purpose: the name of a command, the module in this package that defines it, the beginning of its help
+# by purpose: the name of a command, and the module in this package that defines it
 PURPOSES = {
-    "Your own drive": (
-        ("init", "init", "Create a drive file from data sheet values."),
-        ("plan", "identify", "Plan an experiment that identifies a drive accurately."),
-        ("identify", "identify",
-         "Identify the parameters of a drive, with confidence intervals, from inverter logs."),
-        ("wear", "identify",
-         "Compute the growth of the gap from several identifications, and when it is worn."),
-        ("drives", "lists", "List the shipped drives, or print one as TOML."),
-        ("reduce", "reduce", "Compute the natural frequencies of a chain, and reduce it to two masses."),
-    ),
-    "Strategies": (
-        ("compare", "starts", "Compare strategies on a drive or a chain."),
-        ("simulate", "starts", "Simulate one start of a drive or a chain."),
-        ("fatigue", "starts", "Estimate the fatigue life of the shaft line under each strategy."),
-        ("controllers", "lists", "List the controllers, or show the parameters of one."),
-        ("linear", "starts", "Linearise the control loop: stability margins, modes, limit cycles."),
-    ),
-    "Design": (
-        ("optimize", "optimize",
-         "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound."),
-        ("pareto", "optimize",
-         "Compute the lowest K_dyn over the start time, and compare the controllers with it."),
-        ("tune", "tune", "Tune a controller for each gap and load inertia, and one robust set of gains."),
-        ("sweep", "sweep", "Simulate a grid of drives and controllers of any size."),
-    ),
-    "Results": (
-        ("serve", "serve", "Open the interactive page in the browser."),
-        ("report", "report", "Write a report on the start of a drive or a chain as one HTML file."),
-    ),
-    "Other machines and tools": (
-        ("clutch", "machines", "Simulate a clutch engagement: peak shaft torque, friction work, slip time."),
-        ("balance", "machines",
-         "Compute forces and moments of a piston engine by order, and design a balancer."),
-        ("study", "lists", "List the studies, or run one."),
-        ("completion", "completion", "Print the script for completion with the Tab key."),
-    ),
+    "Your own drive": {
+        "init": "init", "plan": "identify", "identify": "identify", "wear": "identify", "drives": "lists",
+        "reduce": "reduce",
+    },
+    "Strategies": {
+        "compare": "starts", "simulate": "starts", "fatigue": "starts", "controllers": "lists",
+        "linear": "starts",
+    },
+    "Design": {"optimize": "optimize", "pareto": "optimize", "tune": "tune", "sweep": "sweep"},
+    "Results": {"serve": "serve", "report": "report"},
+    "Other machines and tools": {
+        "clutch": "machines", "balance": "machines", "study": "lists", "completion": "completion",
+    },
 }  # fmt: skip
-COMMANDS = {name: (module, text) for rows in PURPOSES.values() for name, module, text in rows}
+COMMANDS = {name: module for commands in PURPOSES.values() for name, module in commands.items()}
 
 GREETING = f"""\
 softstart {__version__}: soft-start torque strategies for drives with backlash.
@@ -81,7 +61,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return super().get_command(ctx, cmd_name)
         command: click.Command = getattr(
-            import_module(f"softstart.cli.{COMMANDS[cmd_name][0]}"), f"{cmd_name}_command"
+            import_module(f"softstart.cli.{COMMANDS[cmd_name]}"), f"{cmd_name}_command"
         )
         return command
 
@@ -91,7 +71,7 @@ class Commands(click.Group):
         for purpose, rows in PURPOSES.items():
             with formatter.section(purpose):
                 limit = formatter.width - 6 - wide
-                formatter.write_dl([(f"{name:{wide}}", short_help(name, limit)) for name, *_ in rows])
+                formatter.write_dl([(f"{name:{wide}}", short_help(name, limit)) for name in rows])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options that begin with `incomplete`."""
@@ -127,9 +107,18 @@ def cli(context: click.Context) -> None:
         print(GREETING)
 
 
+@cache
+def first_sentences(module: str) -> dict[str, str]:
+    """The first paragraph of the docstring of each command of a module, which is not imported for it."""
+    tree = ast.parse(get_data(__package__, f"{module}.py") or b"")
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    return {node.name: (ast.get_docstring(node) or "").split("\n\n")[0] for node in functions}
+
+
 def short_help(name: str, limit: int = 45) -> str:
     """The help of a command in at most `limit` characters, as click shortens it."""
-    return click.Command(name, help=COMMANDS[name][1]).get_short_help_str(limit)
+    text = first_sentences(COMMANDS[name]).get(f"{name}_command", "")
+    return click.Command(name, help=text).get_short_help_str(limit)
 
 
 def usage_sentence(error: click.UsageError, command: str = "") -> str:

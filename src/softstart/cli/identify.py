@@ -61,10 +61,7 @@ def plan_command(*, drive: Drive, standard: bool, **arguments: Any) -> Answer:
         Write torque profiles (CSV, TOML), simulated logs, figure and report into this folder.
     """
     with working("planning experiments ...") as progress:
-        plan = softstart.plan_experiments(drive, optimise=not standard, progress=progress, **arguments)
-    from softstart.views.identification import plan_sheet
-
-    return plan.summary, plan_sheet(plan)
+        return softstart.plan_experiments(drive, optimise=not standard, progress=progress, **arguments)
 
 
 def _columns(text: str, option: str) -> dict[str, str]:
@@ -150,7 +147,4 @@ def wear_command(*, folders: tuple[str, ...], **arguments: Any) -> Answer:
     --out DIR
         Write the gaps (CSV), the figure and report.md into this folder.
     """
-    wear = softstart.follow_wear(folders, **arguments)
-    from softstart.views.identification import wear_sheet
-
-    return wear.summary, wear_sheet(wear)
+    return softstart.follow_wear(folders, **arguments)

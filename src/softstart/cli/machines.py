@@ -75,11 +75,9 @@ def clutch_command(
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
     clutch = clutch.replace(**law) if law else clutch
     from softstart.study import find_study
-    from softstart.views.clutches import engagement_sheet
 
     if not optimal:
-        run = engage(clutch, until=until)
-        return run.summary, engagement_sheet(run)
+        return engage(clutch, until=until)
     study: Any = find_study("paper-c")
     with working("optimizing the law ...") as progress:
         law_class, most = "nondecreasing" if nondecreasing else "any", points or DEFAULT_POINTS
@@ -125,7 +123,4 @@ def balance_command(*, engine: Engine, speeds: list[float] | None) -> Answer:
     --out DIR
         Write figures (SVG, PNG), tables (CSV) and report.md into this folder.
     """
-    from softstart.views.balances import balance_sheet
-
-    result = compute(engine, speeds)
-    return result.summary, balance_sheet(result)
+    return compute(engine, speeds)

@@ -222,6 +222,4 @@ def pareto_command(
         if option_value("as_json"):
             print_json(front.summary())
         raise SimulationError(front.points[-1].status_text)
-    from softstart.views.optima import front_sheet
-
-    return front.summary, front_sheet(front)
+    return front

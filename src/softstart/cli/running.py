@@ -19,6 +19,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.parallel import LOADED_FROM_FILE
 from softstart.plugins import CONTROLLERS, registered
+from softstart.results import Result
 from softstart.stopping import at_stop
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import print_json
@@ -32,7 +33,7 @@ WRITTEN = "## Where this comes from\n\nsoftstart "  # in every report.md of soft
 _SAID: list[str] = []  # what this process has said of it
 
 Progress = Callable[[str], None]
-Answer = tuple[Any, ...]  # of `answers`
+Answer = Result | tuple[Any, ...]  # of `answers`
 
 
 @contextmanager
@@ -110,9 +111,9 @@ def attributed(loading: str = "") -> Iterator[None]:
 def answers(out: bool = False) -> Decorator:
     """--json and, with `out`, --out; the command returns what is shown.
 
-    That is its data for JSON, its sheet or a text and, if there is one, the error to raise at the end. That
-    the folder of --out can be written is found before the command begins; it is filled at its end, and then
-    the answer is printed. Errors name options, see `named_as_options`.
+    That is a result; or its data for JSON, its sheet or a text and, if there is one, the error to raise at
+    the end. That the folder of --out can be written is found before the command begins; it is filled at its
+    end, and then the answer is printed. Errors name options, see `named_as_options`.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., None]:
@@ -123,7 +124,10 @@ def answers(out: bool = False) -> Decorator:
             with named_as_options(), output_folder(out) as folder:
                 if out is not None:
                     _check_report(out)
-                data, shown, *failures = command(**arguments)
+                answer = command(**arguments)
+                if isinstance(answer, Result):
+                    answer = answer.summary, answer.sheet
+                data, shown, *failures = answer
                 if folder is not None:
                     with working("drawing the figures ..."):
                         sheet.export(shown, folder, command_line())

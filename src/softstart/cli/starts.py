@@ -210,7 +210,4 @@ def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -
     """
     with working("running and linearising the start ..."), attributed():
         (strategy,) = controllers_from_options([controller], params, several=False)
-        view = softstart.linear_view(drive, strategy)
-    from softstart.views.linear import linear_sheet
-
-    return view.summary, linear_sheet(view)
+        return softstart.linear_view(drive, strategy)

@@ -162,15 +162,15 @@ def tune_command(
     ):
         controllers_from_options([controller], params, several=False)
         tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **arguments)
-    from softstart.views.tuning import any_in_time, tuning_sheet
+    from softstart.views.tuning import any_in_time
 
     if any_in_time(tuning):
-        return tuning.summary, tuning_sheet(tuning)
+        return tuning
     late = SimulationError(
         f"No gains within these ranges start in time ({tuning.question.bound}); allow more time with "
         "--start-time, or wider ranges with --free."
     )
-    return tuning.summary, tuning_sheet(tuning), late
+    return tuning.summary, tuning.sheet, late
 
 
 @contextmanager

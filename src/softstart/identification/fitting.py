@@ -39,8 +39,10 @@ from softstart.start.comparison import INTERVAL
 HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 STEP: Final = 1e-6  # of x, for derivatives of the motion
-APART: Final = 0.02  # of x, or half a standard error if that is less: for derivatives of covariances
-TURNS: Final = 3  # of the most likely torque error at one x; fewer if it moves by less than
+COVARIANCE_STEP: Final = (
+    0.02  # of x, or half a standard error if that is less: for derivatives of covariances
+)
+MOST_UPDATES: Final = 3  # of the most likely torque error at one x; fewer if it moves by less than
 ERROR_SETTLED: Final = 0.1  # standard deviations, all samples together
 # beforehand a torque error of 2.5 % of the largest torque, within a factor of 3: a log that cannot tell how
 # large it is (coarse encoder, few samples) must not conclude that there is none
@@ -53,7 +55,7 @@ MOST_STEPS, HALVINGS = 30, 7  # towards the most likely x, each step cut if need
 LONGEST_STEP: Final = 0.7  # of a number of x
 STEEP, ROUGHLY = 1e-3, 0.02  # what L must still gain for another step; where all else is refitted
 SAME: Final = 0.3  # standard errors between two explanations that are one
-HOPELESS: Final = 100.0  # above the least L: no place there is as likely
+LARGEST_EXCESS: Final = 100.0  # above the least L: no place there is as likely
 
 
 class ErrorScales(NamedTuple):
@@ -63,7 +65,7 @@ class ErrorScales(NamedTuple):
     ripple: float
 
 
-class Spot(NamedTuple):
+class LogLinearization(NamedTuple):
     """A log about an x and a torque error, in units of its rounding, turned so that V is diagonal."""
 
     error: Vector  # the torque error e, one number for each block of samples
@@ -90,14 +92,14 @@ class Spot(NamedTuple):
         return np.asarray(-(sizes.ripple**2) * (self.response.T @ pulled))
 
 
-class Point(NamedTuple):
+class FitPoint(NamedTuple):
     """An x, the sizes of the errors that are most likely there, and each log about it."""
 
     x: Vector
     sizes: ErrorScales
-    spots: tuple[Spot, ...]
+    spots: tuple[LogLinearization, ...]
     drift: Vector = np.zeros(0)  # d ln|V|/dx, halved
-    value: float = math.nan  # of the restricted likelihood, see `Fitter.valued`
+    value: float = math.nan  # of the restricted likelihood, see `Fitter.with_likelihood`
 
     @property
     def errors(self) -> list[Vector]:
@@ -187,14 +189,14 @@ class Fitter:
         responses = model.responses(model_parameters(self.unknowns, x, log), error)
         return np.asarray(responses[model.rows] / model.root[:, None])
 
-    def spot(self, x: Vector, log: int, error: Vector) -> Spot:
+    def linearize_log(self, x: Vector, log: int, error: Vector) -> LogLinearization:
         """A log about x and this torque error, without derivatives."""
         response = self.response(x, log, error)
         eigenvalues, vectors = np.linalg.eigh(response @ response.T)
         residual = vectors.T @ (self.residuals([x], log, error)[0] - response @ error)
-        return Spot(error, residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
+        return LogLinearization(error, residual, vectors.T, np.maximum(eigenvalues, 0.0), response)
 
-    def left(self, point: Point) -> list[Vector]:
+    def unscaled_residuals(self, point: FitPoint) -> list[Vector]:
         """Model minus log in each sample of each log, in its unit."""
         residuals = []
         for log, (model, error) in enumerate(zip(self.models, point.errors, strict=True)):
@@ -220,7 +222,7 @@ class Fitter:
             start = guess.copy()
             if number:
                 start[free] = [
-                    self.unknowns[i].drawn(one) for i, one in zip(free, draws[number - 1], strict=True)
+                    self.unknowns[i].search_start(one) for i, one in zip(free, draws[number - 1], strict=True)
                 ]
             self.progress(f"search {number + 1}")
             try:
@@ -228,7 +230,7 @@ class Fitter:
             except (InputError, SimulationError):
                 continue
             minima.sort(key=lambda one: one[1])
-            if agreeing(minima) >= AGREED:
+            if agreeing_searches(minima) >= AGREED:
                 break
         if not minima:
             raise InputError("The logs cannot be computed with any of the values tried; check their units.")
@@ -253,46 +255,48 @@ class Fitter:
 
     # ---- the most likely x -------------------------------------------------------------------------------
 
-    def refined(self, x: Vector, held: int | None = None) -> Point:
+    def most_likely(self, x: Vector, held: int | None = None) -> FitPoint:
         """The most likely x near this one. `held`: the number that stays."""
         errors = [np.zeros(model.blocks) for model in self.models]
-        return self.descended(self.settled(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque)), held)
+        return self.minimized(
+            self.linearized(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque)), held
+        )
 
-    def settled(self, x: Vector, errors: Sequence[Vector], sizes: ErrorScales) -> Point:
+    def linearized(self, x: Vector, errors: Sequence[Vector], sizes: ErrorScales) -> FitPoint:
         """The covariance at x about the torque errors that are most likely there, sought from `errors`."""
         spots = []
         for log, error in enumerate(errors):
-            spot = self.spot(x, log, error)
-            for _ in range(TURNS):
+            spot = self.linearize_log(x, log, error)
+            for _ in range(MOST_UPDATES):
                 new = spot.likely_error(spot.residual, sizes)
                 if np.linalg.norm(new - spot.error) < ERROR_SETTLED * sizes.ripple:
                     break
-                spot = self.spot(x, log, new)
+                spot = self.linearize_log(x, log, new)
             spots.append(spot)
-        return Point(x, sizes, tuple(spots))
+        return FitPoint(x, sizes, tuple(spots))
 
-    def descended(self, point: Point, held: int | None = None, best: Point | None = None) -> Point:
+    def minimized(self, point: FitPoint, held: int | None = None, best: FitPoint | None = None) -> FitPoint:
         """Where L is least, from a settled point; with sizes and drift of the best point, or its own.
 
         Bounded linear least squares for each step, cut until L is less: the drift of ln|V| is a force on x,
         which is added to the residual along J, so that the steps end where J' V^-1 r + drift = 0.
         """
-        point = self.derived(point, best)
+        point = self.with_derivatives(point, best)
         for _ in range(MOST_STEPS):
             step, gain = self.step(point, held)
             if gain < (STEEP if best is None else ROUGHLY):
                 break
             length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
             for cut in (length * 0.5 ** np.arange(HALVINGS)).tolist():
-                new = self.settled(np.clip(point.x + cut * step, *self.bounds), point.errors, point.sizes)
+                new = self.linearized(np.clip(point.x + cut * step, *self.bounds), point.errors, point.sizes)
                 if new.likelihood < point.likelihood - 0.1 * cut * gain:
                     break
             else:
                 break
-            point = self.derived(new, best)
+            point = self.with_derivatives(new, best)
         return point
 
-    def derived(self, point: Point, best: Point | None = None) -> Point:
+    def with_derivatives(self, point: FitPoint, best: FitPoint | None = None) -> FitPoint:
         """The point with the derivatives of its spots, and with sizes and drift unless those of the best."""
         spots = tuple(
             spot._replace(jacobian=spot.rotation @ self.jacobian(point.x, i, spot.error))
@@ -300,11 +304,11 @@ class Fitter:
         )
         if best is not None:
             return point._replace(spots=spots, drift=best.drift)
-        point = Point(point.x, self.sized(spots, point.sizes), spots, np.zeros(point.x.size))
+        point = FitPoint(point.x, self.estimated_scales(spots, point.sizes), spots, np.zeros(point.x.size))
         small = point.sizes.ripple <= MOST_RIPPLE * self.largest_torque
         return point._replace(drift=self.drift(point)) if small else point
 
-    def step(self, point: Point, held: int | None = None) -> tuple[Vector, float]:
+    def step(self, point: FitPoint, held: int | None = None) -> tuple[Vector, float]:
         """The step to the least L, were it quadratic, and what is gained by it."""
         residual, jacobian = point.white
         damped = np.vstack([jacobian, np.sqrt(self.weights)])
@@ -318,7 +322,7 @@ class Fitter:
         gradient = jacobian.T @ residual + point.drift
         return step, -float(2.0 * gradient @ step + np.sum((damped @ step) ** 2))
 
-    def drift(self, point: Point) -> Vector:
+    def drift(self, point: FitPoint) -> Vector:
         """D ln|V|/dx, halved; the most likely torque error follows x, by how much, the response says."""
         drift, ripple = np.zeros(point.x.size), point.sizes.ripple
         deviations = np.sqrt(np.diag(self.covariance(point)))
@@ -326,7 +330,7 @@ class Fitter:
             turned = spot.rotation @ spot.response / spot.variance(point.sizes)[:, None]
             inverse = spot.rotation.T @ turned
             for i in self._moved(log):
-                at, move = point.x.copy(), min(APART, 0.5 * float(deviations[i]))
+                at, move = point.x.copy(), min(COVARIANCE_STEP, 0.5 * float(deviations[i]))
                 move = -move if self.unknowns[i].kind == "position" and at[i] > 0.5 else move
                 at[i] += move
                 error = spot.error + move * spot.likely_error(spot.jacobian[:, i], point.sizes)
@@ -334,7 +338,7 @@ class Fitter:
                 drift[i] += ripple**2 * float(np.sum(inverse * more)) / move
         return drift
 
-    def covariance(self, point: Point) -> Matrix:
+    def covariance(self, point: FitPoint) -> Matrix:
         """Of x; what the logs do not tell is as uncertain as it was beforehand."""
         jacobian = point.white[1]
         return np.asarray(np.linalg.inv(jacobian.T @ jacobian + self.weights))
@@ -342,7 +346,10 @@ class Fitter:
     # ---- how large the errors are ------------------------------------------------------------------------
 
     def restricted(
-        self, spots: Sequence[Spot], sizes: ErrorScales, about: Sequence[Spot] | None = None
+        self,
+        spots: Sequence[LogLinearization],
+        sizes: ErrorScales,
+        about: Sequence[LogLinearization] | None = None,
     ) -> float:
         """L + ln|J' V^-1 J|; J and V of the last term are those of `about`.
 
@@ -362,8 +369,11 @@ class Fitter:
         along = (vectors.T @ pull)[kept]
         return value + float(np.log(values[kept]).sum() - np.sum(along**2 / values[kept]))
 
-    def sized(
-        self, spots: Sequence[Spot], before: ErrorScales, about: Sequence[Spot] | None = None
+    def estimated_scales(
+        self,
+        spots: Sequence[LogLinearization],
+        before: ErrorScales,
+        about: Sequence[LogLinearization] | None = None,
     ) -> ErrorScales:
         """Noise and ripple where `restricted` is least, from where they stood; at least the rounding."""
 
@@ -382,12 +392,12 @@ class Fitter:
 
     # ---- intervals ---------------------------------------------------------------------------------------
 
-    def valued(self, point: Point, best: Point) -> Point:
+    def with_likelihood(self, point: FitPoint, best: FitPoint) -> FitPoint:
         """A point with the sizes that are most likely there, and its value of `restricted`."""
-        sizes = self.sized(point.spots, point.sizes, best.spots)
+        sizes = self.estimated_scales(point.spots, point.sizes, best.spots)
         return point._replace(sizes=sizes, value=self.restricted(point.spots, sizes, best.spots))
 
-    def threshold(self, best: Point) -> float:
+    def threshold(self, best: FitPoint) -> float:
         """By how much `restricted` is larger at the ends of an interval.
 
         nu ln(1 + t^2/nu), with Student's quantile t, for errors whose size is known with nu degrees of
@@ -401,7 +411,7 @@ class Fitter:
         quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
         return freedom * math.log1p(quantile**2 / freedom)
 
-    def halves(self, best: Point) -> Vector:
+    def half_widths(self, best: FitPoint) -> Vector:
         """Half the interval of each number, were f linear: the farthest end over all sizes of the errors."""
         reach = np.zeros(best.x.size)
         most = self.threshold(best) + self.restricted(best.spots, best.sizes)
@@ -411,14 +421,16 @@ class Fitter:
                 reach = np.maximum(reach, left * np.diag(self.covariance(best._replace(sizes=sizes))))
         return np.asarray(np.sqrt(reach))
 
-    def refitted(self, i: int, number: float, near: Point, best: Point) -> Point:
+    def refitted(self, i: int, number: float, near: FitPoint, best: FitPoint) -> FitPoint:
         """All else refitted with x_i at a number, from a point nearby."""
         along = self.covariance(near)[:, i]
         x = np.clip(near.x + along / along[i] * (number - near.x[i]), *self.bounds)
         x[i] = number
-        return self.valued(self.descended(self.settled(x, near.errors, near.sizes), i, best), best)
+        return self.with_likelihood(
+            self.minimized(self.linearized(x, near.errors, near.sizes), i, best), best
+        )
 
-    def end(self, i: int, sign: float, half: float, best: Point, others: Sequence[Point]) -> float:
+    def end(self, i: int, sign: float, half: float, best: FitPoint, others: Sequence[FitPoint]) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half of it, were f linear.
 
         Where `restricted`, with all else refitted, is larger than at the best point by `threshold`; or a
@@ -431,7 +443,7 @@ class Fitter:
             far = sign * max(sign * far, sign * self._end_from(i, sign, far, about, best))
         return far
 
-    def _end_from(self, i: int, sign: float, first: float, about: Point, best: Point) -> float:
+    def _end_from(self, i: int, sign: float, first: float, about: FitPoint, best: FitPoint) -> float:
         bound = float(self.bounds[sign > 0.0][i])
         middle, most = float(about.x[i]), math.sqrt(self.threshold(best))
         points = {middle: about}
@@ -443,7 +455,7 @@ class Fitter:
                 try:
                     points[number] = self.refitted(i, number, near, best)
                 except (InputError, SimulationError):
-                    points[number] = near._replace(value=best.value + HOPELESS)
+                    points[number] = near._replace(value=best.value + LARGEST_EXCESS)
             return math.sqrt(max(points[number].value - best.value, 0.0)) - most
 
         reach = max(sign * (first - middle), 0.1 * abs(first - float(best.x[i])))
@@ -457,7 +469,7 @@ class Fitter:
             return outside  # no nearer than from the best point
         return float(brentq(over, inside, outside, xtol=0.5 * NEAR * abs(outside - middle)))
 
-    def explanations(self, best: Point) -> tuple[Point, list[Point]]:
+    def explanations(self, best: FitPoint) -> tuple[FitPoint, list[FitPoint]]:
         """The best point, and other places where the logs are explained nearly as well.
 
         A start that begins at the flank and one that crosses the gap first are two valleys: no step along
@@ -475,27 +487,27 @@ class Fitter:
             if share is not None:
                 x[load] = share * self.unknowns[load].upper
             try:
-                first = self.valued(self.refined(x, None if share is None else load), best)
-                if first.value < best.value + HOPELESS:
-                    found.append(first if share is None else self.refined(first.x))
+                first = self.with_likelihood(self.most_likely(x, None if share is None else load), best)
+                if first.value < best.value + LARGEST_EXCESS:
+                    found.append(first if share is None else self.most_likely(first.x))
             except (InputError, SimulationError):
                 continue
         for one in found:
-            if self.valued(one, best).value < best.value:
-                best = self.valued(one, one)
-        others: list[Point] = []
-        for one in (self.valued(one, best) for one in found if one.x is not best.x):
+            if self.with_likelihood(one, best).value < best.value:
+                best = self.with_likelihood(one, one)
+        others: list[FitPoint] = []
+        for one in (self.with_likelihood(one, best) for one in found if one.x is not best.x):
             apart = [float(np.linalg.norm(best.white[1] @ (one.x - two.x))) for two in (best, *others)]
             if one.value < best.value + self.threshold(best) and min(apart) > SAME:
                 others.append(one)
         return best, others
 
 
-def _ripples(best: Point, logs: Sequence[float]) -> list[ErrorScales]:
+def _ripples(best: FitPoint, logs: Sequence[float]) -> list[ErrorScales]:
     """The sizes of the best point with the ripple so many e-folds larger."""
     return [best.sizes._replace(ripple=best.sizes.ripple * math.exp(log)) for log in logs]
 
 
-def agreeing(minima: Sequence[tuple[Vector, float]]) -> int:
+def agreeing_searches(minima: Sequence[tuple[Vector, float]]) -> int:
     """How many searches ended at the best minimum."""
     return sum(cost <= 1.01 * minima[0][1] + 1e-300 for _, cost in minima)

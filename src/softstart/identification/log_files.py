@@ -89,7 +89,7 @@ def read_log(where: str, columns: Mapping[str, str]) -> tuple[dict[str, Vector],
         for key in [key for key in places if key != "time"]:
             _, factor, unit = wanted_columns.get(key, WantedColumn("", 1.0, ""))
             raw = _numbers(sheet, places[key], key, place)
-            size = _size(sheet, places, key, unit, signals["time"], raw, notes)
+            size = _unit_size(sheet, places, key, unit, signals["time"], raw, notes)
             signals[key] = factor * size * raw
     except RefusedError as refusal:
         raise InputError(f"{place}: {refusal.reason}.") from None
@@ -313,7 +313,7 @@ def _seconds(
     return factor * sizes[unit] * ticks
 
 
-def _size(
+def _unit_size(
     sheet: LogTable,
     places: Mapping[str, int],
     key: str,
@@ -335,10 +335,10 @@ def _size(
         return 1.0
     if key == "torque":
         return _in_si(unit, key, sheet.titled(place))
-    return _motion_size(sheet, places, key, time, raw, notes)
+    return _motion_unit_size(sheet, places, key, time, raw, notes)
 
 
-def _motion_size(
+def _motion_unit_size(
     sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector, notes: list[str]
 ) -> float:
     """One of the unit of an angle or a speed in SI; a column that is its derivative or integral checks it."""
@@ -347,7 +347,7 @@ def _motion_size(
     unit = sheet.unit(place, key)
     size = _in_si(unit, key, title) if unit else None
     hints = []
-    for i, ratio in _alike(sheet, places, key, time, raw):
+    for i, ratio in _derivatives_and_integrals(sheet, places, key, time, raw):
         beside = show(sheet.titled(i))
         try:
             beside_in = sheet.unit(i, other) or sheet.units[i]
@@ -358,18 +358,19 @@ def _motion_size(
             pairs = [
                 f"{name} in {one} with {sheet.names[i]} in {two}"
                 for one in MOTIONS[key] for two in MOTIONS[other]
-                if _near(_unit(two, other) / _unit(one, key), 1.0 / ratio) and not _near(ratio, 1.0)
+                if _matches(_unit(two, other) / _unit(one, key), 1.0 / ratio)
+                and not _matches(ratio, 1.0)
             ]  # fmt: skip
             hints += [f"the column {beside} beside it fits {pairs[0]}"] if len(pairs) == 1 else []
             continue
         right = known * ratio
-        unit = next((one for one in MOTIONS[key] if _near(_unit(one, key), right)), "")
+        unit = next((one for one in MOTIONS[key] if _matches(_unit(one, key), right)), "")
         if size is None and unit:
             notes.append(f"{show(name)} has no unit; it is in {unit}, as the column {beside} tells")
             return _unit(unit, key)
         if size is None:
             hints.append(f"one of it is {right:.5g} {si}, by the column {beside}")
-        elif unit and not _near(size, right):
+        elif unit and not _matches(size, right):
             raise RefusedError(
                 f"{show(title)} and {show(sheet.titled(i))} cannot both be right: by the second the first is "
                 f'in {unit}; write the unit that is meant, as --columns "{key}={name}[{unit}]"'
@@ -385,7 +386,7 @@ def _motion_size(
     )
 
 
-def _near(one: float, other: float) -> bool:
+def _matches(one: float, other: float) -> bool:
     return abs(one / other - 1.0) < MATCHED
 
 
@@ -393,7 +394,7 @@ def _unit(unit: str, key: str) -> float:
     return float(parse(f"1 {unit}", SIGNALS[key].unit))
 
 
-def _alike(
+def _derivatives_and_integrals(
     sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector
 ) -> Iterator[tuple[int, float]]:
     """The columns whose integral or derivative this one is, and by which ratio of the units.

@@ -110,16 +110,16 @@ class Log:
                 i = int(np.argmin(np.isfinite(column)))
                 raise InputError(f"{name}: the {key} of sample {i + 1} is missing; cut the log there.")
         notes: list[str] = []
-        columns["time"] = _clock(columns["time"], notes)
-        columns = _even(_once(columns, notes), notes)
+        columns["time"] = _unwrapped_clock(columns["time"], notes)
+        columns = _spread_evenly(_without_repeats(columns, notes), notes)
         seconds, torques, values = columns.values()
         _check_times(seconds, name)
         seen = np.isfinite(values)
         if kind == "angle":
-            values[seen] = _continuous(seconds[seen], values[seen], name, notes)
+            values[seen] = _unwrapped(seconds[seen], values[seen], name, notes)
         vars(self).update(
             time=seconds, torque=torques, values=values, kind=kind, torque_is=torque_is, name=name,
-            count=_count(np.diff(values[seen])),
+            count=_resolution(np.diff(values[seen])),
         )  # fmt: skip
         self._check_motion()
         every = math.ceil(int(seen.sum()) / MOST_ROWS)
@@ -189,14 +189,14 @@ class Log:
 
     def forward(self) -> Log:
         """The log with torque and motion turned round, if the motor first turns backward in it."""
-        if float(np.sum(self.moved[0][self._early])) >= 0.0:
+        if float(np.sum(self.speed_and_impulse[0][self._early])) >= 0.0:
             return self
         note = "the drive first turns backward, and torque and motion were both turned round"
         return self.changed(
             torque=-self.torque, values=-self.values, sign=-self.sign, notes=(*self.notes, note)
         )
 
-    def summed(self, lines: float) -> Log:
+    def integrated(self, lines: float) -> Log:
         """The angle, if the speed is the difference of the counts of an encoder with so many lines.
 
         A speed in steps of count/period is: its rounding errors then cancel from sample to sample, which the
@@ -221,7 +221,7 @@ class Log:
         return max(self.count, 1e-4 * float(np.nanmax(np.abs(self.values - first))))
 
     @property
-    def moved(self) -> tuple[Vector, Vector]:
+    def speed_and_impulse(self) -> tuple[Vector, Vector]:
         """Speed of the motor, and impulse of its torque until then, N m s, in the samples of the motion."""
         seen = np.isfinite(self.values)
         speed = self.values[seen]
@@ -235,7 +235,7 @@ class Log:
 
         Later a motor that hits the flank of a load at rest may fly back.
         """
-        speed, impulse = map(np.abs, self.moved)
+        speed, impulse = map(np.abs, self.speed_and_impulse)
         early = (impulse <= 0.5 * np.max(impulse)) & (speed <= 0.5 * np.max(speed))
         return slice(0, max(4, int(np.argmin(early)) if not early.all() else early.size))
 
@@ -248,7 +248,7 @@ class Log:
             )
         if not np.any(self.torque):
             raise InputError(f"{name}: the torque is 0 in every sample; log the torque of the motor with it.")
-        speed, impulse = self.moved
+        speed, impulse = self.speed_and_impulse
         fastest = float(np.max(np.abs(speed)))
         if fastest == 0.0:
             raise InputError(f"{name}: the {kind} never changes; log a start in which the motor moves.")
@@ -287,7 +287,7 @@ def _check_times(time: Vector, name: str) -> None:
         )
 
 
-def _once(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
+def _without_repeats(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
     """The columns without samples that repeat the one before, if all that share its time stamp do.
 
     Where some of them differ, the stamps are coarse, and a motor at rest has equal samples in them.
@@ -306,26 +306,26 @@ def _were(count: int) -> str:
     return "were" if count > 1 else "was"
 
 
-def _clock(time: Vector, notes: list[str]) -> Vector:
+def _unwrapped_clock(time: Vector, notes: list[str]) -> Vector:
     """Times that go on where a counter of ticks overflowed, or a clock passed midnight."""
     back = np.diff(time) < -0.5 * float(np.ptp(time)) if time.size > 2 else np.zeros(0, dtype=bool)
     if int(back.sum()) != 1:
         return time
     others = np.diff(time)[~back]
-    width = _width(time, back, TICKS, 0.5 * float(np.median(others)), DAY)
+    width = _counter_range(time, back, TICKS, 0.5 * float(np.median(others)), DAY)
     if width is None:
         return time
     notes.append(f"the clock wraps at {width:.7g} s and was unwrapped")
     return time + width * np.append(0, np.cumsum(back))
 
 
-def _even(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
+def _spread_evenly(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
     """Columns whose samples share time stamps, spread over even times that are rounded to such stamps."""
     time = columns["time"]
     steps = np.diff(time)
     if np.all(steps > 0.0) or np.any(steps < 0.0) or not steps.any():
         return columns
-    stamp, index = _count(steps), np.arange(time.size)
+    stamp, index = _resolution(steps), np.arange(time.size)
     period, start = np.polyfit(index, time - time[0], 1)
     even = time[0] + start + period * index
     # even times that were rounded, down or to the nearest, lie within a stamp about a line
@@ -338,7 +338,7 @@ def _even(columns: dict[str, Vector], notes: list[str]) -> dict[str, Vector]:
     return columns | {"time": even}
 
 
-def _continuous(time: Vector, values: Vector, name: str, notes: list[str]) -> Vector:
+def _unwrapped(time: Vector, values: Vector, name: str, notes: list[str]) -> Vector:
     """An angle without the jumps of a counter that overflows, or of an encoder that counts within a turn."""
     steps = np.diff(values)
     least = float(np.min(np.abs(steps), where=steps != 0.0, initial=math.inf))
@@ -346,8 +346,8 @@ def _continuous(time: Vector, values: Vector, name: str, notes: list[str]) -> Ve
     jumps = np.abs(steps) > max(0.5 * float(np.ptp(values)), 4.0 * least)
     if not jumps.any():
         return values
-    count = _count(steps[~jumps])
-    width = _width(values, jumps, (count,), 2.5 * count, TURN)
+    count = _resolution(steps[~jumps])
+    width = _counter_range(values, jumps, (count,), 2.5 * count, TURN)
     if width is None:
         i = int(np.argmax(jumps))
         raise InputError(
@@ -361,7 +361,7 @@ def _continuous(time: Vector, values: Vector, name: str, notes: list[str]) -> Ve
     return np.unwrap(values, period=width)
 
 
-def _width(
+def _counter_range(
     values: Vector, jumps: NDArray[np.bool_], units: Sequence[float], room: float, other: float
 ) -> float | None:
     """The range of a counter that overflows at these jumps: a power of two of a unit, or times `other`.
@@ -370,7 +370,7 @@ def _width(
     the difference of those neighbours; and it holds all values.
 
     >>> counts = np.array([65000.0, 65300.0, 64.0, 364.0, 664.0])
-    >>> _width(counts, np.array([False, True, False, False]), [1.0], 2.5, 360.0)
+    >>> _counter_range(counts, np.array([False, True, False, False]), [1.0], 2.5, 360.0)
     65536.0
     """
     steps, places = np.diff(values), np.flatnonzero(~jumps)
@@ -391,10 +391,10 @@ def _width(
     return min(fits, key=lambda candidate: abs(candidate - width), default=None)
 
 
-def _count(steps: Vector) -> float:
+def _resolution(steps: Vector) -> float:
     """The step that all of these are multiples of; 0 if there is none.
 
-    >>> _count(np.diff([0.0, 0.7, 2.1, 3.5, 3.5, 9.1, 14.0, 14.7, 16.8, 17.5, 18.9])).__round__(12)
+    >>> _resolution(np.diff([0.0, 0.7, 2.1, 3.5, 3.5, 9.1, 14.0, 14.7, 16.8, 17.5, 18.9])).__round__(12)
     0.7
     """
     steps = np.abs(steps)

@@ -25,17 +25,19 @@ from softstart.start.trajectory import StartRecorder, Trajectory
 POSITION: Final = "position"  # where in the gap a log begins, from -1 (opposite flank) to 1 (driving flank)
 DEAD_TIME: Final = "computing_delay"
 FILTER: Final = "speed_filter"  # time constant of the filter through which a speed was logged
-FINE: Final = 4  # instants in each sample period at which a filter sees the speed
+SUBSAMPLES: Final = 4  # instants in each sample period at which a filter sees the speed
 MOST_BLOCKS: Final = 600  # of the torque error along a log
-WIDE: Final = 1e3  # times the largest torque logged: no limit of the drive cuts a torque that was measured
+WIDE_LIMIT: Final = (
+    1e3  # times the largest torque logged: no limit of the drive cuts a torque that was measured
+)
 
 
-def unlimited(log: Log) -> dict[str, Any]:
+def without_limits(log: Log) -> dict[str, Any]:
     """The changes to a motor that make it follow the torque of a log: wide limits, no encoder.
 
     A measured torque has the lag of the motor in its samples already.
     """
-    limit = WIDE * max(float(np.max(np.abs(log.torque))), 1e-300)
+    limit = WIDE_LIMIT * max(float(np.max(np.abs(log.torque))), 1e-300)
     wide = {
         "starting_torque": limit, "maximum_torque": limit, "minimum_torque": -limit, "encoder_lines": 0.0,
     }  # fmt: skip
@@ -77,14 +79,14 @@ class LogModel:
     @classmethod
     def of(cls, log: Log, drive: Drive, most_blocks: int = MOST_BLOCKS) -> LogModel:
         """The model of a log of this drive."""
-        wide = drive.replace(**unlimited(log), brake="none")
+        wide = drive.replace(**without_limits(log), brake="none")
         block = max(1, math.ceil(log.time.size / most_blocks))
         rows = np.isfinite(log.values)
         if log.kind == "angle":
             log = log.changed(values=log.values - log.values[rows][0])
         values = log.values[rows]
         if log.kind == "angle" and log.count:
-            values, variance = edges(log.time[rows], values, log.count)
+            values, variance = encoder_edges(log.time[rows], values, log.count)
             counts = np.isfinite(variance)
             rows[rows], values, root = counts, values[counts], np.sqrt(variance[counts])
         else:
@@ -117,7 +119,7 @@ class LogModel:
             if self.log.kind == "angle":
                 out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts("twist")[0, 0]
             elif lag := row.get(FILTER, 0.0):
-                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
+                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::SUBSAMPLES]
             else:
                 out[i] = motion.at(self.times)["w"][:, 0]
         return out
@@ -131,7 +133,7 @@ class LogModel:
             parts=slice(1, 2) if self.log.kind == "speed" else slice(4, 5),
         )[1][:, 0]  # fmt: skip
         if lag:
-            response = filtered(self._fine, response.T, lag).T[::FINE]
+            response = filtered(self._fine, response.T, lag).T[::SUBSAMPLES]
         return np.asarray(response / math.sqrt(self.block))
 
     def motion(self, values: Mapping[str, float], error: Vector | None = None) -> Trajectory:
@@ -179,7 +181,7 @@ class LogModel:
     @property
     def _fine(self) -> Vector:
         count = self.times.size
-        return np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
+        return np.interp(np.arange(SUBSAMPLES * (count - 1) + 1) / SUBSAMPLES, np.arange(count), self.times)
 
 
 def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
@@ -201,7 +203,7 @@ def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
     return out
 
 
-def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
+def encoder_edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     """What an encoder tells in each sample: the angle and its variance, infinite where others tell it.
 
     Samples on one count have nearly the same error while the motor creeps, and together they tell one thing:
@@ -211,7 +213,7 @@ def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
     the last are rounded numbers, of the variance count^2/12. All this depends on the log alone: weights that
     follow the fitted motion find the torque error of a coarse start too small.
 
-    >>> angle, variance = edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
+    >>> angle, variance = encoder_edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
     >>> angle.round(2).tolist(), (12.0 * variance).round(2).tolist()
     ([0.0, 0.21, 1.0, 1.28, 2.0, 2.0, 2.0], [1.0, 0.44, inf, 0.25, inf, inf, 1.0])
     """

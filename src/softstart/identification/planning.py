@@ -15,17 +15,17 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import ErrorScales, Fitter, Point
+from softstart.identification.fitting import ErrorScales, FitPoint, Fitter
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import FRICTIONS
 from softstart.identification.unknowns import (
-    USUAL,
-    chosen,
+    DEFAULT_PARAMETERS,
+    default_parameters,
     model_parameters,
     position_is_unknown,
+    selected_parameters,
     unknowns_of,
-    usual,
 )
 from softstart.input.files import object_of
 from softstart.kernel.records import S_PHI
@@ -37,8 +37,8 @@ from softstart.start.comparison import INTERVAL
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
-PLACE: Final = -0.6  # position in the gap for which widths are stated
-CHECKED: Final = (
+STATED_POSITION: Final = -0.6  # position in the gap for which widths are stated
+CHECKED_POSITIONS: Final = (
     257  # start positions from which an experiment is simulated first, see `largest_over_position`
 )
 COARSE: Final = 4  # of these every fourth while a torque is designed, and for the travel
@@ -183,7 +183,7 @@ def plan_experiments(
     if ripple is not None:
         error = _between("ripple", ripple, "N*m", float(drive.Ms), "more is no error of the torque")
     names = _asked(free, drive)
-    aims = chosen(wanted, names, names, "this plan", key="wanted")
+    aims = selected_parameters(wanted, names, names, "this plan", key="wanted")
     test = VirtualTest(drive, period, error, names, tuple(aims), progress or (lambda _: None))
     experiments = [test.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
@@ -197,7 +197,7 @@ def plan_experiments(
             torque = _between("max_torque", most, "N*m")
         if max_travel is not None:
             travel = _between("max_travel", quantity_of(drive, "gap", max_travel, "max_travel"), "rad")
-        experiments.append(test.designed(standard, torque, travel))
+        experiments.append(test.optimised(standard, torque, travel))
     return ExperimentPlan(drive, tuple(experiments), period, error)
 
 
@@ -210,7 +210,7 @@ def _between(name: str, quantity: float | str, unit: str, most: float = math.inf
     return value
 
 
-def made_up_log(
+def simulated_log(
     drive: Drive,
     experiment: str | Experiment,
     *,
@@ -222,18 +222,18 @@ def made_up_log(
     signal: Kind = "angle",
     torque_is: TorqueIs = "demand",
 ) -> Log:
-    """A log that the exact plant makes up, with a torque error of `ripple` N m in each sample.
+    """A log simulated with the exact plant, with a torque error of `ripple` N m in each sample.
 
     It begins at a `position` in the gap and a `phase` of the encoder.
 
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08)
-    >>> made_up_log(crane, "start").kind
+    >>> simulated_log(crane, "start").kind
     'angle'
     """
     if isinstance(experiment, Experiment):
         profile, end = experiment.profile, experiment.end
     else:
-        profile, end = steps_of(*standard_levels(drive)[experiment])
+        profile, end = stepped_torque(*standard_levels(drive)[experiment])
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
     played = demand + ripple * np.random.default_rng(seed).standard_normal(time.size)
@@ -245,7 +245,7 @@ def made_up_log(
         speed = np.diff(angle, prepend=angle[0]) / log_period
     torque = demand if torque_is == "demand" else states["u"]
     values = {signal: speed if signal == "speed" else angle}
-    return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
+    return Log(time, torque, **values, torque_is=torque_is, name="simulated log")
 
 
 def _count_of(drive: Drive) -> float:
@@ -258,8 +258,10 @@ def _at_rest(drive: Drive) -> Drive:
 
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:
-    names = [name for name in usual(drive, lag=True) if float(getattr(drive, name))]
-    asked = chosen(free, names, [*USUAL, "load_torque", "torque_lag", *FRICTIONS], "this log")
+    names = [name for name in default_parameters(drive, lag=True) if float(getattr(drive, name))]
+    asked = selected_parameters(
+        free, names, [*DEFAULT_PARAMETERS, "load_torque", "torque_lag", *FRICTIONS], "this log"
+    )
     if missing := [name for name in asked if not float(getattr(drive, name))]:
         raise InputError(f"free = {show(missing[0])}: it is 0 in the drive; give a guess of it.")
     return tuple(asked)
@@ -300,7 +302,7 @@ def largest_over_position(figure: Callable[[Vector], Sequence[Vector] | Matrix],
     1.0
     """
     span, (values, counts) = float(np.ptp(places)), figure(places)
-    close = 1.01 * span / (KINKS * CHECKED)
+    close = 1.01 * span / (KINKS * CHECKED_POSITIONS)
     while True:
         steps, rises = np.diff(places), np.pad(np.abs(np.diff(values)), 1)
         room = np.maximum(rises[1:-1], np.maximum(rises[:-2], rises[2:]))
@@ -315,10 +317,10 @@ def largest_over_position(figure: Callable[[Vector], Sequence[Vector] | Matrix],
         values, counts = np.insert(values, after, more[0]), np.insert(counts, after, more[1])
 
 
-def steps_of(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
+def stepped_torque(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     """The torque of these levels, and when it ends.
 
-    >>> steps_of(np.array([0.1, 0.2]), np.array([30.0, 10.0]))[1].__round__(12)
+    >>> stepped_torque(np.array([0.1, 0.2]), np.array([30.0, 10.0]))[1].__round__(12)
     0.3
     """
     edges = np.concatenate([[0.0], np.cumsum(durations)])
@@ -339,14 +341,16 @@ class VirtualTest:
     @property
     def places(self) -> Vector:
         """Positions in the gap, from -1 to 1."""
-        return np.linspace(-1.0, 1.0, CHECKED) if position_is_unknown(self.drive) else np.zeros(1)
+        return np.linspace(-1.0, 1.0, CHECKED_POSITIONS) if position_is_unknown(self.drive) else np.zeros(1)
 
     def experiment(self, name: str, durations: Vector, levels: Vector) -> Experiment:
         """What these levels would tell, and how they load the drive."""
         self.progress(name)
-        profile, end = steps_of(durations, levels)
+        profile, end = stepped_torque(durations, levels)
         widths = self.widths(profile, end, SAMPLES)
-        return Experiment(name, profile, end, widths, *self.load(profile, end), self.score(widths))
+        return Experiment(
+            name, profile, end, widths, *self.worst_peak_and_travel(profile, end), self.score(widths)
+        )
 
     def score(self, widths: dict[str, float]) -> float:
         """Of logarithms, so that units do not matter: A-optimal.
@@ -365,7 +369,7 @@ class VirtualTest:
         time = np.arange(0.0, end + 0.5 * period, period)
         log = Log.planned(time, profile.at(time))
         unknowns = unknowns_of(self.free, drive, [log], [position_is_unknown(drive)])
-        numbers = {POSITION: PLACE, "offset": 0.0}
+        numbers = {POSITION: STATED_POSITION, "offset": 0.0}
         values = [numbers.get(one.name, getattr(drive, one.name, 0.0)) for one in unknowns]
         x = np.array([one.number(float(value)) for one, value in zip(unknowns, values, strict=True)])
         signal = LogModel.of(log, _at_rest(drive), SAMPLES).signals([model_parameters(unknowns, x, 0)])[0]
@@ -373,11 +377,11 @@ class VirtualTest:
             signal = np.round(signal / count) * count
         model = LogModel.of(log.changed(values=signal, count=count), _at_rest(drive), SAMPLES)
         fitter = Fitter([model], unknowns)
-        spot = fitter.spot(x, 0, np.zeros(model.blocks))
+        spot = fitter.linearize_log(x, 0, np.zeros(model.blocks))
         spot = spot._replace(jacobian=spot.rotation @ fitter.jacobian(x, 0, spot.error))
         # a longer period stands for samples left out: the same error of the torque in each of them
         sizes = ErrorScales(1.0, self.ripple * math.sqrt(self.period / period))
-        variances = np.diag(fitter.covariance(Point(x, sizes, (spot,))))
+        variances = np.diag(fitter.covariance(FitPoint(x, sizes, (spot,))))
         reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
         widths = {}
         for unknown, number, half in zip(unknowns, x.tolist(), reach, strict=True):
@@ -386,14 +390,16 @@ class VirtualTest:
                 widths[unknown.name] = share if vague or unknown.known(number, half) else math.inf
         return widths
 
-    def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
+    def worst_peak_and_travel(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
         """Largest shaft torque and travel of the load, of all positions in the gap."""
-        peak = largest_over_position(lambda places: self.loads(profile, end, places)[[0, 2]], self.places)
+        peak = largest_over_position(
+            lambda places: self.peaks_and_travels(profile, end, places)[[0, 2]], self.places
+        )
         return peak, largest_over_position(
-            lambda places: self.loads(profile, end, places)[1:], self.places[::COARSE]
+            lambda places: self.peaks_and_travels(profile, end, places)[1:], self.places[::COARSE]
         )
 
-    def loads(self, profile: TorqueProfile, end: float, places: Vector) -> Matrix:
+    def peaks_and_travels(self, profile: TorqueProfile, end: float, places: Vector) -> Matrix:
         """From each position peak of the shaft torque, travel of the load, and changes of the contact.
 
         The travel is seen at events and samples: exact for a load that friction holds, as it turns at events
@@ -411,16 +417,18 @@ class VirtualTest:
             loads[:, i] = abs(motion.shafts["peak"][0]), travel, motion.notes.gap_events
         return loads
 
-    def over(self, durations: Vector, levels: Vector, torque: float, travel: float) -> float:
+    def utilisation(self, durations: Vector, levels: Vector, torque: float, travel: float) -> float:
         """The worst of some positions over the limits."""
-        peaks, travels, _ = self.loads(*steps_of(durations, levels), self.places[::COARSE])
+        peaks, travels, _ = self.peaks_and_travels(*stepped_torque(durations, levels), self.places[::COARSE])
         return max(float(peaks.max()) / torque, float(travels.max()) / travel)
 
-    def within(self, durations: Vector, levels: Vector, torque: float, travel: float) -> Experiment | None:
+    def scaled_to_limits(
+        self, durations: Vector, levels: Vector, torque: float, travel: float
+    ) -> Experiment | None:
         """The experiment, its levels made smaller until it keeps the limits; None if hardly any is left."""
         share = 1.0
         while share > LEAST:
-            over = self.over(durations, share * levels, torque, travel)
+            over = self.utilisation(durations, share * levels, torque, travel)
             if over <= 1.0:
                 experiment = self.experiment("planned", durations, share * levels)
                 over = max(experiment.peak / torque, experiment.travel / travel)
@@ -429,11 +437,13 @@ class VirtualTest:
             share *= (1.0 - NEAR) / over
         return None
 
-    def designed(
+    def optimised(
         self, standard: dict[str, tuple[Vector, Vector]], torque: float, travel: float
     ) -> Experiment:
         """The torque within the limits that tells most, from the best of the standard ones."""
-        experiments = {name: self.within(*levels, torque, travel) for name, levels in standard.items()}
+        experiments = {
+            name: self.scaled_to_limits(*levels, torque, travel) for name, levels in standard.items()
+        }
         kept = {name: experiment for name, experiment in experiments.items() if experiment is not None}
         if not kept:
             raise InputError(
@@ -454,12 +464,12 @@ class VirtualTest:
             """Of levels within the bounds, made smaller until some positions keep the limits."""
             played = scale * np.clip(shares, lower, upper)
             for _ in range(3):
-                over = self.over(durations, played, torque, travel) + NEAR
+                over = self.utilisation(durations, played, torque, travel) + NEAR
                 if over <= 1.0:
                     break
                 played = played * (1.0 - NEAR) / over
             # a design needs the slope of what is unknown
-            widths = self.widths(*steps_of(durations, played), ROUGH, vague=True)
+            widths = self.widths(*stepped_torque(durations, played), ROUGH, vague=True)
             tried.append((self.score(widths), played))
             return math.log(tried[-1][0])
 
@@ -468,7 +478,7 @@ class VirtualTest:
         draws = [levels / scale, *generator.uniform(lower, upper, (DRAWS, levels.size))]
         minimize(score, min(draws, key=score), method="COBYLA", options={"rhobeg": SPREAD, "maxiter": TRIALS})
         tried.sort(key=lambda experiment: experiment[0])
-        exact = (self.within(durations, played, torque, travel) for _, played in tried[:EXACTLY])
+        exact = (self.scaled_to_limits(durations, played, torque, travel) for _, played in tried[:EXACTLY])
         return min(
             (experiment for experiment in (kept[seed], *exact) if experiment is not None),
             key=lambda experiment: experiment.score,

@@ -98,9 +98,9 @@ class Identification(Result, view="identification.identification_sheet"):
     Examples
     --------
     >>> from softstart import identify
-    >>> from softstart.identification.planning import made_up_log
+    >>> from softstart.identification.planning import simulated_log
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
-    >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
+    >>> found = identify(simulated_log(crane, "two levels, then reverse", ripple=1.0), crane, searches=2)
     >>> [one.name for one in found.estimates if not one.known]
     []
     """

@@ -16,7 +16,15 @@ from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
-from softstart.identification.fitting import MOST_RIPPLE, STEP, ErrorScales, Fitter, Point, Spot, agreeing
+from softstart.identification.fitting import (
+    MOST_RIPPLE,
+    STEP,
+    ErrorScales,
+    FitPoint,
+    Fitter,
+    LogLinearization,
+    agreeing_searches,
+)
 from softstart.identification.log_files import MOTIONS, SIGNALS
 from softstart.identification.logs import TURN, Log
 from softstart.identification.model import FILTER, POSITION, LogModel
@@ -24,20 +32,20 @@ from softstart.identification.result import AT_LIMIT, FRICTIONS, Estimate, Ident
 from softstart.identification.unknowns import (
     FREE,
     Unknown,
-    chosen,
+    default_parameters,
     model_parameters,
     position_is_unknown,
+    selected_parameters,
     unknowns_of,
-    usual,
 )
 from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps of a chain, at the motor shaft
-SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
+SIGNIFICANT: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
-FAR: Final = 5.0  # standard deviations that hardly a sample is off
+OUTLIER: Final = 5.0  # standard deviations that hardly a sample is off
 UNSETTLED: Final = 4.0  # gain of the likelihood by another step, from which the fit is none
 CHANCE, INDEPENDENT = 1e-5, 1e-4  # that errors alone leave such a slow torque, such correlations
 WAVES: Final = 20  # torques that change slowly, of which none must be left
@@ -94,10 +102,10 @@ def identify(
 
     Examples
     --------
-    >>> from softstart.identification.planning import made_up_log
+    >>> from softstart.identification.planning import simulated_log
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
     >>> guess = crane.replace(gap=0.2, stiffness=200.0, load_inertia=0.4)
-    >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), guess, searches=2)
+    >>> found = identify(simulated_log(crane, "two levels, then reverse", ripple=1.0), guess, searches=2)
     >>> found["gap"].lower < 0.08 < found["gap"].upper
     True
 
@@ -109,7 +117,7 @@ def identify(
     machine = as_machine(drive)
     drive = reduced_drive(machine)
     given_logs = [logs] if isinstance(logs, Log) else logs
-    read = [_directed(one.summed(float(drive.encoder_lines)), drive) for one in given_logs]
+    read = [_directed(one.integrated(float(drive.encoder_lines)), drive) for one in given_logs]
     if not read or searches < 1:
         raise InputError("logs, searches: there is none; give a log and a whole number of 1 or more.")
     names, moving = _free(free, drive, read)
@@ -122,23 +130,23 @@ def identify(
     fitter = Fitter([LogModel.of(one, base) for one in read], unknowns, progress or (lambda _: None))
     minima = fitter.search(searches)
     fitter.progress("weights and fit")
-    best, others = fitter.refined(minima[0][0]), list[Point]()
-    misfit_warnings = misfits(fitter, best)
+    best, others = fitter.most_likely(minima[0][0]), list[FitPoint]()
+    misfit_warnings = model_mismatch(fitter, best)
     if not misfit_warnings:
-        seek, best = _untold(fitter, best), fitter.valued(best, best)
+        seek, best = _any_undetermined(fitter, best), fitter.with_likelihood(best, best)
         if seek:
             fitter.progress("other explanations")
             best, others = fitter.explanations(best)
-        misfit_warnings = misfits(fitter, best)
+        misfit_warnings = model_mismatch(fitter, best)
     estimates = _without_intervals(unknowns, best.x) if misfit_warnings else _estimates(fitter, best, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     source = f"identified from {', '.join(one.name for one in read)}"
     identified = drive.replace(**changes, source=source + (f"; else: {drive.source}" if drive.source else ""))
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
-        *_left_out(machine),
-        *(misfit_warnings or _unknown(estimates)),
-        *_other_scale(drive, identified),
+        *_neglected_modes(machine),
+        *(misfit_warnings or _unknown_parameters(estimates)),
+        *_scale_warning(drive, identified),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
     ]
@@ -150,9 +158,9 @@ def identify(
         correlations=_correlations(fitter, best),
         ripple=best.sizes.ripple,
         searches=len(minima),
-        agreed=agreeing(minima),
+        agreed=agreeing_searches(minima),
         notes=tuple(notes),
-        residuals=tuple(fitter.left(best)),
+        residuals=tuple(fitter.unscaled_residuals(best)),
     )
 
 
@@ -191,7 +199,7 @@ def reduced_drive(machine: Any) -> Drive:
     return machine.two_masses
 
 
-def _left_out(chain: Any) -> list[str]:
+def _neglected_modes(chain: Any) -> list[str]:
     """What the reduction of more than two masses leaves out."""
     if len(chain.mass_names) <= 2:
         return []
@@ -206,8 +214,8 @@ def _left_out(chain: Any) -> list[str]:
 def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[list[str], bool]:
     """The parameters to find, and whether the position of each log is among them."""
     demand = any(log.torque_is == "demand" for log in logs)
-    names = usual(drive, lag=demand) + ([POSITION] if position_is_unknown(drive) else [])
-    chosen_names = chosen(free, names, (*FREE, POSITION), "logs")
+    names = default_parameters(drive, lag=demand) + ([POSITION] if position_is_unknown(drive) else [])
+    chosen_names = selected_parameters(free, names, (*FREE, POSITION), "logs")
     reasons = {}
     if any(log.kind == "angle" for log in logs):
         reasons[FILTER] = "an angle has no filter of the speed; leave it out."
@@ -226,7 +234,7 @@ def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tupl
 
 def _check_inertia(log: Log, drive: Drive) -> None:
     """Refuse a log whose units cannot be right: torque over acceleration is far from the inertia guessed."""
-    speed, impulse = log.moved
+    speed, impulse = log.speed_and_impulse
     inertia = float(np.max(np.abs(impulse))) / max(float(np.max(np.abs(speed))), 1e-300)
     low, high = float(drive.J1), float(drive.J1 + drive.J2)
     if low / SUSPECT <= inertia <= high * SUSPECT:
@@ -255,9 +263,9 @@ def _check_step(log: Log, lines: float) -> None:
             )
 
 
-def _untold(fitter: Fitter, best: Point) -> bool:
+def _any_undetermined(fitter: Fitter, best: FitPoint) -> bool:
     """Whether there is a number that the logs do not tell, were all intervals symmetric."""
-    fits = zip(fitter.unknowns, best.x.tolist(), fitter.halves(best).tolist(), strict=True)
+    fits = zip(fitter.unknowns, best.x.tolist(), fitter.half_widths(best).tolist(), strict=True)
     return any(
         unknown.kind != "offset" and not unknown.known(x, half, unknown.guess) for unknown, x, half in fits
     )
@@ -272,7 +280,7 @@ def _without_intervals(unknowns: Sequence[Unknown], x: Vector) -> list[Estimate]
     ]
 
 
-def _correlations(fitter: Fitter, best: Point) -> Matrix:
+def _correlations(fitter: Fitter, best: FitPoint) -> Matrix:
     """Of the estimates; the further forward a position, the smaller its number in the fit."""
     covariance = fitter.covariance(best)
     signs = [-1.0 if unknown.kind == "position" else 1.0 for unknown in fitter.unknowns]
@@ -281,10 +289,10 @@ def _correlations(fitter: Fitter, best: Point) -> Matrix:
     return np.asarray((covariance / np.outer(sizes, sizes))[:kept, :kept])
 
 
-def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Estimate]:
+def _estimates(fitter: Fitter, best: FitPoint, others: Sequence[FitPoint]) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
     estimates, lost = [], set[str]()
-    halves, covariance = fitter.halves(best), fitter.covariance(best)
+    halves, covariance = fitter.half_widths(best), fitter.covariance(best)
     for i, (unknown, x, half) in enumerate(
         zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)
     ):
@@ -295,7 +303,7 @@ def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Est
         known = unknown.known(x, half, unknown.guess) and unknown.known(x, 0.5 * (ends[1] - ends[0]))
         known = known and not (unknown.kind == "position" and "gap" in lost)  # a share of the gap
         limited = unknown.limited(x) or (known and any(map(unknown.limited, ends)))
-        reason = AT_LIMIT if limited else "" if known else _why(i, covariance, fitter.unknowns)
+        reason = AT_LIMIT if limited else "" if known else _reason(i, covariance, fitter.unknowns)
         if reason:
             lost.add(unknown.name)
         lower, upper = sorted(map(unknown.value, ends))
@@ -303,7 +311,7 @@ def _estimates(fitter: Fitter, best: Point, others: Sequence[Point]) -> list[Est
     return estimates
 
 
-def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
+def _reason(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
     """With what an unknown number goes together, or that nothing depends on it."""
     sizes = np.sqrt(np.diag(covariance))
     ratio = np.abs(covariance[i] / (sizes[i] * sizes))
@@ -315,7 +323,7 @@ def _why(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
     return "the motion of the motor hardly depends on it in these logs"
 
 
-def _unknown(estimates: Sequence[Estimate]) -> list[str]:
+def _unknown_parameters(estimates: Sequence[Estimate]) -> list[str]:
     """What is unknown, why, and what helps."""
     reasons: dict[str, list[str]] = {}
     for estimate in estimates:
@@ -330,7 +338,7 @@ def _unknown(estimates: Sequence[Estimate]) -> list[str]:
     return [f"Unknown: {groups}. Remedy: {remedy}."]
 
 
-def _other_scale(guess: Drive, identified: Drive) -> list[str]:
+def _scale_warning(guess: Drive, identified: Drive) -> list[str]:
     """A wrong unit of speed or angle is explained by another drive: only the guess can tell."""
     ratio = float((identified.J1 + identified.J2) / (guess.J1 + guess.J2))
     if 1.0 / DOUBTFUL < ratio < DOUBTFUL:
@@ -342,7 +350,7 @@ def _other_scale(guess: Drive, identified: Drive) -> list[str]:
     ]
 
 
-def misfits(fitter: Fitter, best: Point) -> list[str]:
+def model_mismatch(fitter: Fitter, best: FitPoint) -> list[str]:
     """What the logs show that the model has not."""
     sizes, largest, shown = best.sizes, fitter.largest_torque, list[str]()
     usual_torque = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
@@ -355,8 +363,8 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
         left = spot.innovations(sizes)
         if (chance := _whiteness(left)) < INDEPENDENT:
             shown.append(f"{model.log.name}: errors not independent of each other (chance {chance:.1g})")
-        if (far := int(np.sum(np.abs(left) > FAR))) > 2 + 0.005 * left.size:
-            shown.append(f"{model.log.name}: {far} samples more than {FAR:g} standard deviations off")
+        if (far := int(np.sum(np.abs(left) > OUTLIER))) > 2 + 0.005 * left.size:
+            shown.append(f"{model.log.name}: {far} samples more than {OUTLIER:g} standard deviations off")
     notes = _effects(fitter, best)
     if shown:
         notes.append(
@@ -382,7 +390,7 @@ def misfits(fitter: Fitter, best: Point) -> list[str]:
     return notes
 
 
-def _effects(fitter: Fitter, best: Point) -> list[str]:
+def _effects(fitter: Fitter, best: FitPoint) -> list[str]:
     """The friction, or the offset of the torque, that explains most of what is left, if it is sure."""
     residual, jacobian = best.white
     names, drive = {one.name for one in fitter.unknowns}, fitter.models[0].guess
@@ -397,7 +405,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
         shapes = [(one - signals[0]) / step for one, step in zip(signals[1:], steps.values(), strict=True)]
         shapes.append(model.log.sign * math.sqrt(model.block) * spot.response.sum(axis=1))
         logs.append(np.array(shapes) @ spot.rotation.T / np.sqrt(spot.variance(best.sizes)))
-    sure = [(SURE, "", 0.0, 0.0)]
+    sure = [(SIGNIFICANT, "", 0.0, 0.0)]
     for name, shape in zip((*steps, "offset"), np.hstack(logs), strict=True):
         alone = shape - jacobian @ np.linalg.lstsq(jacobian, shape, rcond=None)[0]
         strength = float(alone @ alone)
@@ -422,7 +430,7 @@ def _effects(fitter: Fitter, best: Point) -> list[str]:
     ]
 
 
-def _slow_torque(spot: Spot, sizes: ErrorScales) -> float:
+def _slow_torque(spot: LogLinearization, sizes: ErrorScales) -> float:
     """Chance that no torque that changes slowly is left: the share of it in what is left is chi-square.
 
     Of the torques cos(k pi t/T), of which the parameters explain a part.

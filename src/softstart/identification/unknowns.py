@@ -18,10 +18,10 @@ from softstart.identification.model import FILTER, POSITION
 from softstart.identification.result import FRICTIONS, WIDEST
 from softstart.quantities import show
 
-USUAL: Final = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
-FREE: Final = (*USUAL, "load_torque", "torque_lag", "computing_delay", *FRICTIONS, FILTER)
+DEFAULT_PARAMETERS: Final = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
+FREE: Final = (*DEFAULT_PARAMETERS, "load_torque", "torque_lag", "computing_delay", *FRICTIONS, FILTER)
 FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 times as far
-LESS_KNOWN: Final = ("damping", "torque_lag", "computing_delay", FILTER)  # and these a factor of 100
+WIDE_RANGE: Final = ("damping", "torque_lag", "computing_delay", FILTER)  # and these a factor of 100
 MOST_LOAD: Final = 0.99  # of the starting torque: with more the drive could not start
 MOST_FRICTION: Final = 3.0  # units; as far as a search goes
 LEAST_FRICTION: Final = 1e-8  # units; less is none, which the plant's events could not tell from rounding
@@ -87,7 +87,7 @@ class Unknown:
             return math.log(value / self.scale)
         return float((value / self.scale) ** self.power)
 
-    def drawn(self, draw: float) -> float:
+    def search_start(self, draw: float) -> float:
         """The x at which a search begins, for a number drawn from 0 to 1."""
         factor = FACTOR ** (2.0 * draw - 1.0)
         if self.kind == "position":
@@ -144,7 +144,7 @@ def unknowns_of(
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
             value = 0.04 * math.sqrt(float(drive.c * drive.J1 * drive.J2 / (drive.J1 + drive.J2)))
         value = value or min(float(np.median(np.diff(one.time))) for one in logs)
-        reach = 100.0 if name in LESS_KNOWN else 3.0 * FACTOR
+        reach = 100.0 if name in WIDE_RANGE else 3.0 * FACTOR
         if power is None:
             middle, end, sign = math.log(abs(value)), math.log(reach), math.copysign(1.0, value)
             unknowns.append(Unknown(name, "logarithm", middle, middle - end, middle + end, sign))
@@ -177,20 +177,22 @@ def position_is_unknown(drive: Drive) -> bool:
     return (drive.start_position == "unknown" or drive.rests) and float(drive.gap) > 0.0
 
 
-def usual(drive: Drive, *, lag: bool) -> list[str]:
+def default_parameters(drive: Drive, *, lag: bool) -> list[str]:
     """What is found where nothing is said: what the drive has, and the lag of its torque if that shows.
 
-    >>> usual(Drive.load("crane-4amtkf").replace(motor_friction=1.5), lag=True)[-2:]
+    >>> default_parameters(Drive.load("crane-4amtkf").replace(motor_friction=1.5), lag=True)[-2:]
     ['load_torque', 'motor_friction']
     """
     others = ["load_torque", *(["torque_lag"] if lag else []), *FRICTIONS]
     needed = {"gap", *others}
-    return [name for name in (*USUAL, *others) if name not in needed or float(getattr(drive, name))]
+    return [
+        name for name in (*DEFAULT_PARAMETERS, *others) if name not in needed or float(getattr(drive, name))
+    ]
 
 
-def chosen(
+def selected_parameters(
     free: Iterable[str] | None,
-    usual: Sequence[str],
+    default_parameters: Sequence[str],
     possible: Sequence[str],
     where: str,
     key: str = "free",
@@ -199,13 +201,13 @@ def chosen(
 
     Names of the drive file stand for those of Python. `where` says what cannot tell any other parameter.
 
-    >>> chosen(["+motor.friction"], ["gap", "stiffness"], FREE, "logs")
+    >>> selected_parameters(["+motor.friction"], ["gap", "stiffness"], FREE, "logs")
     ['gap', 'stiffness', 'motor_friction']
     """
     if free is None:
-        return list(usual)
+        return list(default_parameters)
     texts, paths = list(free), {parameter.path: name for name, parameter in PARAMETERS.items()}
-    names = list(usual) if any(name.startswith("+") for name in texts) else []
+    names = list(default_parameters) if any(name.startswith("+") for name in texts) else []
     for text in texts:
         name = paths.get(text.removeprefix("+"), text.removeprefix("+"))
         if name not in possible:

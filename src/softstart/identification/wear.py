@@ -22,8 +22,8 @@ from softstart.results import Result
 from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
-NOT_BY_CHANCE: Final = 3.0  # standard deviations by which a parameter has changed
-CROOKED: Final = 0.01  # chance below which the gap does not grow along a line
+SIGNIFICANT: Final = 3.0  # standard deviations by which a parameter has changed
+NOT_LINEAR: Final = 0.01  # chance below which the gap does not grow along a line
 
 
 @dataclass(frozen=True)
@@ -162,10 +162,10 @@ def follow_wear(
     Examples
     --------
     >>> from softstart import Drive, identify
-    >>> from softstart.identification.planning import made_up_log
+    >>> from softstart.identification.planning import simulated_log
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
     >>> plan = {"log_period": 8e-3, "ripple": 1.0}
-    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
+    >>> each = [identify(simulated_log(one, "two levels, then reverse", **plan), one, searches=1)
     ...     for one in (crane, crane.replace(gap=0.1))]
     >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15)
     >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
@@ -231,7 +231,7 @@ def _date_after(first: date, years: float) -> date | None:
 def _notes(identifications: Sequence[Identification], line: Line) -> list[str]:
     """What else has changed, and what the line cannot tell."""
     notes = []
-    if line.chance < CROOKED:
+    if line.chance < NOT_LINEAR:
         notes.append(
             f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
             "runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the intervals."
@@ -242,7 +242,7 @@ def _notes(identifications: Sequence[Identification], line: Line) -> list[str]:
     )
     for name in (name for name in first if name in last and name != "gap"):
         both = first[name], last[name]
-        if abs(both[1].value - both[0].value) > NOT_BY_CHANCE * math.hypot(*map(_deviation, both)):
+        if abs(both[1].value - both[0].value) > SIGNIFICANT * math.hypot(*map(_deviation, both)):
             notes.append(
                 f"{name} has changed from {both[0].value:.4g} to {both[1].value:.4g}, by more than its "
                 "intervals: another load or temperature, wear of more than the gap, or, if it is an inertia, "

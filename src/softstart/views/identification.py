@@ -172,9 +172,9 @@ def plan_sheet(plan: ExperimentPlan) -> Sheet:
 
 def _write_log(plan: ExperimentPlan, one: Experiment, path: Path) -> None:
     """A simulated log of an experiment."""
-    from softstart.identification.planning import made_up_log
+    from softstart.identification.planning import simulated_log
 
-    log = made_up_log(plan.drive, one, log_period=plan.log_period, ripple=plan.ripple)
+    log = simulated_log(plan.drive, one, log_period=plan.log_period, ripple=plan.ripple)
     log.to_csv(path, SIMULATED)
 
 

@@ -27,7 +27,7 @@ from softstart import (
 from softstart.chain import Mass, Shaft
 from softstart.cli.options import drive_names, read_value_list
 from softstart.clutch import Clutch, engage
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.optimal.front import pareto
 from softstart.plugins import controller_names
 from softstart.quantities import to_si
@@ -299,7 +299,7 @@ def test_commands_go_on_with_the_chain_itself(run, as_json):
 
 @pytest.mark.slow
 def test_a_log_becomes_a_drive_file(run, tmp_path):
-    log = made_up_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
+    log = simulated_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
     log.to_csv(tmp_path / "a.csv")
     guess = TRUTH.replace(gap=0.2, stiffness=200, load_inertia=0.4, damping=0.9)
     (tmp_path / "guess.toml").write_text(guess.to_toml(), encoding="utf-8")

@@ -16,7 +16,7 @@ import pytest
 from tests.patience import patient
 
 from softstart import __version__
-from softstart.cli.commands import COMMANDS, cli
+from softstart.cli.commands import COMMANDS, cli, first_sentences
 from softstart.cli.running import COMPILING, working
 
 HEAVY = ("casadi", "control", "matplotlib", "nicegui", "numba", "scipy.linalg", "xarray")
@@ -64,10 +64,12 @@ def test_greeting_help_and_version(run):
     told = run("--help").out
     assert all(f"  {command} " in told for command in COMMANDS)
     context = click.Context(cli, **cli.context_settings)
-    for name, (_, sentence) in COMMANDS.items():
+    for name in COMMANDS:
         command = cli.get_command(context, name)
         assert command.get_help_option(click.Context(command, parent=context)).opts == ["-h", "--help"]
-        assert (command.name, " ".join(command.help.split("\n\n")[0].split())) == (name, sentence)
+        assert command.name == name
+        assert first_sentences(COMMANDS[name])[f"{name}_command"] == command.help.split("\n\n")[0]
+        assert all(one.help for one in command.params if isinstance(one, click.Option))
         assert "{" not in command.get_help(click.Context(command))  # no placeholder is left
 
 

@@ -13,7 +13,7 @@ import pytest
 from tests.softstart.test_identification import TRUTH as UNKNOWN
 
 from softstart import Identification, InputError, follow_wear, identify
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.identification.wear import Line
 
 TRUTH = UNKNOWN.replace(start_position="mid-gap")
@@ -21,7 +21,7 @@ TRUTH = UNKNOWN.replace(start_position="mid-gap")
 
 @pytest.fixture(scope="module")
 def new() -> Identification:
-    log = made_up_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
+    log = simulated_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
     return identify(log, TRUTH, searches=1)
 
 

@@ -30,7 +30,7 @@ from softstart import (
     tune,
 )  # fmt: skip
 from softstart.controller import make_controller
-from softstart.identification.planning import made_up_log
+from softstart.identification.planning import simulated_log
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
@@ -113,7 +113,7 @@ def test_checks_say_why_a_part_is_missing() -> None:
 @pytest.mark.slow
 def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     drive = CRANE.replace(load_kind="reactive", gap=0.08, damping=0.3, start_position="mid-gap")
-    log = made_up_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
+    log = simulated_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
     log.to_csv(tmp_path / "rig.csv")
     content = (tmp_path / "rig.csv").read_bytes()
     found, text, _ = done(tasks.identified, content, "rig.csv", drive, "demand", {})
