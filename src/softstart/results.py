@@ -20,34 +20,6 @@ if TYPE_CHECKING:
 LONGEST_TEXT = 60  # characters of a text in a repr
 
 
-class Sentence(str):
-    """A sentence of a result: the fact, then advice to the person who gives the input.
-
-    As text it is both. A report for a customer shows `fact` alone, the page `fact` and its own advice.
-
-    >>> sentence = Sentence("The position is unknown.", "Give start.position.", page="Choose a position.")
-    >>> print(sentence)
-    The position is unknown. Give start.position.
-    >>> sentence.fact, sentence.on_page
-    ('The position is unknown.', 'The position is unknown. Choose a position.')
-    """
-
-    fact: str
-    advice: str
-    on_page: str
-
-    def __new__(cls, fact: str, advice: str = "", page: str | None = None) -> Sentence:
-        self = super().__new__(cls, f"{fact} {advice}".strip())
-        self.fact, self.advice = fact, advice
-        self.on_page = f"{fact} {advice if page is None else page}".strip()
-        return self
-
-
-def fact_of(text: str) -> str:
-    """A sentence without its advice."""
-    return text.fact if isinstance(text, Sentence) else text
-
-
 class OneLine:
     """A result whose repr is one line: its numbers and texts, and the size of what is large.
 

@@ -12,7 +12,7 @@ from softstart.controller.finding import ready_controller_names
 from softstart.drive import library
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
-from softstart.start.recommendation import _unbeaten, flags
+from softstart.start.recommendation import _pareto_set, flags
 
 CRANE = Drive.load("crane-4amtkf")
 HOIST = Drive.load("hoist-15kw")
@@ -56,7 +56,7 @@ def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
                 words = {flag.word.split()[0] for flag in flags(run, direct)}
                 slow = run.settled_time > 2.0 * direct.settled_time
                 assert slow == ("slow" in words), (name, position, one)
-                assert (run.k_dyn > 1.001 * direct.k_dyn) == ("harder" in words)
+                assert (run.k_dyn > 1.001 * direct.k_dyn) == ("K_dyn" in words)
                 assert not math.isnan(run.settled_time)
 
 
@@ -66,7 +66,7 @@ def test_thresholds_of_flags_and_of_what_another_strategy_beats():
     def run(k_dyn, settled_time=1.0):
         return SimpleNamespace(k_dyn=k_dyn, settled_time=settled_time, start_time=1.0, drive=CRANE)
 
-    for found, word in ((run(1.0009), ""), (run(1.0011), "harder"), (run(1.0, 1.999), ""),
+    for found, word in ((run(1.0009), ""), (run(1.0011), "K_dyn"), (run(1.0, 1.999), ""),
                         (run(1.0, 2.001), "slow")):  # fmt: skip
         assert [one.word.split()[0] for one in flags(found, run(1.0))] == [word] * bool(word)
     direct = SimpleNamespace(run=run(2.0), effort=Effort.CONTACTOR)
@@ -77,7 +77,7 @@ def test_thresholds_of_flags_and_of_what_another_strategy_beats():
         (1.0, 1.00009, "r"),
     ):
         other = SimpleNamespace(run=run(k, time), effort=Effort.RAMPS)
-        best = _unbeaten([other, direct])
+        best = _pareto_set([other, direct])
         assert "".join("d" if one is direct else "r" for one in best) == names
 
 
@@ -93,7 +93,7 @@ def test_flagged_strategies_are_never_recommended():
 
     found = compare(HOIST, ["direct", "s-curve", Swinging()])
     flagged = {row.name: row.flags for row in found.rows if row.flags}
-    assert any("harder" in flag.word for flag in flagged["swinging"])
+    assert any("K_dyn" in flag.word for flag in flagged["swinging"])
     assert not {row.name for row in found.recommendation.best} & set(flagged)
 
 

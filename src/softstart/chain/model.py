@@ -39,7 +39,7 @@ from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machin
 from softstart.drive.checks import wrong_units
 from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import TwoMasses
-from softstart.errors import InputError
+from softstart.errors import InputError, Sentence
 from softstart.hints import did_you_mean, nearest
 from softstart.input.documents import DocumentTable, construct, document_text, read_document
 from softstart.input.gear import NO_OUTPUT
@@ -341,8 +341,10 @@ class Chain(Machine):
             return tuple(fixed)
         return (
             *fixed,
-            "Nothing damps this chain: its light masses rattle in the gaps indefinitely, and late contacts "
-            "decide the peaks. Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
+            Sentence(
+                "This chain is undamped; late contacts of light masses determine the peaks.",
+                "Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
+            ),
         )
 
     # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------

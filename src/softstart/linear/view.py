@@ -230,15 +230,11 @@ def linear_view(
     if point is not None and point.feeds_back and point.is_sampled:
         loop = Loop(start, point, at_one_position(drive))
         return LinearView(drive, start.controller, "loop", _notes(name, run, loop), run, loop)
-    kind = "open loop"
-    sentence = f"{name} acts open loop: in contact nothing it measures changes its torque demand; "
+    kind, why = "open loop", "is open-loop in contact (no measurement affects its demand)"
     if point is None or point.feeds_back:
-        kind = "events"
-        sentence = (
-            f"{name} has no sampled loop: in contact it does not make a new demand, held until the next, at "
-            "each of equal periods; "
-        )
-    return LinearView(drive, start.controller, kind, (f"{sentence}margins do not apply.",), run)
+        kind, why = "events", "has no sampled loop in contact (no new demand at equal periods)"
+    notes = (f"{name} {why}: stability margins do not apply.",)
+    return LinearView(drive, start.controller, kind, notes, run)
 
 
 def _notes(name: str, run: SampledRun, loop: Loop) -> tuple[str, ...]:

@@ -91,7 +91,7 @@ def best_start(machine: Any) -> str:
 
 def best_k_dyn(machine: Any) -> str:
     """What its K_dyn is called."""
-    return "K_dyn of the best fixed profile" if len(machine.positions) > 1 else "least K_dyn"
+    return "K_dyn of the best fixed profile" if len(machine.positions) > 1 else "minimum K_dyn"
 
 
 @dataclass(frozen=True)

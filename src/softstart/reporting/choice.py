@@ -104,7 +104,7 @@ class Choice(OneLine):
     @property
     def role(self) -> str:
         """What the chosen one is, in a word or two."""
-        return "gentlest unbeaten" if self.recommendation.recommended is None else "recommended"
+        return "lowest K_dyn" if self.recommendation.recommended is None else "recommended"
 
     def worst(self, row: Row) -> float:
         """Largest K_dyn over the map; without one that of the start."""

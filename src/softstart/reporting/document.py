@@ -13,20 +13,21 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
+from matplotlib.patches import Rectangle
 
 from softstart.drive import plausibility
-from softstart.errors import listed
+from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
-from softstart.reporting import choice, figures, limit
+from softstart.reporting import choice, limit
 from softstart.reporting.resolution import rated_torque
 from softstart.reporting.result import Report
 from softstart.start import fatigue
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
-from softstart.views import chains, drives, starts
+from softstart.views import chains, drives, starts, traces
 from softstart.views import fatigue as lives
-from softstart.views.drawing import drawing
+from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_map, literal, panels, svg_of
 from softstart.views.numbers import (
     RPM,
     Column,
@@ -78,15 +79,6 @@ def with_comma(text: str, comma: bool) -> str:
     return _DECIMAL.sub(r"\1,\2", text) if comma else text
 
 
-def for_customer(text: str) -> str:
-    """A text without what it tells the author to give.
-
-    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
-    'It depends. Nothing damps.'
-    """
-    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
-
-
 def css_string(text: str) -> Markup:
     """Any text as a string of CSS that ends nowhere but at its end, cut where it is too long.
 
@@ -114,7 +106,7 @@ def columns(heads: str | list[Column]) -> list[Column]:
 FILTERS = {
     "digits": digits, "fixed": fixed, "short": lambda value: printed(short(value)),
     "percent": percent, "listed": listed, "times": times, "factor": lives.factor,
-    "printed": printed, "for_customer": for_customer,
+    "printed": printed, "fact": fact_of,
     "css_string": css_string,
     "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
     "short4": lambda value: printed(short(float(f"{value:.4g}"))), "columns": columns,
@@ -152,7 +144,7 @@ def document(report: Report) -> str:
     page = plain.overlay(finalize=finalize)
 
     def svg(figure: Any, key: str, title: str) -> Markup:
-        return in_page(figures.svg(figure, key, title))
+        return in_page(svg_of(figure, key, title))
 
     def in_page(text: str) -> Markup:
         return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
@@ -189,12 +181,13 @@ def document(report: Report) -> str:
         "ends": starts.both_ends(report.comparison),
         "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units_of(drive),
         "most_torque": report.most_torque,
-        "rated": rated_torque(drive.design_drive), "shown_until": figures.shown_until(report.ordered),
+        "rated": rated_torque(drive.design_drive), "shown_until": traces.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
         "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
         "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
-        "at_output": at_output, "best_start": best_start, "figures": figures, "starts": starts,
+        "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
+        "maps_figure": maps_figure, "starts": starts,
         "chains": chains, "lives": lives,
         "output": "|#at the output, N m" if drive.gear else "", "strategies": strategies,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
@@ -205,6 +198,44 @@ def document(report: Report) -> str:
     }  # fmt: skip
     with drawing():  # a name may have characters that the font of the figures has not
         return page.get_template("report.html.j2").render(values)
+
+
+def limit_figure(report: Report) -> Any:
+    """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
+    rows = [row for row in report.comparison.rows if not math.isnan(row.run.start_time)]
+    curve = report.limit
+    return traces.trade_off_figure(
+        [(row.name, row.run.start_time, row.run.k_dyn) for row in rows],
+        filled=[index for index, row in enumerate(rows) if row in report.choice.of_sheets],
+        optima=[(p.start_time_bound, p.k_dyn) for p in curve.found if p.k_dyn is not None],
+        best=f"{best_start(report.drive)} found",
+        bound=list(zip(curve.times, curve.bounds, strict=True)),
+    )
+
+
+def maps_figure(report: Report) -> Any:
+    """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
+    drive, units = report.drive, units_of(report.drive)
+    maps = {row.name: report.choice.maps[row.name] for row in report.choice.mapped}
+    first = next(iter(maps.values()))
+    gaps = [f"{units.shown(gap, 'rad'):.4g}" for gap in first.gaps]
+    inertias = [f"{inertia:.3g}" for inertia in first.inertias]
+    # the cell of the drive as it is
+    i, j = (
+        min(range(len(axis)), key=lambda k: abs(axis[k] - value))
+        for axis, value in ((first.gaps, float(drive.gap)), (first.inertias, float(drive.J2)))
+    )
+    scale = colour_scale(*(one.k_dyn for one in maps.values()))
+    with drawing():
+        size = (3.5, 0.7 + 0.22 * max(len(gaps), 2))
+        figure, axes = panels(len(maps), size, 2, "load inertia J2, kg m²", f"gap, {units.angle}")
+        for panel, (name, one) in zip(axes, maps.items(), strict=True):
+            heat_map(panel, inertias, gaps, one.k_dyn, scale, decimals=2)
+            box = Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, fc="none", ec=COLOURS[1], lw=2.0, zorder=5)
+            panel.add_patch(box)
+            worst = f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
+            panel.set_title(f"{literal(name)}: {worst}", loc="left", fontsize=SMALL)
+    return figure
 
 
 def inverters() -> dict[str, Any]:

@@ -20,7 +20,7 @@ from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
-from softstart.errors import InputError, Mistakes, SimulationError
+from softstart.errors import InputError, Mistakes, SimulationError, fact_of
 from softstart.input.files import write_whole
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
@@ -170,7 +170,7 @@ class Report(Result):
         try:
             return fatigue([row.run for row in self.comparison.rows])
         except (InputError, SimulationError) as error:
-            return " ".join(getattr(error, "sentences", [str(error)]))
+            return " ".join(map(fact_of, getattr(error, "sentences", [str(error)])))
 
     @cached_property
     def life_gain(self) -> float | None:
@@ -303,7 +303,7 @@ def report(
     --------
     >>> found = report("crane-4amtkf", controllers=["ramp", "shaped"], budget=0.0)
     >>> found
-    <Report: shaped, K_dyn 1.003, gentlest unbeaten, for Crane travel drive 4AMTKF(H)112L6>
+    <Report: shaped, K_dyn 1.003, lowest K_dyn, for Crane travel drive 4AMTKF(H)112L6>
     >>> found.choice.ordinary.name
     'ramp'
 

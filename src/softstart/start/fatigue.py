@@ -12,7 +12,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
 from softstart.drive import SNCurve
-from softstart.errors import InputError
+from softstart.errors import InputError, Sentence
 from softstart.kernel import records as rec
 from softstart.quantities import number_in
 from softstart.results import OneLine, Result
@@ -513,15 +513,22 @@ def _check_shafts(machine: Any) -> None:
     columns = zip(machine.shaft_names, machine.stiffnesses, machine.gaps, strict=True)
     if rigid := [name for name, c, gap in columns if math.isinf(c) and gap > 0.0]:
         raise InputError(
-            f"stiffness is infinite in {', '.join(rigid)}: the impacts of a rigid gap have no finite torque, "
-            "so that their damage cannot be counted; give these shafts a stiffness."
+            Sentence(
+                f"stiffness is infinite in {', '.join(rigid)}: impacts in a rigid gap have no finite torque, "
+                "so that their damage is undefined.",
+                "Give these shafts a stiffness.",
+            )
         )
     if lacking := undamped(machine):
         raise InputError(
-            f"damping is missing in {', '.join(lacking)}: an undamped shaft rattles without end, and its "
-            "cycles make lives out of nothing; give each shaft a damping, or have its ratio estimated from "
-            'numbers of gears and couplings (estimate_damping={"gears": 3, "couplings": 2}, or '
-            "--estimate-damping gears=3,couplings=2)."
+            Sentence(
+                f"damping is missing in {', '.join(lacking)}: an undamped shaft oscillates indefinitely, so "
+                "its fatigue life is undefined.",
+                "Give each shaft a damping, or have its ratio estimated from numbers of gears and couplings "
+                '(estimate_damping={"gears": 3, "couplings": 2}, or '
+                "--estimate-damping gears=3,couplings=2).",
+                page="Give each shaft a damping.",
+            )
         )
 
 

@@ -16,14 +16,16 @@ from typing import Any, Final
 
 from softstart.controller.base import Controller, Effort, effort_of, label_of
 from softstart.drive import Limit, Limits
+from softstart.errors import Sentence
 from softstart.results import OneLine
 from softstart.start.fatigue import undamped, worst_damage
 from softstart.start.run import Run
 
 SLOW: Final = 2.0  # times the time of `direct`
-HARDER: Final = 1.001  # times the K_dyn of `direct`
+HIGHER: Final = 1.001  # times the K_dyn of `direct`
 BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
 ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
+AT_THE_LIMIT: Final = 1e-4  # share left that is the accuracy of a search
 ENDS: Final = ("lower", "upper")  # of an interval, in names of figures
 CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
 
@@ -117,6 +119,7 @@ class Margin:
             return f"{self.name} {_times(self.share)} times what is permitted{case}"
         percent = 100.0 * self.share
         left = f"margin {percent:.3g} %" if self.kept else f"{-percent:.3g} % over"
+        left = "at the limit" if 0.0 <= self.share < AT_THE_LIMIT else left
         return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{case} ({left})"
 
 
@@ -189,7 +192,7 @@ class Row(OneLine):
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """Why it is never recommended: slow, not settled, harder than direct start; empty if it may be."""
+        """Why it is never recommended: slow, not settled, K_dyn above that of direct start; empty if not."""
         return flags(self.run, self.direct)
 
     @cached_property
@@ -261,10 +264,10 @@ def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
     slower = run.settled_time / direct.settled_time
     if slower > SLOW and run.drive.limits.start_time is None:
         found.append(Flag(f"slow x{slower:.3g}", f"takes {slower:.3g} times as long as direct start"))
-    harder = run.k_dyn / direct.k_dyn
-    if harder > HARDER:
-        text = f"harder than direct start, K_dyn {run.k_dyn:.3f} against {direct.k_dyn:.3f}"
-        found.append(Flag(f"harder x{harder:.3g}", text))
+    ratio = run.k_dyn / direct.k_dyn
+    if ratio > HIGHER:
+        text = f"K_dyn {run.k_dyn:.3f} above that of direct start, {direct.k_dyn:.3f}"
+        found.append(Flag(f"K_dyn x{ratio:.3g}", text))
     return tuple(found)
 
 
@@ -274,17 +277,17 @@ class Recommendation(OneLine):
 
     Attributes
     ----------
-    text : str
-        Answer, margin and reason.
+    text : Sentence
+        Answer, margin and reason; its advice is for the person who gives the limits.
     recommended : Row or None
         With limits, the simplest strategy that keeps them, if one does.
     best : tuple of Row
-        Those that no other one beats in K_dyn and time at once, the quickest first.
+        The Pareto-optimal ones in K_dyn and settled time, the quickest first.
     limits : Limits
         Those of the drive.
     """
 
-    text: str
+    text: Sentence
     recommended: Row | None
     best: tuple[Row, ...]
     limits: Limits
@@ -304,7 +307,7 @@ class Recommendation(OneLine):
         if self.limits:
             more = "keeps the limits, with more effort or less margin"
             return "recommended" if row is self.recommended else more
-        return "unbeaten" if row in self.best else "another one is gentler and quicker"
+        return "Pareto-optimal" if row in self.best else "dominated by another strategy"
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""
@@ -319,13 +322,16 @@ def recommend(drive: Any, rows: Iterable[Row]) -> Recommendation:
     """The recommendation among the strategies started on a drive."""
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
-    best = _unbeaten(able)
-    found = _with_limits(limits, rows, able, best) if limits else _without_limits(drive, rows, best)
-    return replace(found, text=f"{found.text} {unchecked_life(drive)}".rstrip())
+    best = _pareto_set(able)
+    if limits:
+        return _with_limits(limits, rows, able, best, unchecked_life(drive))
+    advice = f"For a recommendation, give {drive.LIMITS_GIVEN}." if best else ""
+    fact = f"{_pareto_optimal(best, rows)} {unchecked_life(drive)}".rstrip()
+    return Recommendation(Sentence(fact, advice), None, best, limits)
 
 
-def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
-    """The quickest, then each one that is gentler than all quicker ones."""
+def _pareto_set(able: Sequence[Row]) -> tuple[Row, ...]:
+    """The quickest, then each one with a lower K_dyn than all quicker ones."""
     found: list[Row] = []
     for row in sorted(able, key=lambda row: (row.run.settled_time, row.run.k_dyn, row.effort.order)):
         if not found or row.run.k_dyn < BETTER * found[-1].run.k_dyn:
@@ -363,10 +369,10 @@ def unchecked_life(drive: Any) -> str:
     return swings if undamped(drive) else ""
 
 
-def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:
-    limits = checked_limits(drive)
+def _pareto_optimal(best: Sequence[Row], rows: Sequence[Row]) -> str:
+    """The Pareto-optimal strategies, with what each step from one to the next costs."""
     if not best:
-        return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
+        return f"None is recommended: {_refused(rows)}."
     first = best[0]
     parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f}, settled in {first.run.settled_time:.4g} s"]
     for before, row in pairwise(best):
@@ -375,11 +381,7 @@ def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> R
             f"{row.name}, {row.run.k_dyn:.3f}, settled in {row.run.settled_time:.4g} s "
             f"({change:+.3f} K_dyn for {1e3 * longer:+.3g} ms)"
         )
-    text = (
-        f"Pareto-optimal in K_dyn and settled time: {'; '.join(parts)}. "
-        f"Give {drive.LIMITS_GIVEN} for a recommendation."
-    )
-    return Recommendation(text, None, best, limits)
+    return f"Pareto-optimal in K_dyn and settled time: {'; '.join(parts)}."
 
 
 def _refused(rows: Sequence[Row]) -> str:
@@ -397,8 +399,11 @@ def _why_not(row: Row, limits: Limits) -> str:
 
 
 def _with_limits(
-    limits: Limits, rows: Sequence[Row], able: Sequence[Row], best: tuple[Row, ...]
+    limits: Limits, rows: Sequence[Row], able: Sequence[Row], best: tuple[Row, ...], unchecked: str
 ) -> Recommendation:
+    def _answer(text: str, chosen: Row | None) -> Recommendation:
+        return Recommendation(Sentence(f"{text} {unchecked}".rstrip()), chosen, best, limits)
+
     def least(row: Row) -> float:
         shares = [one.share for one in row.margins(limits)]
         return -math.inf if any(map(math.isnan, shares)) else min(shares, default=math.inf)
@@ -407,8 +412,7 @@ def _with_limits(
     if not passing:
         nearest = max(able, key=least, default=None)
         reason = f"Nearest: {nearest.name}, {_why_not(nearest, limits)}" if nearest else _refused(rows)
-        text = f"No strategy keeps the limits. {reason}."
-        return Recommendation(text, None, best, limits)
+        return _answer(f"No strategy keeps the limits. {reason}.", None)
     effort = min(row.effort.order for row in passing)
     chosen = max((row for row in passing if row.effort.order == effort), key=least)
     margins = _capital("; ".join(map(str, chosen.margins(limits))))
@@ -420,7 +424,7 @@ def _with_limits(
     if simpler:
         reasons = "; ".join(f"{row.name}, {_why_not(row, limits)}" for row in simpler)
         text = f"{text} Simpler ones do not: {reasons}."
-    return Recommendation(text, chosen, best, limits)
+    return _answer(text, chosen)
 
 
 def _capital(text: str) -> str:

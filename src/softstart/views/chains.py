@@ -15,7 +15,7 @@ import numpy as np
 from softstart.errors import listed
 from softstart.views.drawing import COLOURS, drawing, entitle, head, legend_above, new_figure
 from softstart.views.drives import drive_lines
-from softstart.views.numbers import TextTable, column_of, number, short
+from softstart.views.numbers import DataColumn, TextTable, column_of, number, short
 from softstart.views.sheet import Sheet, records_file, rows_file
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from softstart.vibration import Reduction, Vibration
 
 MOST_MODES = 12
-ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
+ALIKE = 0.01  # share by which two K_dyn differ at least where one counts as lower
 TALLEST, DISC = 150.0, 16.0  # px, of the discs of the scheme: the tallest, and their thickness
 WIDEST, LONGEST_NAME = 60.0, 26  # inches of a figure; characters of a mass in it
 
@@ -66,7 +66,7 @@ def reduction_sheet(found: Reduction, off: TwoMassError | None = None) -> Sheet:
         shown,
         title=f"{shown.title} and reduction",
         tables=[*shown.tables, two_masses_table(found), verified_table(starts)],
-        conclusions=[enough(off)] if off else [],
+        conclusions=two_mass_verdict(off) if off else [],
         notes=[note[0].upper() + note[1:] + "." for note in found.notes],
         files=files,
     )
@@ -75,13 +75,13 @@ def reduction_sheet(found: Reduction, off: TwoMassError | None = None) -> Sheet:
 # words -----------------------------------------------------------------------------------------------------
 
 
-def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification] | None:
-    """The pair that stands the other way round on the chain, the one that is gentler there first.
+def reordered(verified: Sequence[Verification]) -> tuple[Verification, Verification] | None:
+    """The pair that the two-mass model ranks in the opposite order, the lower K_dyn on the chain first.
 
     Of several the one that differs most on the chain; strategies that are alike are no pair.
     """
     less = 1.0 - ALIKE
-    ordered = sorted(done, key=lambda one: one.chain_k_dyn)
+    ordered = sorted(verified, key=lambda one: one.chain_k_dyn)
     pairs = [
         (a, b)
         for a, b in combinations(ordered, 2)
@@ -90,30 +90,23 @@ def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification]
     return max(pairs, key=lambda pair: pair[1].chain_k_dyn / pair[0].chain_k_dyn, default=None)
 
 
-def enough(found: TwoMassError) -> str:
-    """Whether two masses are enough, and for what they are not, in a few sentences."""
-    limit, worst, pair = f"(limit {100.0 * found.LIMIT:g} %)", found.worst, reordered(found.verified)
-    torques = f"{found.TORQUES} torques over time"
-    if found.enough:
-        return (
-            f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} and under "
-            f"{torques} is off by {_percent(found.error)} at most {limit}."
-        )
-    failed = listed(list(found.failed))
-    said = [f"{failed} {'do' if len(found.failed) > 1 else 'does'} not start the chain"] if failed else []
-    if worst is not None and abs(worst.error) > found.LIMIT:
-        said.append(
-            f"{worst.name} has K_dyn {worst.chain_k_dyn:.3g} on the chain and {worst.drive.k_dyn:.3g} on them"
-        )
-    if found.of_torques > found.LIMIT:
-        said.append(f"of {torques} the worst is {_percent(found.of_torques)} off")
-    order = pair and (
-        f" On the chain {pair[0].name} is gentler than {pair[1].name} (K_dyn {pair[0].chain_k_dyn:.3g} and "
-        f"{pair[1].chain_k_dyn:.3g}), on two masses it is the other way round ({pair[0].drive.k_dyn:.3g} and "
-        f"{pair[1].drive.k_dyn:.3g})."
+def two_mass_verdict(error: TwoMassError) -> list[str]:
+    """Whether the two-mass model is valid, and for what it is not."""
+    worst, pair = error.worst, reordered(error.verified)
+    of_strategies = f"{_percent(abs(worst.error))} ({worst.name}), " if worst is not None else ""
+    sentences = [
+        f"The two-mass model is {'' if error.enough else 'not '}valid for this chain: largest K_dyn error "
+        f"{of_strategies}{_percent(error.of_torques)} ({error.TORQUES} torque profiles); limit "
+        f"{_percent(error.LIMIT)}."
+    ]
+    if error.failed:
+        sentences.append(f"Only the two-mass model starts under {listed(list(error.failed))}.")
+    if pair and not error.enough:
+        names = " and ".join(one.name for one in pair)
+        sentences.append(f"The two-mass model ranks {names} in the opposite order.")
+    return (
+        sentences if error.enough else [*sentences, "Use the chain itself; all analysis commands accept it."]
     )
-    choose = "Choose by the chain: simulate, compare, optimize, tune, sweep, linear and others take it."
-    return f"Two masses are not enough: {'; '.join(said)} {limit}.{order or ''} {choose}"
 
 
 def _percent(share: float) -> str:
@@ -136,7 +129,7 @@ def summary(found: Reduction, off: TwoMassError | None) -> dict[str, Any]:
             "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
             "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain_k_dyn)],
             "order_differs": reordered(done) is not None,
-            "said": enough(off),
+            "conclusion": " ".join(two_mass_verdict(off)),
         }
     )
     return {
@@ -171,24 +164,24 @@ def two_masses_table(found: Reduction) -> TextTable:
     """The chain beside the two masses, and how far these are off."""
     names = {
         "first elastic frequency, rad/s": "Omega",
-        "node: share of the twist before it": "node",
+        "node position": "node",
         "participation of the motor": "participation",
         "stiffness motor - load, N m/rad": "stiffness",
-        "whole inertia, kg m2": "inertia",
-        "whole gap, rad": "gap",
+        "total inertia, kg m2": "inertia",
+        "total backlash, rad": "gap",
     }
     chain, two = ([getattr(one, key) for key in names.values()] for one in (found.whole, found.reduced))
     off = [100.0 * (b - a) / a if a else 0.0 for a, b in zip(chain, two, strict=True)]
     cells = {
         "at the motor shaft": [*names, "J1, kg m2", "J2, kg m2"],
         "chain": [*map(short, chain), "-", "-"],
-        "two masses": [*map(short, two), short(found.J1), short(found.J2)],
-        "off\n%": [*map(_signed, off), "-", "-"],
+        "two-mass\nmodel": [*map(short, two), short(found.J1), short(found.J2)],
+        "deviation\n%": [*map(_signed, off), "-", "-"],
     }
     condition = (
         f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}{', fails' * found.forced}"
     )
-    title = f"Two masses instead of {len(found.chain.masses)} ({condition})"
+    title = f"Two-mass model of the {len(found.chain.masses)} masses ({condition})"
     return TextTable.of(title, cells, texts=["at the motor shaft"])
 
 
@@ -201,20 +194,20 @@ def _signed(percent: float) -> str:
     return "-" if math.isnan(percent) else f"{percent:+.1f}" if abs(percent) > 1e-6 else "0"
 
 
-def verified_table(done: Sequence[Verification]) -> TextTable:
+VERIFIED = (
+    DataColumn("strategy", lambda one: one.name),
+    DataColumn("largest in", lambda one: one.worst_place),
+    DataColumn("K_dyn\nmodel", lambda one: one.drive.k_dyn, 4),
+    DataColumn("K_dyn\nchain", lambda one: one.chain_k_dyn, 4),
+    DataColumn("deviation\n%", lambda one: 100.0 * one.error, 1),
+    DataColumn("start time\nmodel s", lambda one: one.drive.start_time),
+    DataColumn("start time\nchain s", lambda one: one.chain.start_time),
+)
+
+
+def verified_table(verified: Sequence[Verification]) -> TextTable:
     """The starts on the drive and on the chain."""
-    cells = {
-        "strategy": [one.name for one in done],
-        "largest in": [one.worst_place for one in done],
-        "K_dyn\ndrive": [number(one.drive.k_dyn, 4) for one in done],
-        "K_dyn\nchain": [number(one.chain_k_dyn, 4) for one in done],
-        "chain off\n%": [f"{100 * one.error:+.1f}" for one in done],
-        "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
-        "start time\nchain s": column_of([one.chain.start_time for one in done], 4),
-    }
-    return TextTable.of(
-        "Designed on the two masses, verified on the chain", cells, ["strategy", "largest in"]
-    )
+    return TextTable.of_data("Designed on the two-mass model, verified on the chain", VERIFIED, verified)
 
 
 # figure ----------------------------------------------------------------------------------------------------

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import html
+import io
 import math
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.input.files import write_whole
+from softstart.views.numbers import cut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,8 +37,14 @@ FINEST_CONTOUR = 50  # points along each side
 
 PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
+LONGEST_NAME = 32  # characters in a figure
 LETTERS = 11.0  # of a title, in an inch
 
+# what a page does not need: ids that nothing refers to would be in it twice, a <style> would hold for all
+UNUSED = (
+    r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->"
+    r'| id="[A-Za-z0-9.]+_\d+"'
+)
 STYLE: dict[str, Any] = {
     "figure.figsize": (8.0, 5.0),
     "figure.constrained_layout.use": True,
@@ -91,6 +101,19 @@ def save_figure(figure: Figure, folder: Path, stem: str) -> list[Path]:
     return written
 
 
+def svg_of(figure: Figure, key: str = "softstart", title: str = "") -> str:
+    """The figure as an <svg> element; the same one gives the same text. Screen readers read `title`."""
+    import matplotlib as mpl
+
+    stream = io.StringIO()
+    with drawing(), mpl.rc_context({"svg.hashsalt": key}):
+        metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure.savefig(stream, format="svg", metadata=metadata, bbox_inches="tight")
+    text = re.sub(UNUSED, "", stream.getvalue(), flags=re.DOTALL).strip()
+    label = f' role="img" aria-label="{html.escape(title)}"' if title else ""
+    return text.replace("<svg ", f'<svg class="plot"{label} ', 1)
+
+
 def entitle(figure: Figure, text: str) -> None:
     """A title over all panels, on the left; wrapped where the figure is narrow."""
     width = int(figure.get_figwidth() * LETTERS)
@@ -116,12 +139,17 @@ def legend_beside(axes: Axes, columns: int = 1, **options: Any) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, **options)
 
 
+def literal(name: str) -> str:
+    """A name for a figure: not set as a formula, and cut where it is too long."""
+    return cut(name, LONGEST_NAME).replace("$", r"\$")
+
+
 def mark_points(axes: Axes, points: Sequence[tuple[str, float, float]], filled: Sequence[int] = ()) -> None:
     """A mark for each point (name, x, y), named in the legend beside the panel; some are filled."""
     for index, (name, x, y) in enumerate(points):
         colour = COLOURS[(index + 1) % len(COLOURS)]
         axes.plot([x], [y], MARKERS[index % len(MARKERS)], ms=8, mfc=colour if index in filled else "none",
-                  mew=1.8, color=colour, label=name, clip_on=False, ls="none", zorder=4)  # fmt: skip
+                  mew=1.8, color=colour, label=literal(name), clip_on=False, ls="none", zorder=4)  # fmt: skip
     legend_beside(axes, fontsize=8.5)
 
 
@@ -193,7 +221,7 @@ def heat_map(
     """
     axes.grid(visible=False)
     axes.set_facecolor(MISSING)
-    colours = {"norm": scale, "cmap": COLOUR_MAP, "shading": "nearest", "rasterized": True}
+    colours = {"norm": scale, "cmap": COLOUR_MAP, "shading": "nearest", "rasterized": decimals is None}
     if decimals is None:
         drawn = axes.pcolormesh(x, y, values, **colours)
         fit_axis(axes, "x", x)

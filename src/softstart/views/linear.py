@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
 from softstart.linear.view import LinearView, margin_texts
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, TextTable, column_of, number
+from softstart.views.numbers import NOTHING, DataColumn, TextTable
 from softstart.views.sheet import Sheet, rows_file
 from softstart.views.starts import machine_lines
 
@@ -41,73 +41,80 @@ def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
     return [
         ("closed loop in contact", "stable" if loop.stable else "unstable"),
         *margin_texts(m).items(),
-        *([("least gain", f"{m.gain_reduction:.3g} of the present one")] if m.gain_reduction > 0.0 else []),
+        *([("gain reduction margin", f"{m.gain_reduction:.3g}")] if m.gain_reduction > 0.0 else []),
         ("modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"),
-        ("loop gain is 1 at", _frequencies(m.gain_crossovers)),
-        ("loop is at -180 degrees at", _frequencies(m.phase_crossovers)),
+        ("gain crossover", _frequencies(m.gain_crossovers)),
+        ("phase crossover", _frequencies(m.phase_crossovers)),
         *([("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}")]
           if mode is not None else []),
-        ("linear against exact", f"{float(f'{100.0 * loop.point.mismatch:.2g}'):g} % at most"),
+        ("linearisation error, max.", f"{float(f'{100.0 * loop.point.mismatch:.2g}'):g} %"),
     ]  # fmt: skip
+
+
+def _margin(name: str, scale: float) -> Callable[[Loop], float | str]:
+    def of(loop: Loop) -> float | str:
+        value = scale * getattr(loop.margins, name)
+        return value if math.isfinite(value) else math.nan  # not limited
+
+    return of
+
+
+MODES = (
+    DataColumn("rad/s", lambda mode: mode.frequency),
+    DataColumn("damping\nratio", lambda mode: mode.damping_ratio, 4),
+    DataColumn("pole z", lambda mode: _pole(mode.value)),
+)
+VARIATIONS = (
+    DataColumn("drive", lambda loop: loop.name),
+    DataColumn("stable", lambda loop: "yes" if loop.stable else "no"),
+    DataColumn("gain\nmargin", _margin("gain_margin", 1.0), 2),
+    DataColumn("phase\nmargin deg", _margin("phase_margin", 180.0 / math.pi), 1),
+    DataColumn("delay\nmargin ms", _margin("delay_margin", 1e3), 2),
+    DataColumn("modulus\nmargin", _margin("modulus_margin", 1.0), 3),
+    DataColumn("minimum\ndamping", lambda loop: loop.least_damping, 3),
+)
+CYCLES = (
+    DataColumn("rad/s", lambda cycle: cycle.frequency),
+    DataColumn("amplitude\nrad", lambda cycle: cycle.amplitude, 4),
+    DataColumn("bias\nrad", lambda cycle: cycle.bias, 4),
+    DataColumn("demand\n+- N m", lambda cycle: cycle.demand_amplitude, 1),
+    DataColumn("predicted", lambda cycle: "stable" if cycle.stable else "unstable"),
+    DataColumn("motor\nlimits", lambda cycle: "exceeded" if cycle.beyond_limits else "kept"),
+)
+
+
+def _pole(z: complex) -> str:
+    return f"{z.real:.5f}" + (f" +- {z.imag:.5f}j" if z.imag > 0.0 else "")
 
 
 def tables(view: LinearView, loop: Loop) -> list[TextTable]:
     """Modes of the closed loop, where a pair counts once, other drives, and limit cycles."""
     modes = [mode for mode in loop.modes if mode.imag >= 0.0][:SHOWN_MODES]
-    found, others = view.cycles, view.variations
-
-    def each(read: str, scale: float, decimals: int) -> list[str]:
-        values = (getattr(one.margins, read) for one in others)
-        return ["any" if math.isinf(value) else number(scale * value, decimals) for value in values]
-
-    def pole(z: complex) -> str:
-        return f"{z.real:.5f}" + (f" +- {z.imag:.5f}j" if z.imag > 0.0 else "")
-
-    of_modes = {
-        "rad/s": column_of([mode.frequency for mode in modes]),
-        "damping\nratio": [number(mode.damping_ratio, 4) for mode in modes],
-        "pole z": [pole(mode.value) for mode in modes],
-    }
-    of_drives = {
-        "drive": [one.name for one in others],
-        "stable": ["yes" if one.stable else "no" for one in others],
-        "gain\nmargin": each("gain_margin", 1.0, 2),
-        "phase\nmargin deg": each("phase_margin", 180.0 / math.pi, 1),
-        "delay\nmargin ms": each("delay_margin", 1e3, 2),
-        "modulus\nmargin": each("modulus_margin", 1.0, 3),
-        "least\ndamping": [number(one.least_damping, 3) for one in others],
-    }
-    beyond = ", its demand beyond the motor's limits"
-    of_cycles = {
-        "rad/s": column_of([one.frequency for one in found]),
-        "amplitude\nrad": [number(one.amplitude, 4) for one in found],
-        "bias\nrad": [number(one.bias, 4) for one in found],
-        "demand\n+- N m": [number(one.demand_amplitude, 1) for one in found],
-        "predicted": [("stable" if one.stable else "unstable") + beyond * one.beyond_limits for one in found],
-    }
-    cycles = "Limit cycles predicted by the describing function of the gap"
     return [
-        TextTable.of("Modes of the closed loop", of_modes, ("pole z",)),
-        TextTable.of("The same controller on other drives", of_drives, ("drive", "stable")),
-        TextTable.of(cycles, of_cycles, ("predicted",)),
+        TextTable.of_data("Modes of the closed loop", MODES, modes),
+        TextTable.of_data(
+            "The same controller on other drives (-: not limited)", VARIATIONS, view.variations
+        ),
+        TextTable.of_data(
+            "Limit cycles predicted by the describing function of the gap", CYCLES, view.cycles
+        ),
     ]
 
 
 def linear_notes(view: LinearView) -> list[str]:
-    """The mean torque of the limit cycles, then the notes of the view."""
-    found = "No limit cycle through the gap is predicted by the describing function."
+    """What the limit cycles assume, then the notes of the view."""
+    note = "No limit cycle through the gap is predicted by the describing function."
     if len(view.drive.shaft_names) > 1:
-        found = (
-            "The loop is that of the whole chain with all gaps closed; limit cycles through several gaps are "
-            "not predicted: simulate shows them."
+        note = (
+            "The loop is that of the whole chain with all gaps closed. Limit cycles through several gaps are "
+            "not predicted; use simulate."
         )
     elif view.cycles:
-        mean = view.cycles[0].mean_torque
-        found = (
-            f"The mean shaft torque of the limit cycles is {mean:.4g} N m. They assume that the controller "
-            "keeps in the gap its law in contact: simulate shows what the exact plant does."
+        note = (
+            f"Mean shaft torque of the limit cycles: {view.cycles[0].mean_torque:.4g} N m. Assumed: the "
+            "controller has the same linear law in the gap. Verify with simulate."
         )
-    return [found, *view.notes]
+    return [note, *view.notes]
 
 
 def linear_sheet(view: LinearView) -> Sheet:

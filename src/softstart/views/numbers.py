@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -39,6 +39,28 @@ class Column(NamedTuple):
         return max(len(line) for text in (self.heading, *cells) for line in text.split("\n"))
 
 
+class DataColumn(NamedTuple):
+    """A column as a view declares it: its heading, and the value of a row.
+
+    A number has so many `decimals`, or all of the column as many as the largest one has with `digits`
+    significant ones.
+    """
+
+    heading: str
+    of: Callable[[Any], Any]
+    decimals: int | None = None
+    digits: int = 4
+
+    def cells(self, rows: Iterable[Any]) -> list[str]:
+        """The cells of these rows."""
+        values = list(map(self.of, rows))
+        if any(isinstance(value, str) for value in values):
+            return values
+        if self.decimals is None:
+            return column_of(values, self.digits)
+        return [number(value, self.decimals) for value in values]
+
+
 class TextTable(NamedTuple):
     """A titled table of text cells; rows numbered in `bold` stand out, a terminal shows the first `most`.
 
@@ -59,6 +81,19 @@ class TextTable(NamedTuple):
         """From the cells below each heading; columns named in `texts` hold text, the others numbers."""
         columns = [Column(heading, heading not in texts) for heading in cells]
         return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)], **options)
+
+    @classmethod
+    def of_data(
+        cls, title: str, columns: Sequence[DataColumn], rows: Sequence[Any], **options: Any
+    ) -> TextTable:
+        """From declared columns; numbers to the right, texts to the left.
+
+        >>> columns = DataColumn("name", str), DataColumn("K_dyn", float, 2)
+        >>> TextTable.of_data("", columns, ["1", "2.5"]).rows
+        [['1', '1.00'], ['2.5', '2.50']]
+        """
+        texts = [c.heading for c in columns if any(isinstance(c.of(row), str) for row in rows)]
+        return cls.of(title, {c.heading: c.cells(rows) for c in columns}, texts, **options)
 
     @classmethod
     def of_rows(
@@ -260,6 +295,15 @@ def printable(text: str) -> str:
     'a [31mb'
     """
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+
+
+def cut(text: str, most: int) -> str:
+    """A text of at most so many characters.
+
+    >>> cut("Crane", 5), cut("Crane drive", 5)
+    ('Crane', 'Cran\N{HORIZONTAL ELLIPSIS}')
+    """
+    return text if len(text) <= most else text[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def json_ready(value: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 import math
 import platform
 import re
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart import __version__
-from softstart.views.drawing import drawing, save_figure
+from softstart.views.drawing import save_figure, svg_of
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
 from softstart.views.numbers import Column, TextTable
@@ -231,7 +230,7 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     ]  # fmt: skip
     pictures = [
         f'<figure tabindex="0" role="img" aria-label="{html.escape(f"{sheet.title}: {stem}")}">'
-        f"{_svg(draw())}</figure>"
+        f"{svg_of(draw(), stem)}</figure>"
         for stem, draw in tuple(sheet.figures.items())[:figures]
     ]
     parts += [*pictures, *tables] if first else [*tables, *pictures]
@@ -264,12 +263,3 @@ def _html(table: TextTable) -> str:
     head = f"<thead>{row(headings, 'th')}</thead>" if any(headings) else ""
     caption = f"<caption>{html.escape(table.title)}</caption>" if table.title else ""
     return f"<table>{caption}{head}<tbody>{''.join(row(cells, 'td') for cells in table.rows)}</tbody></table>"
-
-
-def _svg(figure: Any) -> str:
-    """A figure within a page."""
-    written = io.StringIO()
-    with drawing():
-        figure.savefig(written, format="svg", metadata={"Date": None}, bbox_inches="tight")
-    text = written.getvalue()
-    return text[text.index("<svg") :]

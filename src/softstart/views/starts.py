@@ -5,43 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.drive.data_sheet import BAND
 from softstart.drive.plausibility import plausibility_warnings
+from softstart.errors import Sentence
 from softstart.start.comparison import SOFT_END, Comparison
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Recommendation, Row, checked_limits, margins_of
 from softstart.start.run import SETTLING_PERIODS, Run, Stage
-from softstart.views.drawing import (
-    COLOURS,
-    DASHES,
-    GREY,
-    SHAFTS,
-    drawing,
-    entitle,
-    head,
-    legend_above,
-    legend_beside,
-    line_of,
-    mark_points,
-    new_figure,
-    shade_open_gap,
-)
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import TextTable, column_of, label, number, short, units_of, with_unit
+from softstart.views.numbers import TextTable, column_of, label, number, short, with_unit
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from softstart.views.traces import comparison_figure, draw_trade_off, run_figure, torques, trade_off_figure
 
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
 OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
-FEW = 8  # masses or shafts with a name each in a figure
 SHOWN = 24  # stages and events on a terminal
 SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
@@ -104,8 +87,8 @@ def position_notes(runs: Sequence[Run]) -> list[str]:
         "flanks and mid-gap; curves, stages and contacts belong to the start with the largest torque: "
         f"{', '.join(worst)}."
     )
-    known = "Friction holds the load anywhere; give start.position if it is always the same."
-    return [text if runs[0].drive.position_given else f"{text} {known}"]
+    advice = "Give start.position if it is always the same."
+    return [Sentence(text, "" if runs[0].drive.position_given else advice)]
 
 
 def clipped_torque(run: Any) -> str:
@@ -179,98 +162,6 @@ def shaft_table(run: Run) -> TextTable:
     if run.drive.limits:
         cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
     return TextTable.of("Shafts", cells, ("shaft",))
-
-
-# figures of starts over time
-
-
-def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: str, note: str = "") -> Any:
-    """Panels over the time of a start; of a single shaft grey where its gap is open."""
-    single = len(run.drive.shaft_names) == 1
-    with drawing():
-        figure, axes = new_figure(len(panels), 1, (8.0, 0.6 + 2.25 * len(panels)), sharex=True)
-        for panel, draw in zip(axes, panels, strict=True):
-            if single:
-                shade_open_gap(panel, run)
-            draw(panel, run)
-            if not panel.get_legend_handles_labels()[0]:
-                continue
-            if single:
-                legend_above(panel, 5, columnspacing=1.2, handlelength=1.8)
-            else:
-                legend_beside(panel, 1 + len(run.drive.mass_names) // FEW, fontsize=6.5)
-        notes = "; ".join(filter(None, ["grey: gap open" if single else "", note]))
-        axes[-1].set_xlabel(f"time, s     ({notes})" if notes else "time, s")
-        axes[-1].set_xlim(0.0, run.end_time)
-        entitle(figure, title)
-    return figure
-
-
-def run_figure(run: Run) -> Any:
-    """Torques, speeds and twists over time."""
-    return over_time(run, (torques, speeds, twists), f"{run.drive.name}: {run.controller_name}")
-
-
-def torques(axes: Axes, run: Run) -> None:
-    """Motor and shaft torques, and the permissible one."""
-    axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
-    shaft_torques(axes, run)
-    if not math.isnan(run.permissible_torque):
-        axes.axhline(run.permissible_torque, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
-    head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
-
-
-def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
-    """Name and line of each shaft."""
-    names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque T",)
-    return [(name, line_of(k) | {"color": SHAFTS[k % len(SHAFTS)]}) for k, name in enumerate(names)]
-
-
-def shaft_torques(axes: Axes, run: Run) -> None:
-    """The torque of each shaft with its peak, and where K_dyn is 1."""
-    for (name, line), torque, time, peak in zip(
-        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.trajectory.shafts["peak_time"],
-        run.trajectory.shafts["peak"], strict=True,
-    ):  # fmt: skip
-        axes.plot(run.t, torque, label=name, **line)
-        axes.plot([time], [peak], "o", ms=4, color=line["color"])
-    if run.k_dyn > 0.0:
-        axes.axhline(run.peak_torque / run.k_dyn, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
-
-
-def speeds(axes: Axes, run: Run) -> None:
-    """The speeds of all masses, the target speed, and the end of the start."""
-    machine, units = run.drive, units_of(run.drive)
-    lines = [(name, line_of(i)) for i, name in enumerate(machine.mass_names)]
-    if len(lines) == 2:
-        lines = [("motor w1", {"color": COLOURS[1], "ls": DASHES[1]}), ("load w2", {"color": COLOURS[0]})]
-    for (name, line), speed in zip(lines, run.w.T, strict=True):
-        axes.plot(run.t, units.shown(speed, "rad/s"), label=name, **line)
-    if machine.target_speed is not None:
-        target = float(units.shown(machine.target_speed, "rad/s"))
-        axes.axhline(target, color=GREY, lw=0.8, ls=":", label="target")
-    reached = not math.isnan(run.start_time)
-    if reached:
-        axes.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
-    title = f"start time {run.start_time:.4f} s" if reached else run.status.value
-    head(axes, title, f"speed, {units.of('rad/s')}")
-
-
-def twists(axes: Axes, run: Run) -> None:
-    """The twist of a single shaft as an angle, of several each in its gap."""
-    gaps, units = run.drive.gaps, units_of(run.drive)
-    if len(gaps) == 1:
-        axes.plot(run.t, units.shown(run.twist[:, 0], "rad"), color=COLOURS[2])
-        flanks, title, unit = float(units.shown(0.5 * gaps[0], "rad")), "phi1 - phi2", units.of("rad")
-    else:
-        for (name, line), gap, twist in zip(shafts_of(run), gaps, run.twist.T, strict=True):
-            if gap > 0.0:
-                axes.plot(run.t, 2.0 * twist / gap, label=name, **line)
-        flanks, title, unit = 1.0, "over half the gap", "half gaps"
-    for flank in (flanks, -flanks):
-        axes.axhline(flank, color="#444444", lw=0.8, ls="--")
-    contacts = f"{run.contacts} contact{'' if run.contacts == 1 else 's'}"
-    head(axes, f"twist {title}, flanks dashed; {contacts}", f"twist, {unit}")
 
 
 def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
@@ -435,15 +326,17 @@ def both_ends(comparison: Comparison) -> list[str]:
     same = [row.name for row in stiff.shown] == [row.name for row in soft.shown]
     return [
         NO_STIFFNESS,
-        f"If it is {BAND[1]:g} Hz: {_chosen(stiff)}. If it is {BAND[0]:g} Hz, and set up for it: "
-        f"{_chosen(soft)}. The choice {'is the same at both ends' if same else 'depends on the stiffness'}. "
-        "Give shaft.elastic_frequency, from the swing of the speed in a log, or a stiffness.",
+        Sentence(
+            f"At {BAND[1]:g} Hz: {_chosen(stiff)}. At {BAND[0]:g} Hz, and set up for it: {_chosen(soft)}. "
+            f"The choice {'is the same at both ends' if same else 'depends on the stiffness'}.",
+            "Give shaft.elastic_frequency, from the oscillation of the speed in a log, or a stiffness.",
+        ),
     ]
 
 
 def _chosen(choice: Recommendation) -> str:
     """The strategies that a recommendation shows, with their K_dyn."""
-    word = "unbeaten" if choice.recommended is None else "recommended"
+    word = "Pareto-optimal" if choice.recommended is None else "recommended"
     shown = [f"{row.name} (K_dyn {row.run.k_dyn:.3f})" for row in choice.shown]
     return f"{word} {', '.join(shown)}" if shown else "no strategy keeps the limits"
 
@@ -502,46 +395,6 @@ def remarks(comparison: Comparison) -> list[str]:
     ]
 
 
-def comparison_figure(rows: Sequence[Row], title: str) -> Any:
-    """Motor torque and torque of each shaft of several starts, one panel each."""
-    runs = [row.run for row in rows]
-    several = len(runs[0].drive.shaft_names) > 1
-    with drawing():
-        size = (8.0, 1.0 + 1.35 * len(runs))
-        figure, axes = new_figure(len(runs), 1, size, sharex=True, sharey=True, squeeze=False)
-        for panel, row, run in zip(axes[:, 0], rows, runs, strict=True):
-            if not several:
-                shade_open_gap(panel, run)
-            panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
-            for (name, line), torque in zip(shafts_of(run), run.T.reshape(run.t.size, -1).T, strict=True):
-                panel.plot(run.t, torque, label=name, **line)
-            head(panel, f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s", "N m")
-        handles, labels = axes[0, 0].get_legend_handles_labels()
-        if len(labels) <= FEW:
-            figure.legend(handles, labels, loc="outside lower right", ncols=4)
-        axes[-1, 0].set_xlabel("time, s" if several else "time, s     (grey: gap open)")
-        axes[-1, 0].set_xlim(0.0, max(run.end_time for run in runs))
-        entitle(figure, title)
-    return figure
-
-
-def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> Any:
-    """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
-    with drawing():
-        figure, axes = new_figure(1, 1, (8.0, 4.6))
-        draw_trade_off(axes, points, title)
-    return figure
-
-
-def draw_trade_off(axes: Axes, points: Sequence[tuple[str, float, float]], title: str) -> None:
-    """The same on given axes."""
-    mark_points(axes, points)
-    axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
-    axes.set_ylim(bottom=0.0)
-    axes.margins(x=0.08)
-    head(axes, title, "K_dyn", "start time, s")
-
-
 def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: bool = True) -> Sheet:
     """What is shown of a comparison; `rows` are its rows in an order other than by K_dyn."""
     machine = comparison.drive
@@ -557,7 +410,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     points = [(row.marked, row.run.start_time, row.run.k_dyn) for row in reached]
     figures = {"comparison": lambda: comparison_figure(rows, machine.name)}
     if points:
-        figures["trade-off"] = lambda: trade_off_figure(points, machine.name)
+        figures["trade-off"] = lambda: trade_off_figure(points, title=machine.name)
     records = list(map(_record, rows))
     files: dict[str, str | Writer] = {"comparison.csv": records_file(records)}
     stems: list[str] = []
@@ -577,7 +430,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
             *remarks(comparison),
         ],
         figures=figures,
-        panel=lambda ax: draw_trade_off(ax, points, machine.name),
+        panel=lambda ax: draw_trade_off(ax, points, title=machine.name),
         records=records,
         files=files,
         machine=machine,

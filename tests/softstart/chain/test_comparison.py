@@ -9,8 +9,8 @@ import pytest
 
 from softstart import Drive, InputError, compare, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.reporting.figures import start_figure, traces_figure
 from softstart.views.starts import figure_rows, run_sheet
+from softstart.views.traces import comparison_figure
 
 DAMPED = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
 CHAIN = Chain.load("crane-4-mass", also=DAMPED)
@@ -96,7 +96,7 @@ def test_a_permissible_torque_is_seen_wherever_the_start_is():
         assert table.rows[0][-1] == f"{used:.1f}"
         assert said in run._repr_html_()
         assert said in compare(chain, ["direct"], worst_case=()).recommendation.text
-        for figure in (run.plot(), start_figure(run), traces_figure(compare(chain, ["direct"]).rows)):
+        for figure in (run.plot(), comparison_figure(compare(chain, ["direct"]).rows)):
             lines = [float(line.get_ydata()[0]) for line in figure.axes[0].lines]
             assert run.permissible_torque in lines
         assert run.permissible_torque == pytest.approx(20e3 / 57, rel=1e-12)

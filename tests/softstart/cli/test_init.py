@@ -310,7 +310,7 @@ def test_an_unknown_stiffness_is_compared_at_both_ends(run, also):
     compare = ("compare", "sheet.toml", "--controllers", "direct")
     code, out, _ = run(*compare)
     assert (code, "No stiffness is known." in out) == (0, True)
-    assert "If it is 30 Hz: unbeaten direct" in " ".join(out.split())
+    assert "At 30 Hz: Pareto-optimal direct" in " ".join(out.split())
     out = run(*compare, "--set", also).out
     assert "stiffness is known" not in out
     assert "elastic frequency" not in out
@@ -321,7 +321,7 @@ def test_an_unknown_stiffness_is_compared_at_both_ends(run, also):
 def test_init_says_how_the_choice_depends_on_an_unknown_stiffness(run):
     code, out, err = run("init", "sheet.toml", "--out", "mine.toml")
     assert code == 0
-    assert "softstart: If it is 30 Hz: unbeaten" in err
+    assert "softstart: At 30 Hz: Pareto-optimal" in err
     assert "What next: softstart compare sheet.toml" in " ".join(out.split())  # which has both ends
     assert Drive.load("mine.toml").assumed.startswith("elastic frequency 30 Hz")
 

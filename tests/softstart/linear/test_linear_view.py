@@ -136,7 +136,7 @@ class Hasty(PlainController):
 def test_what_is_no_loop_is_said(controller):
     kind, said = "events", "has no sampled loop"
     if controller == "acceleration-delay":
-        kind, said = "open loop", "acts open loop"
+        kind, said = "open loop", "is open-loop in contact"
     view = linear_view(FREE, controller)
     assert (view.kind, view.loop) == (kind, None)
     assert said in view.conclusion

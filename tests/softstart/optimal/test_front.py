@@ -20,7 +20,6 @@ from softstart.optimal.front import (
     default_start_times,
     pareto,
 )
-from softstart.views.optima import front_sheet
 
 TIMES = [0.33, 0.29, 0.31]
 
@@ -112,8 +111,8 @@ def test_a_controller_as_quick_as_any_start_is_not_the_best_of_all() -> None:
         assert front.gentlest is named
     some = (direct, steep, late, hold, ControllerPoint("no start", 0.1, math.nan, "", None))
     curve = (FrontPoint(0.9, "reached", "OPTIMAL", "", k_dyn=0.98),)
-    (said,) = front_sheet(Front(CRANE, "reached", curve, some)).found
-    assert said.endswith(": pulse-coast-hold, K_dyn 0.983 in 0.9079 s, where the optimum has 0.974.")
+    _, sentence = Front(CRANE, "reached", curve, some).conclusions
+    assert sentence.endswith(": pulse-coast-hold, 0.983 in 0.9079 s; optimum at that time: 0.974.")
     assert Front(CRANE, "reached", (), some[-1:]).gentlest is None
 
 

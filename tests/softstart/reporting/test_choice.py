@@ -14,7 +14,7 @@ from softstart.optimal.front import FrontPoint
 from softstart.optimal.problem import Problem
 from softstart.reporting import report
 from softstart.reporting.choice import robustness
-from softstart.reporting.document import for_customer, text_answer
+from softstart.reporting.document import text_answer
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.sheet import Setting
 
@@ -50,14 +50,12 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     verdicts = {one["controller"]: one["verdict"] for one in hostile.summary()["choice"]["candidates"]}
     assert choice.maps["reduced-first-stage"].worst < choice.maps["direct"].worst  # out for its sensor alone
     assert verdicts["reduced-first-stage"] == "a sensor that drives do not have"
-    assert [name for name, verdict in verdicts.items() if verdict == "unbeaten"] == ["direct", "shaped"]
+    assert [name for name, verdict in verdicts.items() if verdict == "Pareto-optimal"] == ["direct", "shaped"]
     assert choice.chosen is said.best[-1]
-    assert choice.role == "gentlest unbeaten"
+    assert choice.role == "lowest K_dyn"
     assert choice.worst(choice.ordinary) == min(choice.maps[name].worst for name in ("ramp", "s-curve"))
-    assert hostile.answer.startswith(for_customer(said.text))
-    assert said.text.endswith(
-        "Give [limits] in the drive file for a recommendation."
-    )  # which is for the author
+    assert hostile.answer.startswith(said.text.fact)
+    assert said.text.advice == "For a recommendation, give [limits] in the drive file."
     assert "[limits]" not in hostile.answer
     page = Page(hostile.to_html()).text
     assert "no limits, so nothing says which peak is low enough" in page

@@ -10,7 +10,8 @@ from tests.softstart.variants import TOGETHER, machines, variants
 
 from softstart import Drive, report
 from softstart.chain import Chain
-from softstart.reporting import Report, figures
+from softstart.reporting import Report
+from softstart.reporting import document as documents
 from softstart.reporting.document import data_of, of_part
 from softstart.views.drives import drive_lines
 
@@ -68,7 +69,7 @@ def test_a_list_is_shown_in_both_units(made: Report) -> None:
 @pytest.mark.parametrize("kind", TOGETHER)
 def test_every_template_is_rendered(made: Report, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The whole page, whose figures are those of other tests."""
-    monkeypatch.setattr(figures, "svg", lambda figure, key, title: Markup())
+    monkeypatch.setattr(documents, "svg_of", lambda figure, key, title: Markup())
     base = MACHINES[QUICK[0]] if kind == "drive" else FAN
     some = made if kind == "drive" else report(FAN, controllers=["direct"], budget=0.0)
     for what, machine in [*variants(base)][: len(TOGETHER[kind])]:

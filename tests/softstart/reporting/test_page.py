@@ -11,9 +11,9 @@ from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import report
 from softstart.reporting.document import css_string, templates
-from softstart.reporting.figures import traces_figure
 from softstart.views.fatigue import factor
 from softstart.views.numbers import json_ready, units_of
+from softstart.views.traces import comparison_figure
 
 from .conftest import COMMAND, HOSTILE, Page
 
@@ -115,7 +115,7 @@ def test_names_in_figures_are_taken_literally():
     gains = [RobustGains(label, make_controller("ramp"), CRANE) for label in labels]
     made = report(CRANE, controllers=["direct", *gains], budget=0.0)
     page = made.to_html()  # warnings are errors here
-    figure = traces_figure(made.comparison.rows[1:])
+    figure = comparison_figure(made.comparison.rows[1:])
     for label, axes in zip(labels, figure.axes, strict=False):
         assert label in page
         shown = axes.get_title(loc="left").replace("\\$", "$").partition(":")[0]
