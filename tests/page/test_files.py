@@ -64,7 +64,7 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
 def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     """The report is computed aside; meanwhile everything else goes on."""
     with files.expect_download(lambda it: it.suggested_filename.endswith(".html"), timeout=120_000) as report:
-        files.get_by_test_id("export-report").click()
+        files.get_by_test_id("report-go").click()
         name, content = saved(files, "export-traces")
         assert name == "crane-travel-drive-4amtkf-h-112l6-direct-traces.csv"
         simulate(CRANE, "direct").to_csv(tmp_path / "same.csv")
@@ -84,7 +84,7 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert html.lstrip().lower().startswith("<!doctype html")
     assert CRANE.name in html
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
-    name, content = saved(files, "export-again")
+    name, content = saved(files, "report-file")
     assert (name, content.decode()) == (report.value.suggested_filename, html)
 
 

@@ -87,10 +87,10 @@ def command_text(
     params: list[str] = []
     for label, controller in strategies.items():
         if isinstance(controller, Tuned):
-            names.append(gain_file(label))
+            names.append(file_name(label, suffix=".toml"))
         elif profile_of(controller) is not None:
             names.append("profile")
-            params.append(f"profile.file={profile_file(label)}")
+            params.append(f"profile.file={file_name(label, suffix='.csv')}")
         elif label in controller_names():
             names.append(label)
             params += [
@@ -154,11 +154,13 @@ def drive_file(drive: Machine) -> str:
     return file_name(drive.name, suffix=".toml")
 
 
-def gain_file(label: str) -> str:
-    """The file name under which tuned gains are saved."""
-    return file_name(label, suffix=".toml")
-
-
-def profile_file(label: str) -> str:
-    """The file name under which a torque profile is saved."""
-    return file_name(label, suffix=".csv")
+def profile_file(
+    profile: TorqueProfile, label: str, suffix: str, about: Mapping[str, object]
+) -> tuple[str, str]:
+    """The name and the text of the file of a torque profile; TOML and C state what it is `about`."""
+    writers: dict[str, Callable[[Path], object]] = {
+        ".csv": profile.to_csv,
+        ".toml": lambda path: profile.to_toml(path, about),
+        ".c": lambda path: profile.to_c(path, about=about),
+    }
+    return file_name(label, suffix=suffix), written_text(writers[suffix], suffix)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from functools import partial
-from typing import Any
 
 from nicegui import ui
 
@@ -18,20 +17,20 @@ from softstart.page.downloads import (
     command_text,
     drive_file,
     file_name,
+    profile_file,
     profile_of,
     shipped_drives,
     written_text,
 )
+from softstart.page.job_panel import JobPanel, Task
 from softstart.page.machines import Loaded, machine_from
 from softstart.page.panel_parts import (
     POLL,
-    JobView,
     Troubles,
     action,
     box,
     choice,
     hint,
-    jobs_of,
     notify,
     save,
     upload,
@@ -47,9 +46,11 @@ class FilesPanel:
     """Drive files, exports and the command line; built in the current slot."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
-        for title, part in (("Drive", DriveFiles), ("Export", Exports), ("Command line", CommandLine)):
+        parts = {"Drive": (DriveFiles,), "Export": (Exports, ReportPanel), "Command line": (CommandLine,)}
+        for title, panels in parts.items():
             ui.html(title, tag="h3", sanitize=False).classes("panel-title")
-            part(session, user)
+            for panel in panels:
+                panel(session, user)
 
 
 class DriveFiles:
@@ -110,11 +111,10 @@ def machine_of(content: bytes, name: str) -> Loaded:
 
 
 class Exports:
-    """Traces and profile of the selected strategy, and the report, as files."""
+    """Traces and profile of the selected strategy as files."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        self._text = ""
         self._seen = -1
         with box("panel-actions"):
             self._caption = ui.label().classes("panel-caption").props('data-testid="export-strategy"')
@@ -122,70 +122,56 @@ class Exports:
             with box("panel-actions") as self._of_profile:
                 for suffix, text in ((".csv", "Profile CSV"), (".toml", "Profile TOML"), (".c", "C code")):
                     action(text, partial(self._profile, suffix), f"export-profile-{suffix[1:]}")
-        with box("panel-actions"):
-            ui.label("Report for a customer").classes("panel-caption")
-            self._report = action("Report HTML", self._begin_report, "export-report", main=True)
-        hint(
-            "The report is one file that opens offline and prints: drive, strategies, limit, robustness, "
-            "parameter sheet. It takes a while and is computed in the background."
-        )
-        self._view = JobView(jobs_of(user), user, "export", on_done=self._done, on_state=self._state)
-        # some browsers hold back a file that comes long after the press of a button
-        self._again = action("Save it again", self._save, "export-again")
-        self._again.set_visibility(False)
         ui.timer(POLL, self._refresh)
         self._refresh()
 
     def _refresh(self) -> None:
-        """The strategy that the buttons mean."""
+        """The strategy to which the buttons refer."""
         if self._session.version == self._seen:
             return
-        self._seen = self._session.version
-        self._caption.set_text(f"Selected: {self._session.inputs.selected}")
-        selected = self._session.inputs.controllers[self._session.inputs.selected]
-        self._of_profile.set_visibility(profile_of(selected) is not None)
-
-    def _state(self) -> None:
-        self._report.set_enabled(not self._view.busy)
-        self._again.set_visibility(bool(self._text) and not self._view.busy and not self._view.failed)
-
-    def _named(self, *parts: str, suffix: str) -> str:
-        return file_name(self._session.inputs.machine.name, *parts, suffix=suffix)
+        self._seen, inputs = self._session.version, self._session.inputs
+        self._caption.set_text(f"Selected: {inputs.selected}")
+        self._of_profile.set_visibility(profile_of(inputs.controllers[inputs.selected]) is not None)
 
     def _traces(self) -> None:
-        found = self._session.result(self._session.inputs.selected)
-        if found.run is None:
-            raise InputError(f"{found.name} has no traces: {found.trouble}")
-        save(written_text(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
+        inputs = self._session.inputs
+        result = self._session.result(inputs.selected)
+        if result.run is None:
+            raise InputError(f"{result.name} has no traces: {result.trouble}")
+        name = file_name(inputs.machine.name, result.name, "traces", suffix=".csv")
+        save(written_text(result.run.to_csv, ".csv"), name)
 
     def _profile(self, suffix: str) -> None:
-        label = self._session.inputs.selected
-        profile = profile_of(self._session.inputs.controllers[label])
+        inputs = self._session.inputs
+        profile = profile_of(inputs.controllers[inputs.selected])
         if profile is None:  # another strategy was selected a moment ago
-            raise InputError(f"{label}: this strategy plays no torque profile.")
-        about = {"drive": self._session.inputs.machine.name, "strategy": label}
-        writers: dict[str, Any] = {
-            ".csv": profile.to_csv,
-            ".toml": lambda path: profile.to_toml(path, about),
-            ".c": lambda path: profile.to_c(path, about=about),
-        }
-        save(written_text(writers[suffix], suffix), file_name(label, suffix=suffix))
+            raise InputError(f"{inputs.selected}: this strategy plays no torque profile.")
+        about = {"drive": inputs.machine.name, "strategy": inputs.selected}
+        name, text = profile_file(profile, inputs.selected, suffix, about)
+        save(text, name)
 
-    def _begin_report(self) -> None:
-        session = self._session
-        strategies = dict(session.inputs.controllers)
-        name, self._text = self._named("report", suffix=".html"), ""
-        command = command_text(session.inputs.machine_in_units, strategies, "report", f"--out={name}")
-        work = tasks.report_task, session.inputs.both_ends, list(strategies.values()), command
-        self._view.begin("report", *work, subject=name)
 
-    def _done(self, text: str) -> None:
-        self._text = text
-        if self._view.mine:
-            self._save()
+class ReportPanel(JobPanel):
+    """The report for a customer, saved in the tab that has asked for it."""
 
-    def _save(self) -> None:
-        save(self._text, self._view.subject)
+    name = "report"
+    about = (
+        "The report is one file that opens offline and prints: drive, strategies, limit, robustness, "
+        "parameter sheet. It takes a while and is computed in the background."
+    )
+    verb = "Report HTML"
+    saves = True
+
+    def form(self) -> None:
+        """The caption."""
+        ui.label("Report for a customer").classes("panel-caption")
+
+    def task(self) -> Task:
+        """The report."""
+        inputs = self.session.inputs
+        name = file_name(inputs.machine.name, "report", suffix=".html")
+        command = command_text(inputs.machine_in_units, inputs.controllers, "report", f"--out={name}")
+        return tasks.report_task, inputs.both_ends, list(inputs.controllers.values()), command, name
 
 
 class CommandLine:

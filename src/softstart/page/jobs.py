@@ -49,8 +49,7 @@ class Job:
 
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
     `result` what came out; `sentences` why there is no result.
-    `changes` counts what happened, so that whoever looks now and then sees whether to look closer; it is
-    raised last. `subject` is for those who show it: what the result is of. `ahead` waiting jobs come before.
+    `state` is set last. `subject` is for those who show it: the machine of the result.
     """
 
     def __init__(self, user: Hashable, title: str, packed: bytes, ahead: Callable[[Job], int]) -> None:
@@ -60,18 +59,12 @@ class Job:
         self.message = ""
         self.result: Any = None
         self.sentences: tuple[str, ...] = ()
-        self.changes = 0
         self.subject: Any = None
         self.pid: int | None = None
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._worker: Worker | None = None
         self._began = self._ended = 0.0
-
-    @property
-    def error(self) -> str:
-        """Why there is no result, one sentence a line; empty where there is one, or may come."""
-        return "\n".join(self.sentences)
 
     @property
     def stopping(self) -> bool:
@@ -107,7 +100,6 @@ class Job:
                     return
                 self._worker = start()
                 self.pid, self._began, self.state = self._worker.pid, time.monotonic(), JobState.RUNNING
-                self.changes += 1
             state, sentences = self._heard(self._worker)
         except Exception:
             log.exception("The process of %r could not be attended.", self.title)
@@ -135,7 +127,6 @@ class Job:
                     case Message("error", (_, text)):
                         log.error("In the process of %r:\n%s", self.title, text)
                         return JobState.FAILED, (MISTAKE,)
-                self.changes += 1
         except DiedError as death:
             if self._stop.is_set():
                 return JobState.CANCELLED, ()
@@ -145,7 +136,6 @@ class Job:
     def _conclude(self, state: JobState, *sentences: str) -> None:
         self._ended = time.monotonic() if self._began else 0.0
         self.sentences, self.state = sentences, state
-        self.changes += 1
 
 
 class Jobs:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from nicegui import ui
 
 from softstart.controller.finding import controller_class
@@ -12,8 +10,8 @@ from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
-from softstart.page.panel_parts import TERMINALS, TaskPanel, choice, text_field, upload
-from softstart.page.sentences import clipped
+from softstart.page.job_panel import JobPanel, Task
+from softstart.page.panel_parts import TERMINALS, choice, text_field, upload
 from softstart.plugins import controller_names
 from softstart.quantities import values_in
 from softstart.tuning.question import gaps_of, inertias_of
@@ -24,7 +22,7 @@ MOST_CELLS = 60
 LARGEST = 1000 * 1024  # bytes of a log; a request may have little more
 
 
-class OptimumPanel(TaskPanel):
+class OptimumPanel(JobPanel):
     """The optimal start within a time; it joins the strategies."""
 
     name = "optimum"
@@ -32,23 +30,23 @@ class OptimumPanel(TaskPanel):
         "The torque over time with the lowest K_dyn, and a bound that no start can go below. Where "
         "the start position is unknown it is the best fixed profile for all, and feedback can be lower."
     )
-    joins = True
+    adds = True
 
     def form(self) -> None:
         """Start time and what holds at its end."""
         example = "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
         self.time = text_field("Start time", "1.2x", "optimum-time", example).classes("panel-narrow")
-        self.time.on("keydown.enter", self.begin)
+        self.time.on("keydown.enter", self.start)
         self.end = choice("At its end", TERMINALS, "reached", "optimum-terminal")
 
-    def question(self) -> tuple[Any, ...]:
+    def task(self) -> Task:
         """The gentlest start."""
         text = str(self.time.value).strip()
         StartTime.of(text, "Start time")
-        return "optimal start", tasks.optimum_task, self.session.inputs.machine_in_units, text, self.end.value
+        return tasks.optimum_task, self.session.inputs.machine_in_units, text, self.end.value
 
 
-class LimitPanel(TaskPanel):
+class LimitPanel(JobPanel):
     """The least K_dyn over the start time, the strategies beside it."""
 
     name = "curve"
@@ -61,7 +59,7 @@ class LimitPanel(TaskPanel):
         """What holds at the end of each start."""
         self.end = choice("Start ends with", TERMINALS, "reached", "curve-terminal")
 
-    def question(self) -> tuple[Any, ...]:
+    def task(self) -> Task:
         """The curve."""
         controllers = list(self.session.inputs.controllers.values())
         return (
@@ -73,7 +71,7 @@ class LimitPanel(TaskPanel):
         )
 
 
-class ChecksPanel(TaskPanel):
+class ChecksPanel(JobPanel):
     """Start positions, limits and life of all strategies, and the quickest start within limits."""
 
     name = "checks"
@@ -82,7 +80,7 @@ class ChecksPanel(TaskPanel):
         "beside that under direct, and the quickest start that keeps the limits."
     )
 
-    def question(self) -> tuple[Any, ...]:
+    def task(self) -> Task:
         """All checks."""
         session = self.session
         return (
@@ -93,7 +91,7 @@ class ChecksPanel(TaskPanel):
         )
 
 
-class TuningPanel(TaskPanel):
+class TuningPanel(JobPanel):
     """Gains for each gap and load inertia, and one set for all of them."""
 
     name = "tuning"
@@ -116,12 +114,12 @@ class TuningPanel(TaskPanel):
         self.certified = ui.checkbox("optimum of each cell", value=False).classes("panel-check")
         self.certified.props('dense data-testid="tuning-certified"')
 
-    def question(self) -> tuple[Any, ...]:
+    def task(self) -> Task:
         """The tuning."""
         drive, name = self.session.inputs.machine_in_units, str(self.controller.value)
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
-        return f"tuning of {name}", tasks.tuning, self.session.inputs.both_ends, name, *grid, *more
+        return tasks.tuning, self.session.inputs.both_ends, name, *grid, *more
 
 
 def tunable_controllers() -> list[str]:
@@ -168,7 +166,7 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
     return found[0], found[1]
 
 
-class LogPanel(TaskPanel):
+class LogPanel(JobPanel):
     """The drive from the log of an inverter; the drive of the page is the guess."""
 
     name = "log"
@@ -187,20 +185,20 @@ class LogPanel(TaskPanel):
         self.torque_is = choice("The torque is", kinds, "demand", "log-torque-is")
         self.columns = text_field("Column names, optional", "", "log-columns", "torque=M, speed=n[rpm]")
         remedy = "cut the log to the start"
-        self.go = upload("Load a log ...", "log", ".csv,text/csv", LARGEST, remedy, self.take, self.refuse)
+        self.go = upload("Load a log ...", "log", ".csv,text/csv", LARGEST, remedy, self.take, self.reject)
 
     def take(self, content: bytes, name: str) -> None:
         """A file was chosen."""
         self.file = content, name
-        self.begin()
+        self.start()
 
-    def refuse(self, name: str, error: InputError) -> None:
+    def reject(self, name: str, error: InputError) -> None:
         """A file could not be taken."""
-        self.view.refuse(error)
+        self.refuse(error)
 
-    def question(self) -> tuple[Any, ...]:
+    def task(self) -> Task:
         """The identification."""
         content, name = self.file
         columns = tasks.columns_of(str(self.columns.value or ""))
         guess, kind = self.session.inputs.machine_in_units, str(self.torque_is.value)
-        return f"drive from {clipped(name)}", tasks.identified, content, name, guess, kind, columns
+        return tasks.identified, content, name, guess, kind, columns

@@ -22,7 +22,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
-from softstart.page.downloads import file_name, written_text
+from softstart.page.downloads import file_name, profile_file, written_text
 from softstart.page.machines import Loaded, with_typed_changes
 from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
@@ -108,14 +108,14 @@ def player_of(best: Optimum, label: str) -> Controller:
 
 def profile_files(best: Optimum, label: str) -> dict[str, str]:
     """The profile of an optimum as CSV, TOML and C."""
-    profile, terminal = best.profile, best.problem.terminal
-    drive = best.problem.drive.name
-    about = {"drive": drive, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
-    return {
-        file_name(label, suffix=".csv"): written_text(profile.to_csv, ".csv"),
-        file_name(label, suffix=".toml"): written_text(lambda path: profile.to_toml(path, about), ".toml"),
-        file_name(label, suffix=".c"): written_text(lambda path: profile.to_c(path, about=about), ".c"),
+    problem = best.problem
+    about = {
+        "drive": problem.drive.name,
+        "start_time": best.end_time,
+        "terminal": problem.terminal,
+        "k_dyn": best.k_dyn,
     }
+    return dict(profile_file(best.profile, label, suffix, about) for suffix in (".csv", ".toml", ".c"))
 
 
 def curve(
@@ -333,16 +333,18 @@ def _margins(compared: Comparison) -> Sheet:
 
 
 def report_task(
-    drive: Loaded,
-    controllers: Sequence[str | Controller],
-    command: str,
-    *,
-    progress: Progress,
-) -> str:
-    """The report for a customer, as one HTML text; SOFTSTART_BUDGET, in s, is its `budget`."""
+    drive: Loaded, controllers: Sequence[str | Controller], command: str, file: str, *, progress: Progress
+) -> TaskResult:
+    """The report for a customer, as one HTML file; SOFTSTART_BUDGET, in s, is its `budget`."""
     from softstart import reporting
 
     progress(0.0, "starting the drive")
-    budget = os.environ.get("SOFTSTART_BUDGET")
-    options: dict[str, Any] = {"command": command} | ({"budget": float(budget)} if budget else {})
-    return str(reporting.report(drive, controllers=controllers, progress=progress, **options).to_html())
+    budget = float(text) if (text := os.environ.get("SOFTSTART_BUDGET")) else None
+    report = reporting.report(
+        drive,
+        controllers=controllers,
+        progress=progress,
+        command=command,
+        budget=float(budget) if budget else None,
+    )
+    return TaskResult("", {file: str(report.to_html())})

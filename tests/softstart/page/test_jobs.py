@@ -75,7 +75,7 @@ def test_one_after_another_in_processes_of_low_priority(jobs: Jobs, works: Any, 
     assert Path(log).read_text().split() == ["1", "2", "3"]
     for job in begun:
         assert (job.state, job.share, job.message) == (JobState.DONE, 1.0, "half of it")
-        assert job.error == ""
+        assert job.sentences == ()
         pid, niceness, threads = job.result
         assert (pid, niceness, threads) == (job.pid, min(os.nice(0) + NICENESS, 19), "1")
         assert not alive(pid)
@@ -144,11 +144,11 @@ def test_failures_are_sentences(
     assert job.state is JobState.FAILED
     assert job.result is None
     if sentences is None:
-        assert "signal 9" in job.error
+        assert "signal 9" in job.sentences[0]
     else:
         assert job.sentences == sentences
     assert ("Traceback" in caplog.text) == (sentences == (MISTAKE,))
-    assert "Traceback" not in job.error
+    assert "Traceback" not in "".join(job.sentences)
 
 
 def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:

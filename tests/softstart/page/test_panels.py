@@ -15,6 +15,7 @@ from softstart import DataSheet, Drive, InputError
 from softstart.controller import make_controller
 from softstart.page.jobs import Jobs, JobState
 from softstart.page.session import Session
+from softstart.page.tasks import TaskResult
 
 pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
 
@@ -32,25 +33,28 @@ def client() -> Iterator[Any]:
 
 
 class Hasty:
-    """A job that ends in its thread when somebody has looked so often at how often it has changed."""
+    """A job that ends in its thread when somebody has read its state so often."""
 
     def __init__(self) -> None:
-        self.state, self.result, self.sentences = JobState.RUNNING, None, ()
+        self._state, self.result, self.sentences = JobState.RUNNING, None, ()
         self.share, self.message, self.ahead, self.stopping = None, "", 0, False
-        self.count, self.looks, self.clock = 1, -1, itertools.count()
+        self.looks, self.clock = -1, itertools.count()
+        self.subject = None
 
     @property
     def seconds(self) -> float:
         return next(self.clock)  # another second at each look
 
     @property
-    def changes(self) -> int:
-        seen = self.count
+    def state(self) -> JobState:
+        state = self._state
         self.looks -= 1
         if self.looks == 0:
-            self.state, self.result = JobState.DONE, "the result"
-            self.count += 1
-        return seen
+            self.end()
+        return state
+
+    def end(self) -> None:
+        self.result, self._state = TaskResult("the result"), JobState.DONE
 
 
 class Queue(Jobs):
@@ -58,44 +62,56 @@ class Queue(Jobs):
         return Hasty()
 
 
-@pytest.mark.parametrize("looks", [1, 2, 3, 4])
-def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
-    from softstart.page.panel_parts import JobView
+def panel_of(jobs: Jobs, user: str = "A") -> Any:
+    """A panel that lists the results that it has shown."""
+    from softstart.page.job_panel import JobPanel
 
-    given, states = [], []
-    view = JobView(Queue(), "A", "it", on_done=given.append, on_state=lambda: states.append(view.busy))
-    view.begin("it", print)
-    view.job.looks = looks
+    class Panel(JobPanel):
+        name, about = "it", ""
+
+        def task(self) -> tuple[Any, ...]:
+            return (print,)
+
+        def show(self, result: TaskResult) -> None:
+            super().show(result)
+            given.append(result.html)
+
+    given: list[str] = []
+    panel = Panel(Session(controllers=["direct"]), user, jobs)
+    panel.given = given
+    return panel
+
+
+@pytest.mark.parametrize("looks", [1, 2, 3, 4, 5])
+def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
+    panel = panel_of(Queue())
+    panel.start()
+    panel.job.looks = looks
     for _ in range(looks + 2):
-        view._refresh()
-    assert given == ["the result"]
-    assert states[-1] is False
+        panel.refresh()
+    assert panel.given == ["the result"]
+    assert panel.go.enabled
 
 
 def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
-    """Its one result; `mine` is the tab in which it was begun."""
-    from softstart.page.panel_parts import JobView
-
+    """Its one result; `mine` is the tab in which it was started."""
     jobs = Queue()
-    given: dict[str, list[Any]] = {"first": [], "second": [], "late": [], "other": []}
-
-    def tab(name: str, user: str = "A") -> Any:
-        return JobView(jobs, user, "it", on_done=given[name].append)
-
-    first, second, other = tab("first"), tab("second"), tab("other", "B")
-    first.begin("it", print, subject="the drive")
+    first, second, other = panel_of(jobs), panel_of(jobs), panel_of(jobs, "B")
+    first.start()
     job = first.job
-    second._refresh()
-    other._refresh()
-    assert (first.mine, second.mine, second.busy, second.subject) == (True, False, True, "the drive")
+    second.refresh()
+    other.refresh()
+    assert (first.mine, second.mine, second.busy) == (True, False, True)
+    assert job.subject is first.session.inputs.machine
     assert other.job is None
-    second.begin("another", print)  # one at a time at one place
+    second.start()  # one at a time at one place
     assert second.job is job
-    job.state, job.result, job.count = JobState.DONE, "the result", 2
-    late = tab("late")  # the page was loaded anew
-    for view in (first, second, late, other) * 2:
-        view._refresh()
-    assert given == {"first": ["the result"], "second": ["the result"], "late": ["the result"], "other": []}
+    job.end()
+    late = panel_of(jobs)  # the page was loaded anew
+    for panel in (first, second, late, other) * 2:
+        panel.refresh()
+    assert [panel.given for panel in (first, second, late)] == [["the result"]] * 3
+    assert other.given == []
     assert not late.mine
 
 
@@ -148,8 +164,8 @@ def test_a_data_sheet_without_stiffness_is_loaded_with_both_its_ends(client, mon
         panel._use()
         assert session.inputs.both_ends == ends
         tuning, checks = panels.TuningPanel(session, "A", Queue()), panels.ChecksPanel(session, "A", Queue())
-        assert ends in tuning.question()
-        assert ends in checks.question()
+        assert ends in tuning.task()
+        assert ends in checks.task()
 
 
 def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> None:
@@ -166,15 +182,16 @@ def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> 
 
 
 def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
-    from softstart.page import tasks
     from softstart.page.panels import OptimumPanel
 
-    crane = Drive.load("crane-4amtkf")
-    session = Session(crane, controllers=["direct"])
-    panel = OptimumPanel(session, "A", Jobs())
-    panel._found = tasks.TaskResult("", controllers={"optimum": make_controller("ramp")})
+    session = Session("crane-4amtkf", controllers=["direct"])
+    panel = OptimumPanel(session, "A", Queue())
+    panel.start()
+    panel.job.end()
+    panel.job.result = TaskResult("", controllers={"optimum": make_controller("ramp")})
     session.load(Drive.load("hoist-15kw"))
-    panel._stale.show_for(crane)
+    with pytest.raises(InputError, match="another drive is loaded now: it is not added"):
+        panel.refresh()  # it would be added at once
     with pytest.raises(InputError, match="another drive is loaded now: it is not added"):
         panel.add("optimum")
     assert list(session.inputs.controllers) == ["direct"]
