@@ -22,7 +22,7 @@ from softstart import Drive, simulate
 sync_client = pytest.importorskip("websockets.sync.client", reason="comes with NiceGUI: make page")
 ConnectionClosed = pytest.importorskip("websockets.exceptions").ConnectionClosed
 
-OWN_FAULT = "mistake in softstart"
+INTERNAL = "Internal error in softstart"
 ESCAPED = (("&#36;", "$"), ("&#96;", "`"), ("&gt;", ">"), ("&lt;", "<"), ("&amp;", "&"))
 
 
@@ -78,7 +78,7 @@ class Tab:
                 self.line.send("3")
             if not isinstance(text, str) or not text.startswith("42"):
                 continue
-            assert OWN_FAULT not in text
+            assert INTERNAL not in text
             code = json.loads(text[2:])[1].get("code", "").replace("\n", "")
             if called := re.search(r'"frame", \[(.*)\]\)', code):
                 number, frame = json.loads(f"[{called[1]}]")

@@ -267,7 +267,7 @@ def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None
     found = identify(coarse, guess, free=["motor_inertia", "position"], searches=1)
     assert found["motor_inertia"].value == pytest.approx(TRUTH.motor_inertia, rel=0.01)
     assert not found["motor_inertia"].known
-    assert any("motor_inertia: at the limit of the search. Remedy: begin" in note for note in found.notes)
+    assert any("motor_inertia: at the limit of the search. Remedy: start" in note for note in found.notes)
     assert "at the limit of the search" in [cell for row in estimates_table(found).rows for cell in row]
 
 

@@ -192,7 +192,7 @@ def test_a_file_is_read_by_the_names_of_its_columns(log: Log, kind: str, tmp_pat
     ]
     path = tmp_path / "trace.csv"
     path.write_text("\n".join([heading, *rows]), encoding=encoding)
-    with pytest.raises(InputError, match=r"there are the columns .*; write --columns"):
+    with pytest.raises(InputError, match=r"there are the columns .*; set columns to"):
         Log.load(path)
     read = Log.load(path, columns=columns)
     assert read.time == pytest.approx(2.0 * log.time, abs=1e-9)
@@ -326,7 +326,7 @@ def test_a_torque_without_a_unit_is_taken_for_newton_metres_and_that_is_said(tmp
     ("text", "sentence"),
     [
         ("\0\0", "this is not a text file; export the signals as CSV"),
-        ("s;torque;angle\n0;1;2\n1;1;2", "none is called time; write --columns .time=NAME .ms."),
+        ("s;torque;angle\n0;1;2\n1;1;2", "none is called time; set columns to .time=NAME .ms."),
         ("time;torque [%];angle\n0;1;2\n1;1;2", r"torque \[%\].*of %, as .torque=NAME \[% of 35 N\*m\]"),
         ("time,torque,speed [%]\n0,1,2\n1,1,2", r"speed \[%\].*is no unit.*speed=NAME \[rad/s\]"),
         ("time,torque,speed,angle\n0,1,1,2\n1,1,1,2", "they name both of angle and speed"),

@@ -273,8 +273,8 @@ def _places(names: Sequence[str], wanted_columns: Mapping[str, WantedColumn]) ->
         wrong.append(f"they name {'both' if motions else 'neither'} of angle and speed")
     if wrong:
         raise RefusedError(
-            f"there are the columns {', '.join(filter(None, names))}; {' and '.join(wrong)}; write --columns "
-            '"time=NAME [ms],torque=NAME,speed=NAME [rpm]" with names of this file'
+            f"there are the columns {', '.join(filter(None, names))}; {' and '.join(wrong)}; set columns "
+            'to "time=NAME [ms],torque=NAME,speed=NAME [rpm]" with names of this file'
         )
     return {key: places[key][0] for key in wanted}
 
@@ -330,7 +330,7 @@ def _unit_size(
     if key == "torque" and not unit:
         notes.append(
             f"{show(name)} has no unit and was taken for a torque in N m, which no motion can check; if it "
-            f'is in % or a current, write --columns "torque={name}[% of 35 N*m]" or "torque=1.2*{name}[N*m]"'
+            f'is in % or a current, set columns to "torque={name}[% of 35 N*m]" or "torque=1.2*{name}[N*m]"'
         )
         return 1.0
     if key == "torque":
@@ -373,7 +373,7 @@ def _motion_unit_size(
         elif unit and not _matches(size, right):
             raise RefusedError(
                 f"{show(title)} and {show(sheet.titled(i))} cannot both be right: by the second the first is "
-                f'in {unit}; write the unit that is meant, as --columns "{key}={name}[{unit}]"'
+                f'in {unit}; set columns to "{key}={name}[{unit}]"'
             )
     if size is not None:
         return size
@@ -382,7 +382,7 @@ def _motion_unit_size(
     told = f"; {'; '.join(hints)}" if hints else ""
     raise RefusedError(
         f"{show(name)}, the {key}, has no unit, and with another one another drive explains the log as well; "
-        f"write one of --columns {ways}{counts}{told}"
+        f"set columns to one of {ways}{counts}{told}"
     )
 
 
@@ -436,6 +436,4 @@ def _in_si(unit: str, key: str, cell: str) -> float:
             part = unit.strip() if unit.strip() in SHARES else "%"
             ways += f'; of {part}, as "torque=NAME [{part} of 35 N*m]"'
             ways += '; of a current in A, as "torque=1.2*NAME [N*m]"'
-        raise RefusedError(
-            f"{show(cell)}: {reason}; or name the unit that is meant, as --columns {ways}"
-        ) from None
+        raise RefusedError(f"{show(cell)}: {reason}; or set columns to {ways}") from None

@@ -265,7 +265,7 @@ class Log:
             word, side = ("rises", "below") if float(speed[share][-1]) > 0.0 else ("falls", "above")
             raise InputError(
                 f"{name}: the {kind} {word} where the torque is {side} 0; one of the two has the wrong sign; "
-                "write --columns torque=-NAME to turn that of the torque round."
+                "set columns to torque=-NAME to change that of the torque."
             )
 
 

@@ -40,6 +40,7 @@ from softstart.identification.unknowns import (
 )
 from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
+from softstart.results import Sentence
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps of a chain, at the motor shaft
@@ -171,7 +172,7 @@ def _directed(log: Log, drive: Drive) -> Log:
         return turned
     note = (
         "the drive first turns backward, where the active load drives it; if the log counts the other way "
-        "than the drive file, turn both round: --columns torque=-NAME,angle=-NAME"
+        "than the drive file, change both signs: set columns to torque=-NAME,angle=-NAME"
     )
     return log.changed(notes=(*log.notes, note.replace("angle", log.kind)))
 
@@ -243,7 +244,7 @@ def _check_inertia(log: Log, drive: Drive) -> None:
         f"{log.name}: torque and motion tell an inertia of about {inertia:.3g} kg m2, and the drive has "
         f"{low + float(drive.J2):.3g} kg m2; look at the units of its columns: time in ms, speed in "
         "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms], or "
-        'given as --columns "time=NAME [ms]".'
+        'set by columns, "time=NAME [ms]".'
     )
 
 
@@ -258,8 +259,8 @@ def _check_step(log: Log, lines: float) -> None:
         if abs(share - 1.0) < STEP_ALIKE and abs(counts - 1.0) > STEP_ALIKE:
             raise InputError(
                 f"{log.name}: the {log.kind} goes in steps of {log.count:.4g} {si}, which are the counts of "
-                f'{lines:g} encoder lines in {unit}; write --columns "{log.kind}=NAME[{unit}]", or --set '
-                "motor.encoder_lines=0 if the log is of another encoder."
+                f'{lines:g} encoder lines in {unit}; set columns to "{log.kind}=NAME[{unit}]", or '
+                "motor.encoder_lines to 0 if the log is of another encoder."
             )
 
 
@@ -331,9 +332,9 @@ def _unknown_parameters(estimates: Sequence[Estimate]) -> list[str]:
             reasons.setdefault(estimate.reason, []).append(estimate.name)
     if not reasons:
         return []
-    remedy = "a log of an experiment that tells it (softstart plan)"
+    remedy = "a log of an experiment that determines it"
     if AT_LIMIT in reasons:
-        remedy = f"begin from another guess of {listed(reasons[AT_LIMIT])} (--set)"
+        remedy = f"start from another initial guess of {listed(reasons[AT_LIMIT])}"
     groups = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
     return [f"Unknown: {groups}. Remedy: {remedy}."]
 
@@ -382,7 +383,7 @@ def model_mismatch(fitter: Fitter, best: FitPoint) -> list[str]:
     if replace(fitter, unknowns=wider).step(best)[1] > UNSETTLED:
         ends = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
         where = f"beyond the limit of the search for {listed(ends)}" if ends else "elsewhere"
-        notes.append(f"The fit would be better {where}: begin from another guess (--set).")
+        notes.append(f"The fit would be better {where}: start from another initial guess.")
     if notes:
         notes.append(
             "The drive does not explain the logs: the values are its best fit, and no interval is stated."
@@ -421,13 +422,15 @@ def _effects(fitter: Fitter, best: FitPoint) -> list[str]:
         return []
     what, unit, remedy = "an offset of the torque signal", "N m", ""
     if effect != "offset":
-        one = PARAMETERS[effect]
-        what, unit, remedy = one.meaning, one.unit, f" Remedy: find it too, --free +{one.path}."
+        parameter = PARAMETERS[effect]
+        what, unit = parameter.meaning, parameter.unit
+        remedy = f"Remedy: identify it too, --free +{parameter.path}."
     value = had.get(effect, 0.0)
-    return [
+    fact = (
         f"The logs show {what} of {value + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
-        f"{value:.3g}: gap and load torque may be far off.{remedy}"
-    ]
+        f"{value:.3g}: gap and load torque may be far off."
+    )
+    return [Sentence(fact, remedy, page="")]  # the page has no choice of unknowns
 
 
 def _slow_torque(spot: LogLinearization, sizes: ErrorScales) -> float:

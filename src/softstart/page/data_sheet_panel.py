@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Any
 
 from nicegui import ui
 
@@ -22,7 +21,18 @@ from softstart.drive.data_sheet_words import (
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
-from softstart.page.panel_parts import Troubles, action, box, choice, hint, notify, reveal, save, text_field
+from softstart.page.panel_parts import (
+    Troubles,
+    action,
+    box,
+    choice,
+    hint,
+    notify,
+    reveal,
+    row_of,
+    save,
+    text_field,
+)
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
@@ -45,7 +55,7 @@ class DataSheetPanel:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        self._fields: dict[str, Any] = {}
+        self._fields: dict[str, ui.input | ui.select] = {}
         with box("sheet-form"):
             hint(
                 "Each number as its data sheet gives it, at its own part, in the unit beside its name or "
@@ -72,10 +82,10 @@ class DataSheetPanel:
     def _about(self, machine: str) -> None:
         """Show the fields of this machine."""
         for name, machines in ABOUT.items():
-            self._fields[name].parent_slot.parent.set_visibility(machine in machines)
+            row_of(self._fields[name]).set_visibility(machine in machines)
 
     def sheet(self) -> DataSheet | None:
-        """What is written in the form; None if something is wrong with it, which is said then."""
+        """The contents of the form; None if something is wrong with them, which is shown then."""
         machine = str(self._fields["machine"].value)
         written = {
             p.path: text
@@ -83,29 +93,29 @@ class DataSheetPanel:
             if machine in ABOUT.get(p.name, (machine,))
             and (text := typed(p, str(self._fields[p.name].value)))
         }
-        found: DataSheet | None = None
+        sheet: DataSheet | None = None
         reveal(self._answer, "nearest")
         try:
-            found = DataSheet.from_settings(answered(written))
-            title, sentences = "Check these values.", found.plausibility_warnings
+            sheet = DataSheet.from_settings(answered(written))
+            title, sentences = "Check these values.", sheet.plausibility_warnings
         except InputError as error:
-            found, title, sentences = None, "There is no drive yet.", list(error.sentences)
+            title, sentences = "There is no drive yet.", list(error.sentences)
         self._troubles.say(sentences, title)
-        self._text.set_visibility(found is not None)
-        self._text.set_text("" if found is None else found.drive_toml())
-        return found
+        self._text.set_visibility(sheet is not None)
+        self._text.set_text("" if sheet is None else sheet.drive_toml())
+        return sheet
 
     def _use(self) -> None:
-        if (found := self.sheet()) is not None:
-            self._session.load(found.possible)
-            notify(f"{clipped(found.name)} is loaded.")
+        if (sheet := self.sheet()) is not None:
+            self._session.load(sheet.possible)
+            notify(f"{clipped(sheet.name)} is loaded.")
 
     def _save(self) -> None:
-        if (found := self.sheet()) is not None:
-            save(found.drive_toml(), drive_file(found.drive))
+        if (sheet := self.sheet()) is not None:
+            save(sheet.drive_toml(), drive_file(sheet.drive))
 
 
-def data_sheet_field(p: Parameter) -> Any:
+def data_sheet_field(p: Parameter) -> ui.input | ui.select:
     """The field of one parameter with an example; below it its value in SI, or what is used without."""
     needed = p.required or p.name == "mass"
     unit = USUAL.get(p.name, p.unit)
@@ -115,19 +125,18 @@ def data_sheet_field(p: Parameter) -> Any:
         words = {word: f"{word}: {about}" for word, about in MACHINES.items()}
         return choice(f"{label} *", words, p.example.strip('"'), name)
     example = "such as " + p.example.strip('"').removesuffix(f" {unit}")
-    one = text_field(label + (" *" if needed else ""), "", name, TYPICAL.get(p.name, ("", example))[1])
-    with one.parent_slot.parent:
+    field = text_field(label + (" *" if needed else ""), "", name, TYPICAL.get(p.name, ("", example))[1])
+    with row_of(field):
         note = ui.label().props(f'data-testid="{name}-note"')
+    nothing = "" if needed or if_empty(p) == "none" else f"empty: {if_empty(p)}"
 
-    def say() -> None:
-        text = str(one.value)
+    def explain() -> None:
+        text = str(field.value)
         try:
-            nothing = "" if needed or if_empty(p) == "none" else f"empty: {if_empty(p)}"
-            said = echo(p, text) if text.strip() else nothing
+            note.set_text(echo(p, text) if text.strip() else nothing)
         except RefusedError as refusal:
-            said = in_usual_unit(p, refusal).reason
-        note.set_text(said)
+            note.set_text(in_usual_unit(p, refusal).reason)
 
-    say()
-    one.on_value_change(say)
-    return one.props(f'placeholder="{example}" maxlength=200')
+    explain()
+    field.on_value_change(explain)
+    return field.props(f'placeholder="{example}" maxlength=200')

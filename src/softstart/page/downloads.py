@@ -26,6 +26,7 @@ from softstart.quantities import shortest
 if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
 
+UNSETTABLE = ("name", "source")  # by --set
 MOST_SETTINGS = 8  # more than that are better kept in a file
 LONGEST = 60
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
@@ -94,8 +95,8 @@ def command_text(
         elif label in controller_names():
             names.append(label)
             params += [
-                f"{label}.{name}={_literal(value, one.unit)}"
-                for name, one in declared_parameters(controller).items()
+                f"{label}.{name}={_literal(value, parameter.unit)}"
+                for name, parameter in declared_parameters(controller).items()
                 if (value := getattr(controller, name)) is not None
             ]
     profiles = [param for param in params if param.startswith("profile.")]
@@ -124,14 +125,13 @@ def drive_words(drive: Machine) -> list[str]:
     >>> drive_words(Chain.load("crane-4-mass"))
     ['crane-4-mass']
     """
-    alike = {name: one for name, one in shipped_drives().items() if type(one) is type(drive)}
-    shipped = [(name, changes(one, drive)) for name, one in alike.items()]
-    name, differing = min(shipped, key=lambda one: len(one[1]))
-    if len(differing) > MOST_SETTINGS or any(one.new is None for one in differing):
+    same_kind = {name: machine for name, machine in shipped_drives().items() if type(machine) is type(drive)}
+    candidates = [(name, changes(machine, drive)) for name, machine in same_kind.items()]
+    name, different = min(candidates, key=lambda candidate: len(candidate[1]))
+    unsettable = any(change.new is None or change.parameter.name in UNSETTABLE for change in different)
+    if len(different) > MOST_SETTINGS or unsettable:
         return [drive_file(drive)]
-    if any(one.parameter.name in ("name", "source") for one in differing):
-        return [drive_file(drive)]
-    settings = (f"{one.path}={_literal(one.new, one.parameter.unit)}" for one in differing)
+    settings = (f"{change.path}={_literal(change.new, change.parameter.unit)}" for change in different)
     return [name, *(word for setting in settings for word in ("--set", setting))]
 
 

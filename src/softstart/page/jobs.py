@@ -16,15 +16,9 @@ from softstart.errors import InputError, SimulationError
 from softstart.parallel import DiedError, Message, Progress, Worker, checked_workers
 
 NICENESS = 10  # the live page comes first
-OUT_OF_MEMORY = "The computation needs more memory than there is; ask for fewer points or a smaller grid."
-DIED = (
-    "The process of this computation was ended from outside ({}), perhaps because memory ran out; start it "
-    "again, or ask for less."
-)
-MISTAKE = (
-    "There is a mistake in softstart, and this could not be computed; the log of the server "
-    "says more. Everything else goes on."
-)
+OUT_OF_MEMORY = "Not enough memory for this computation; ask for fewer points or a smaller grid."
+DIED = "The computation was killed ({}), perhaps for lack of memory; start it again or ask for less."
+MISTAKE = "Internal error in softstart, not caused by your input; details are in the log of the server."
 
 log = logging.getLogger("softstart.page")
 
@@ -102,7 +96,7 @@ class Job:
                 self.pid, self._began, self.state = self._worker.pid, time.monotonic(), JobState.RUNNING
             state, sentences = self._heard(self._worker)
         except Exception:
-            log.exception("The process of %r could not be attended.", self.title)
+            log.exception("The process of %r was lost.", self.title)
         finally:
             if self._worker is not None:
                 self._worker.kill()
@@ -165,7 +159,7 @@ class Jobs:
         job = Job(user, title, pickle.dumps((work, args)), self._ahead)
         with self._lock:
             if self._ended:
-                raise InputError("The server is ending; nothing new is begun.")
+                raise InputError("The server is ending and starts no computation.")
             self._jobs.append(job)
             self._threads.submit(self._attend, job)
         return job

@@ -143,26 +143,27 @@ def parameter_fields(machine: Machine) -> Mapping[str, Entry]:
     >>> gap.group, gap.symbol, gap.scale
     ('pinion - wheel shaft', '\N{GREEK SMALL LETTER DELTA}\N{SUBSCRIPT TWO}', Scale(low=0.0, high=0.8, ...))
     """
-    values, lever_rule_model, found = machine.parameters_by_path(), machine.lever_rule_model, {}
+    values, model, entries = machine.parameters_by_path(), machine.lever_rule_model, {}
     for place, table, k in _places(machine):
         for key in FIELDS[table].split():
             path, word = f"{place}.{key}".lstrip("."), f"{table}.{key}".lstrip(".")
             if path not in values or (k and not _has_field(place, key, values, k == machine.load_index + 1)):
                 continue
-            one, value = values[path]
+            parameter, value = values[path]
             group = table.capitalize() or (HEAD if key == "units" else type(machine).__name__)
             if k:
                 group = (machine.mass_names if table == "mass" else machine.shaft_names)[k - 1]
             symbol = SYMBOLS.get(word, "")
-            words = UNITS if path == "units" else one.choices if one.unit else ()
-            found[path] = Entry(
+            choices, si, example = parameter.choices, parameter.unit, parameter.example
+            words = UNITS if path == "units" else choices if si else ()
+            entries[path] = Entry(
                 path, group, LABELS.get(word, key.replace("_", " ")),
-                f"{symbol}{k if k and symbol else ''}".translate(BELOW), one.unit,
-                f"{one.meaning}; write for example {', '.join([*words, one.example])}", one.example,
-                () if one.unit else one.choices, words, one.default is None,
-                _scale(word, value, machine, lever_rule_model, k),
+                f"{symbol}{k if k and symbol else ''}".translate(BELOW), si,
+                f"{parameter.meaning}; write for example {', '.join([*words, example])}", example,
+                () if si else choices, words, parameter.default is None,
+                _scale(word, value, machine, model, k),
             )  # fmt: skip
-    return found
+    return entries
 
 
 def _places(machine: Machine) -> list[tuple[str, str, int]]:
@@ -183,7 +184,7 @@ def _has_field(place: str, key: str, values: Values, load: bool) -> bool:
     return key != "contact_law" and (key != "torque" or load or bool(values[f"{place}.torque"][1]))
 
 
-def _scale(word: str, value: Any, origin: Machine, lever_rule_model: TwoMasses, k: int) -> Scale | None:
+def _scale(word: str, value: Any, origin: Machine, model: TwoMasses, k: int) -> Scale | None:
     """The slider of a main parameter, about the machine as it was loaded; `k` numbers a part of a chain."""
     drive: Any = origin.motor
     motor, ratio = float(drive.starting_torque), 1.0
@@ -192,7 +193,7 @@ def _scale(word: str, value: Any, origin: Machine, lever_rule_model: TwoMasses, 
         ratio = origin.speed_ratios()[k - (not after)]
     match word.split("."):
         case ["motor", "starting_torque"]:
-            weakest = rounded(min(max(1.1 * lever_rule_model.Mc, 0.1 * motor), 0.9 * motor), 2)
+            weakest = rounded(min(max(1.1 * model.Mc, 0.1 * motor), 0.9 * motor), 2)
             return Scale(weakest, max(float(drive.maximum_torque), motor))
         case ["motor", "torque_lag"]:
             return Scale(0.0, rounded(max(0.02, 4.0 * value), 2))
@@ -205,12 +206,7 @@ def _scale(word: str, value: Any, origin: Machine, lever_rule_model: TwoMasses, 
         case ["shaft", "damping"]:
             if k:
                 return Scale(0.0, rounded(5.0 * value))
-            critical = 2.0 * math.sqrt(
-                lever_rule_model.c
-                * lever_rule_model.J1
-                * lever_rule_model.J2
-                / (lever_rule_model.J1 + lever_rule_model.J2)
-            )
+            critical = 2.0 * math.sqrt(model.c * model.J1 * model.J2 / (model.J1 + model.J2))
             return Scale(0.0, rounded(max(0.3 * critical, 2.0 * value), 2))
         case ["shaft", "damping_ratio"]:
             return Scale(0.0, max(MOST_DAMPING, 2.0 * (value or 0.0)))
@@ -229,33 +225,36 @@ def page_parameters(controller: Controller) -> list[ControllerParameter]:
     ['initial', 'time', 'full_torque', 'period']
     """
     declared = {} if isinstance(controller, Tuned) else declared_parameters(controller)
-    return [one for one in declared.values() if one.declared and (one.choices or one.unit)]
+    return [
+        parameter for parameter in declared.values()
+        if parameter.declared and (parameter.choices or parameter.unit)
+    ]  # fmt: skip
 
 
 def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, Entry]:
     """The fields of a strategy, those without a slider or choice last; sliders go as far as tuning would.
 
     >>> from softstart.controller import make_controller
-    >>> found = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"), "s-curve")
-    >>> found["strategy.rounding"].scale
+    >>> entries = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"), "s-curve")
+    >>> entries["strategy.rounding"].scale
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
-    own = page_parameters(controller)
-    default, names = controller.defaults(origin.design_drive) if own else {}, tunable_parameters(controller)
+    parameters = page_parameters(controller)
+    default = controller.defaults(origin.design_drive) if parameters else {}
+    tunable = tunable_parameters(controller)
     scales = {}
-    for one in ranges_of(controller, names) if own and names else ():
-        low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
+    for search in ranges_of(controller, tunable) if parameters and tunable else ():
+        low, high = (rounded(float(end)) for end in search.ends(default.get(search.name, 1.0)))
         if low < high:
-            scales[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
-    main = [one for one in own if one.name in scales or one.choices] or own
+            scales[search.name] = Scale(low, high, search.logarithmic and low > 0.0)
+    main = {p.name for p in parameters if p.name in scales or p.choices} or {p.name for p in parameters}
     return {
-        STRATEGY + one.name: Entry(
-            STRATEGY + one.name, f"parameters of {label}" if one in main else MORE,
-            one.name.replace("_", " "), "", one.unit,
-            f"{one.meaning}; default: {one.default_text or 'fixed'}",
-            "a value, or nothing for the default", one.choices, (), True, scales.get(one.name),
+        STRATEGY + p.name: Entry(
+            STRATEGY + p.name, f"parameters of {label}" if p.name in main else MORE,
+            p.name.replace("_", " "), "", p.unit, f"{p.meaning}; default: {p.default_text or 'fixed'}",
+            "a value, or nothing for the default", p.choices, (), True, scales.get(p.name),
         )
-        for one in [*main, *(one for one in own if one not in main)]
+        for p in sorted(parameters, key=lambda p: p.name not in main)
     }  # fmt: skip
 
 
@@ -277,9 +276,9 @@ def without(machine: Machine, path: str) -> Machine:
     >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
     None
     """
-    knob = machine.parameter_value(path)
-    assert knob is not None
-    return machine.with_values({knob.name: None})
+    parameter = machine.parameter_value(path)
+    assert parameter is not None
+    return machine.with_values({parameter.name: None})
 
 
 def machine_from(text: str, where: str = "") -> Machine:
@@ -353,9 +352,9 @@ def placeless(machine: Machine, axes: Axes, origin: Machine) -> tuple[Any, ...]:
     >>> placeless(chain.with_gap_and_inertia(0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
     True
     """
-    there = machine.with_gap_and_inertia(axes.gaps[-1], axes.inertias[0], origin).parameters_by_path()
-    values = [value for parameter, value in there.values() if parameter.name not in WORDS]
-    return tuple(rounded(one, SAME) if isinstance(one, float) else one for one in values)
+    moved = machine.with_gap_and_inertia(axes.gaps[-1], axes.inertias[0], origin).parameters_by_path()
+    values = [value for parameter, value in moved.values() if parameter.name not in WORDS]
+    return tuple(rounded(value, SAME) if isinstance(value, float) else value for value in values)
 
 
 def k_dyn_row(

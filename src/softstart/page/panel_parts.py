@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakMethod
 
 from nicegui import ui
+from nicegui.element import Element
 
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.sentences import page_sentence, sentence_of
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from nicegui.events import UiEventArguments, UploadEventArguments
 
 POLL = 0.2  # s between two checks of a job
-MOST_SENTENCES = 12  # about one input; whoever has mended these sees the next ones
+MOST_SENTENCES = 12  # about one input; the next ones appear when these are corrected
 TERMINALS = {
     "synchronous": "both masses at target speed",
     "reached": "load at target speed",
@@ -25,29 +26,35 @@ TERMINALS = {
 MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html"}
 
 
-def box(classes: str) -> Any:
+def box(classes: str) -> Element:
     """A plain box; its class says how it lays out what is in it."""
     return ui.element("div").classes(classes)
 
 
-def text_field(label: str, value: str, name: str, example: str = "") -> Any:
+def text_field(label: str, value: str, name: str, example: str = "") -> ui.input:
     """A text field below its label."""
     with box("panel-field"):
         ui.label(label)
-        made = ui.input(value=value).props(f'dense outlined aria-label="{label}" data-testid="{name}"')
-        return made.tooltip(example) if example else made
+        field = ui.input(value=value).props(f'dense outlined aria-label="{label}" data-testid="{name}"')
+        return field.tooltip(example) if example else field
 
 
-def choice(label: str, options: dict[str, str] | list[str], value: str, name: str) -> Any:
+def row_of(field: Element) -> Element:
+    """The box of a field and its label."""
+    assert field.parent_slot is not None
+    return field.parent_slot.parent
+
+
+def choice(label: str, options: dict[str, str] | list[str], value: str, name: str) -> ui.select:
     """A choice of one of several, below its label."""
     with box("panel-field"):
         ui.label(label)
-        made = ui.select(options, value=value)
-        return made.props(f'dense outlined options-dense aria-label="{label}" data-testid="{name}"')
+        field = ui.select(options, value=value)
+        return field.props(f'dense outlined options-dense aria-label="{label}" data-testid="{name}"')
 
 
-def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> Any:
-    """A button; the main one of a panel stands out. What goes wrong is said in sentences."""
+def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> ui.button:
+    """A button; the main one of a panel stands out. Errors are shown as sentences."""
 
     def acting() -> None:
         try:
@@ -57,10 +64,10 @@ def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> 
             for sentence in few(sentences):
                 ui.notify(sentence, type="negative", position="bottom-left", multi_line=True, timeout=8000)
 
-    made = ui.button(text, on_click=acting, color=None).props(
+    button = ui.button(text, on_click=acting, color=None).props(
         f'dense no-caps {"unelevated" if main else "flat"} data-testid="{name}"'
     )
-    return made.classes("panel-main" if main else "panel-action")
+    return button.classes("panel-main" if main else "panel-action")
 
 
 def upload(
@@ -71,7 +78,7 @@ def upload(
     remedy: str,
     take: Callable[[bytes, str], None],
     refuse: Callable[[str, InputError], None],
-) -> Any:
+) -> ui.button:
     """A button that hands the file a user chooses to the method `take(content, name)`.
 
     The method `refuse(name, error)` is called where `take` raises, and, with the remedy, for a file of
@@ -106,12 +113,12 @@ def upload(
 
     chooser = ui.upload(on_upload=uploaded, on_rejected=rejected, max_file_size=largest, auto_upload=True)
     chooser.classes("panel-upload").props(f'accept="{media},text/plain" data-testid="{name}-upload"')
-    made = action(text, lambda: None, f"{name}-load", main=True)
-    return made.on("click", js_handler=f"() => getElement({chooser.id}).pickFiles()")
+    button = action(text, lambda: None, f"{name}-load", main=True)
+    return button.on("click", js_handler=f"() => getElement({chooser.id}).pickFiles()")
 
 
-def hint(text: str) -> Any:
-    """A quiet sentence that says what a panel is for."""
+def hint(text: str) -> Element:
+    """A sentence in grey: what a panel is for."""
     written = html.escape(text).replace("K_dyn", "K<sub>dyn</sub>")
     return ui.html(written, sanitize=False).classes("panel-hint")
 
@@ -159,7 +166,7 @@ class Troubles:
                 ui.label(sentence).classes("trouble")
 
 
-def reveal(part: Any, block: str = "start") -> None:
+def reveal(part: Element, block: str = "start") -> None:
     """Scroll to a part of a panel once the browser has drawn it."""
     seen = f"getHtmlElement({part.id})?.scrollIntoView({{block: '{block}', behavior: 'smooth'}})"
     ui.timer(POLL, lambda: ui.run_javascript(seen), once=True)

@@ -128,15 +128,15 @@ def tunable_controllers() -> list[str]:
     >>> "shaped" in tunable_controllers(), "direct" in tunable_controllers()
     (True, False)
     """
-    found = []
+    names = []
     for name in controller_names():
         try:
             declared = declared_parameters(controller_class(name)).values()
         except InputError:  # somebody's broken plug-in
             continue
-        if any(one.multiples or one.between for one in declared):
-            found.append(name)
-    return found
+        if any(parameter.multiples or parameter.between for parameter in declared):
+            names.append(name)
+    return names
 
 
 def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
@@ -148,22 +148,22 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
     >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
     ([0.25, 1.0], [0.175, 0.35])
     """
-    wrong = Mistakes()
-    found: list[list[float]] = []
-    units = units_of(drive)
+    mistakes, units = Mistakes(), units_of(drive)
+    values: list[list[float]] = []
     for text, name, read, si in (
         (gaps, "Gaps", gaps_of, "rad"),
         (inertias, "Load inertias", inertias_of, "kg*m^2"),
     ):
-        with wrong.collect():
-            found.append(list(read(drive, [units.typed(one, si) for one in values_in(text, name)], name)))
-    wrong.raise_if_any()
-    if len(found[0]) * len(found[1]) > MOST_CELLS:
+        with mistakes.collect():
+            typed = [units.typed(value, si) for value in values_in(text, name)]
+            values.append(list(read(drive, typed, name)))
+    mistakes.raise_if_any()
+    cells = len(values[0]) * len(values[1])
+    if cells > MOST_CELLS:
         raise InputError(
-            f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
-            f"{MOST_CELLS}; take fewer."
+            f"Gaps and load inertias make {cells} cells; the page tunes at most {MOST_CELLS}, give fewer."
         )
-    return found[0], found[1]
+    return values[0], values[1]
 
 
 class LogPanel(JobPanel):

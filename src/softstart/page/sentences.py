@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-import re
 from typing import Any, NamedTuple
 
-from softstart.chain.machines import Values
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest
+from softstart.results import Sentence
 from softstart.views.numbers import unit, units_of
 
 log = logging.getLogger("softstart.page")
@@ -20,42 +19,41 @@ NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source", "assumed", "units", "gear_ratio", "gear_efficiency")  # they change no result
 
 
-OWN_MISTAKE = "This did not work, and that is a mistake in softstart, not in your input ({})."
-FAILED_START = "The start was given up: the strategy failed on this drive ({})."
+INTERNAL_ERROR = "Internal error in softstart, not caused by your input ({})."
+FAILED_START = "The start was aborted: the strategy failed on this drive ({})."
 
 
-def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
+def sentence_of(error: BaseException, otherwise: str = INTERNAL_ERROR) -> str:
     """One plain sentence for an exception: nobody who uses the page sees a traceback.
 
-    `otherwise` is said of an exception that has no sentence of its own.
+    `otherwise` is the sentence for an exception that has none of its own.
 
     >>> sentence_of(InputError(["gap = -1: a gap is 0 or more.", "inertia = 0: above 0."]))
     'gap = -1: a gap is 0 or more. inertia = 0: above 0.'
     >>> sentence_of(KeyError("x"))
-    "This did not work, and that is a mistake in softstart, not in your input (KeyError: 'x')."
+    "Internal error in softstart, not caused by your input (KeyError: 'x')."
     """
     if isinstance(error, InputError):
         return " ".join(map(page_sentence, error.sentences))
     if isinstance(error, SimulationError):
         return page_sentence(" ".join(str(error).split()))
     if isinstance(error, MemoryError):
-        return "There is not enough memory for this."
+        return "Not enough memory."
     text = " ".join(str(error).split())
     if len(text) > LONGEST:
         text = text[:LONGEST] + " ..."
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
-    log.debug("told the user: %s", what, exc_info=error)
+    log.debug("shown to the user: %s", what, exc_info=error)
     return otherwise.format(what)
 
 
 def page_sentence(sentence: str) -> str:
-    """A sentence without the words of the command line, which a page does not have.
+    """A sentence with its advice for the page, which has no command line.
 
-    >>> page_sentence("minimise = life: it is below 0; leave out --max-torque (softstart plan).")
-    'it is below 0; leave out max torque.'
+    >>> page_sentence(Sentence("The position is unknown.", "Give --set start.position.", page="Choose it."))
+    'The position is unknown. Choose it.'
     """
-    text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)
-    return re.sub(r"--([a-z][\w-]*)", lambda option: option[1].replace("-", " "), text)
+    return sentence.on_page if isinstance(sentence, Sentence) else sentence
 
 
 def clipped(name: str) -> str:
@@ -86,20 +84,20 @@ def changed_since(computed: Machine, now: Machine) -> str:
     return f"For {named}; {'another drive is loaded now' if other else 'the drive has changed since'}."
 
 
-def differences(drive: Machine, other: Machine) -> str:
-    """What tells a drive or chain from another one: its name, else its values; empty where both start alike.
+def differences(machine: Machine, other: Machine) -> str:
+    """How a machine differs from another one: its name, else its values; empty where both start alike.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
     'shaft.gap 1 rad, load.inertia 0.2 kg m\N{SUPERSCRIPT TWO}'
     """
-    found = [one for one in changes(drive, other) if one.parameter.name not in WORDS]
-    if found and drive.name != other.name:
-        return clipped(drive.name)
-    seen = units_of(other)
-    named = ", ".join(f"{one.path} {_value(one.parameter, one.old, seen)}" for one in found[:NAMED])
-    return named + (f" and {len(found) - NAMED} more" if len(found) > NAMED else "")
+    different = [change for change in changes(machine, other) if change.parameter.name not in WORDS]
+    if different and machine.name != other.name:
+        return clipped(machine.name)
+    units = units_of(other)
+    values = [f"{change.path} {_value(change, units)}" for change in different[:NAMED]]
+    return ", ".join(values) + (f" and {len(different) - NAMED} more" if len(different) > NAMED else "")
 
 
 class Change(NamedTuple):
@@ -113,35 +111,31 @@ class Change(NamedTuple):
 
 def changes(old: Machine, new: Machine) -> list[Change]:
     """The parameters in which two machines differ; those that follow another one only where they do not."""
-    first, second = old.parameters_by_path(), new.parameters_by_path()
-    found = []
-    for path in dict.fromkeys([*first, *second]):
-        parameter, value = first.get(path) or (second[path][0], None)
-        other = second[path][1] if path in second else None
+    before, after = old.parameters_by_path(), new.parameters_by_path()
+    different = {}
+    for path in dict.fromkeys([*before, *after]):
+        parameter, value = before.get(path) or (after[path][0], None)
+        other = after[path][1] if path in after else None
         if value != other:
-            found.append(Change(path, parameter, value, other))
-    return [one for one in found if not _follows(one, first, second, {other.path for other in found})]
+            different[path] = Change(path, parameter, value, other)
+    paths = {parameter.name: path for path, (parameter, _) in before.items()}
+
+    def follows(path: str, parameter: Parameter) -> bool:
+        """Whether it is, before and after, as the one that it follows by default, which has changed."""
+        leader = paths.get(parameter.follows, "")
+        alike = (leader in values and values[leader][1] == values[path][1] for values in (before, after))
+        return leader in different and all(alike)
+
+    return [change for change in different.values() if not follows(change.path, change.parameter)]
 
 
-def _follows(one: Change, first: Values, second: Values, changed: set[str]) -> bool:
-    """Whether a parameter is, before and after, as the one that it follows by default."""
-    leader = next((path for path, (other, _) in first.items() if other.name == one.parameter.follows), "")
-    return (
-        leader in changed
-        and leader in second
-        and all(values[leader][1] == values[one.path][1] for values in (first, second))
-    )
-
-
-def _value(parameter: Parameter, value: Any, units: Units) -> str:
-    if value is None:
-        return "not given"
-    if isinstance(value, str):
-        return value
-    of = unit(units.of(parameter.unit))
-    each = value if isinstance(value, tuple) else (value,)
-    texts = [written(float(one), parameter.unit, units) for one in each]
-    return ", ".join(texts) + (f" {of}" if of and " " not in texts[-1] else "")
+def _value(change: Change, units: Units) -> str:
+    value, si = change.old, change.parameter.unit
+    if value is None or isinstance(value, str):
+        return value or "not given"
+    shown = unit(units.of(si))
+    texts = [written(float(part), si, units) for part in (value if isinstance(value, tuple) else (value,))]
+    return ", ".join(texts) + (f" {shown}" if shown and " " not in texts[-1] else "")
 
 
 def written(value: float, si: str, units: Units) -> str:

@@ -49,7 +49,7 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 
 @dataclass(frozen=True)
 class TaskResult:
-    """What a task found: HTML to show, texts of files by their names, and what may be taken over from it.
+    """The result of a task: HTML to show, texts of files by their names, and what may be taken over from it.
 
     `controllers` may join the strategies, by label; `drive` may become that of the page.
     """
@@ -61,24 +61,23 @@ class TaskResult:
 
 
 def shown(*sheets: Sheet, first: bool = False) -> str:
-    """The sheets of a terminal as HTML, figures `first` or last, without words of the command line."""
+    """The sheets of a terminal as HTML, figures `first` or last, with advice for the page."""
     from softstart.views.sheet import as_html
 
-    each = (
-        replace(
-            one, conclusions=[*map(page_sentence, one.conclusions)], notes=[*map(page_sentence, one.notes)]
-        )
-        for one in sheets
-    )
-    return "\n".join(as_html(one, len(one.figures), first=first, width=COLUMN) for one in each)
+    parts = []
+    for sheet in sheets:
+        conclusions, notes = ([*map(page_sentence, texts)] for texts in (sheet.conclusions, sheet.notes))
+        on_page = replace(sheet, conclusions=conclusions, notes=notes)
+        parts.append(as_html(on_page, len(sheet.figures), first=first, width=COLUMN))
+    return "\n".join(parts)
 
 
 def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> TaskResult:
-    """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
+    """The start with the lowest K_dyn within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     from softstart.optimal.optimize import optimize
     from softstart.views.optima import optimum_sheet
 
-    progress(None, "looking for the gentlest start")
+    progress(None, "minimising K_dyn")
     with no_solution_as_sentence():
         best = optimize(drive, start_time, terminal=terminal)
     others = []
@@ -121,9 +120,8 @@ def profile_files(best: Optimum, label: str) -> dict[str, str]:
 def curve(
     drive: Machine, controllers: Sequence[Controller], terminal: Terminal, *, progress: Progress
 ) -> TaskResult:
-    """The least K_dyn over the start time, and each strategy beside that of its own start time."""
+    """The lowest K_dyn over the start time, and each strategy beside that of its own start time."""
     from softstart.optimal import front
-    from softstart.views.optima import front_sheet
 
     progress(None, "the shortest start time")
     with no_solution_as_sentence():
@@ -136,9 +134,9 @@ def curve(
             progress(min(done / total, 1.0), f"start in {within}")
             done += 1
 
-        found = front.pareto(drive, times, terminal=terminal, controllers=controllers, progress=doing)
+        limit = front.pareto(drive, times, terminal=terminal, controllers=controllers, progress=doing)
     name = file_name(drive.name, "limit", suffix=".csv")
-    return TaskResult(shown(front_sheet(found), first=True), {name: written_text(found.to_csv, ".csv")})
+    return TaskResult(shown(limit.sheet, first=True), {name: written_text(limit.to_csv, ".csv")})
 
 
 @contextmanager
@@ -164,24 +162,23 @@ def tuning(
 ) -> TaskResult:
     """Gains of a controller for each gap and load inertia, and one set for all."""
     from softstart.tuning.solving import tune
-    from softstart.views.tuning import tuning_sheet
 
-    found = tune(
+    tuned = tune(
         drive, controller, gaps, inertias, certified=certified, restarts=restarts, workers=1,
         progress=_Throttled(progress),
     )  # fmt: skip
     progress(1.0, "writing the gains")
-    sheet = tuning_sheet(found)
+    sheet = tuned.sheet
     files = {}
     for name, write in sheet.files.items():
         stem, suffix = Path(name).stem, Path(name).suffix
         text = write if isinstance(write, str) else written_text(write, suffix)
         files[file_name(controller, stem, suffix=suffix)] = text
     controllers: dict[str, Controller] = {}
-    if found.robust is not None:
-        controllers[f"{controller} (robust)"] = found.robust.controller
-    if found.schedule is not None:
-        controllers[f"{controller} (schedule)"] = found.scheduled
+    if tuned.robust is not None:
+        controllers[f"{controller} (robust)"] = tuned.robust.controller
+    if tuned.schedule is not None:
+        controllers[f"{controller} (schedule)"] = tuned.scheduled
     return TaskResult(shown(sheet), files, controllers)
 
 
@@ -241,7 +238,6 @@ def identified(
     """
     from softstart.identification.logs import Log
     from softstart.identification.solving import identify
-    from softstart.views.identification import identification_sheet
 
     progress(None, "reading the log")
     with tempfile.TemporaryDirectory(prefix="softstart-log-") as folder:
@@ -250,17 +246,16 @@ def identified(
         try:
             log = Log.load(path, columns=columns, torque_is=torque_is)
         except InputError as error:
-            raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
-    found = identify(log, guess, progress=lambda doing: progress(None, doing))
-    files = {"identified-drive.toml": found.drive.to_toml()}
-    return TaskResult(shown(identification_sheet(found)), files, drive=found.drive)
+            raise InputError([sentence.replace(str(path), name) for sentence in error.sentences]) from None
+    fit = identify(log, guess, progress=lambda doing: progress(None, doing))
+    files = {"identified-drive.toml": fit.drive.to_toml()}
+    return TaskResult(shown(fit.sheet), files, drive=fit.drive)
 
 
 def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     from softstart.optimal.optimize import optimize
-    from softstart.views import optima
-    from softstart.views.fatigue import fatigue_sheet
+    from softstart.views.optima import optimum_sheet
     from softstart.views.sheet import Sheet
 
     progress(0.0, "limits")
@@ -270,12 +265,11 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     sheets = [_positions(machine, controllers), _margins(compared)]
     progress(0.6, "life of the shaft line")
     try:
-        sheets.append(fatigue_sheet(fatigue([row.run for row in compared.rows])))
+        sheets.append(fatigue([row.run for row in compared.rows]).sheet)
     except InputError as error:
         sheets.append(Sheet("Life of the shaft line", notes=list(error.sentences)))
-    if (
-        not machine.limits or machine.limits.used_torque is not None
-    ):  # those of single shafts bound no optimum
+    # the permissible torques of single shafts bound no optimum
+    if not machine.limits or machine.limits.used_torque is not None:
         return TaskResult(shown(*sheets))
     progress(0.8, "the quickest start that keeps the limits")
     try:
@@ -284,7 +278,7 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     except (InputError, SimulationError) as error:
         return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=[str(error)])))
     label = f"quickest {best.end_time:.4g} s"
-    quickest = optima.optimum_sheet(best, [row.run for row in compared.rows])
+    quickest = optimum_sheet(best, [row.run for row in compared.rows])
     return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
 
 
@@ -297,17 +291,15 @@ def _positions(machine: Machine, controllers: Mapping[str, Controller]) -> Sheet
     try:
         unknown = with_typed_changes(machine, {"start.position": "unknown"})
     except InputError as error:
-        return Sheet(title, notes=["It starts from one position alone.", *error.sentences])
+        return Sheet(title, notes=["There is only one start position.", *error.sentences])
     rows = []
     for label, controller in controllers.items():
         with suppress(SimulationError):
             run = simulate(unknown, controller)
-            rows.append(
-                [label, *(number(one.k_dyn, 3) for one in run.positions.values()), number(run.k_dyn, 3)]
-            )
+            rows.append([label, *(number(start.k_dyn, 3) for start in (*run.positions.values(), run))])
     if not rows or len(rows[0]) < 3:
-        return Sheet(title, notes=["There is one position alone: no gap, or one that is wound up."])
-    names = (one.replace("-", " ") for one in UNKNOWN_POSITIONS)
+        return Sheet(title, notes=["There is only one start position: no gap, or a preloaded one."])
+    names = (position.replace("-", " ") for position in UNKNOWN_POSITIONS)
     rows.sort(key=lambda row: float(row[-1]))
     return Sheet(title, tables=[TextTable.of_rows("", ("strategy",), (*names, "worst"), rows)])
 
@@ -321,13 +313,13 @@ def _margins(compared: Comparison) -> Sheet:
     if not limits:
         return Sheet(title, notes=["No limits are given: enter them under Limits, on the left."])
     each = [(row, row.margins(limits), row.least_margin) for row in compared.rows]
-    each.sort(key=lambda one: math.inf if one[2] is None or math.isnan(one[2].share) else -one[2].share)
+    each.sort(key=lambda row: math.inf if row[2] is None or math.isnan(row[2].share) else -row[2].share)
     rows = [
         [row.name, row.against_limits, (least.case if least else "") or "as it is",
          *(short(float(f"{margin.value:.4g}")) for margin in margins)]
         for row, margins, least in each
     ]  # fmt: skip
-    heads = [f"{one.name}\n{one.unit}, at most {one.limit:.4g}" for one in each[0][1]]
+    heads = [f"{margin.name}\n{margin.unit}, at most {margin.limit:.4g}" for margin in each[0][1]]
     table = TextTable.of_rows("", ("strategy", "least margin", "worst with"), heads, rows)
     return Sheet(title, tables=[table])  # what is recommended stands on the page already
 

@@ -514,4 +514,4 @@ def test_no_message_whatever_kills_the_page(message):
     frame = frames.main_frame()
     json.dumps(frame, allow_nan=False)
     assert frame["figure"]["k_dyn"] is not None
-    assert "mistake in softstart" not in str(frame["mistakes"])
+    assert "Internal error in softstart" not in str(frame["mistakes"])
