@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from time import perf_counter
-from typing import Any
 
 from softstart.errors import InputError
 from softstart.page import links
@@ -80,10 +79,9 @@ class Controls:
         # without a field, the message appears next to the figure
         place = path if (path := str(arguments.get("path"))) in self._frames.entries else ""
         version = self._session.version
-        stamp: Any = message.get("stamp")
-        if _is_a(float, stamp):
-            self._frames.stamp = float(stamp)
-            self._frames.late = self._delay.of(float(stamp) / 1000.0, perf_counter())
+        if _is_a(float, message.get("stamp")):
+            self._frames.stamp = float(message["stamp"])
+            self._frames.late = self._delay.of(self._frames.stamp / 1000.0, perf_counter())
         try:
             act(*arguments.values())
         except Exception as error:  # a drive may refuse anything

@@ -85,7 +85,7 @@ class FrameBuilder:
         """All fields by their paths: those of the machine, then those of the selected strategy."""
         return {**self._machine, **self._strategy}
 
-    def _is_new(self, part: str, content: Any) -> bool:
+    def _is_new(self, part: str, content: object) -> bool:
         """Whether the browser does not have this yet; it is sent then."""
         if self.sent.get(part) == content:
             return False
@@ -283,7 +283,7 @@ class FrameBuilder:
         same = sent[0] is inputs.controllers[inputs.selected]
         return same and sent[1:] == (self.fixed, axes, self._map_machine(axes))
 
-    def _map_machine(self, axes: Axes) -> Any:
+    def _map_machine(self, axes: Axes) -> object:
         """What of the machine a map depends on: not its gap and inertia, unless the controller is fixed."""
         inputs = self.session.inputs
         return inputs.machine if self.fixed else machines.placeless(inputs.machine, axes, inputs.origin)

@@ -130,7 +130,7 @@ class JobPanel:
         except InputError as error:
             self.refuse(error)
             return
-        self._started.subject = self.session.inputs.machine
+        self._started.machine = self.session.inputs.machine
         self._jobs.show(self._user, self.name, self._started)
         self.refresh()
 
@@ -202,18 +202,18 @@ class JobPanel:
 
     def _compare(self, job: Job) -> None:
         """Say for which machine a result is, once the session has another one."""
-        if self._result is None or self.session.version == self._compared:
+        if self._result is None or job.machine is None or self.session.version == self._compared:
             return
         self._compared = self.session.version
-        sentence = changed_since(job.subject, self.session.inputs.machine_in_units)
+        sentence = changed_since(job.machine, self.session.inputs.machine_in_units)
         self._stale.set_text(sentence)
         self._stale.set_visibility(bool(sentence))
 
     def add(self, label: str) -> None:
         """Add a controller of the result to the strategies, unless it was computed for another machine."""
-        assert self.job is not None
-        assert self._result is not None
-        now, computed = self.session.inputs.machine, self.job.subject
+        if self.job is None or self.job.machine is None or self._result is None:
+            return
+        now, computed = self.session.inputs.machine, self.job.machine
         if computed.name != now.name and (sentence := changed_since(computed, now)):
             raise InputError(f"{sentence[:-1]}: it is not added to the strategies.")
         label = self.session.add(label, self._result.controllers[label], select=False)

@@ -12,6 +12,7 @@ from contextlib import suppress
 from enum import Enum
 from typing import Any
 
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.parallel import DiedError, Message, Progress, Worker, checked_workers
 
@@ -43,7 +44,7 @@ class Job:
 
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
     `result` what came out; `sentences` why there is no result.
-    `state` is set last. `subject` is for those who show it: the machine of the result.
+    `state` is set last. `machine` is for those who show it: that of the result.
     """
 
     def __init__(self, user: Hashable, title: str, packed: bytes, ahead: Callable[[Job], int]) -> None:
@@ -53,7 +54,7 @@ class Job:
         self.message = ""
         self.result: Any = None
         self.sentences: tuple[str, ...] = ()
-        self.subject: Any = None
+        self.machine: Machine | None = None
         self.pid: int | None = None
         self._stop = threading.Event()
         self._lock = threading.Lock()
@@ -211,7 +212,7 @@ class Jobs:
         self._threads.shutdown()
 
     def _ahead(self, job: Job) -> int:
-        waiting = [one for one in self._jobs if one.state is JobState.WAITING]
+        waiting = [job for job in self._jobs if job.state is JobState.WAITING]
         return waiting.index(job) if job in waiting else 0
 
     def _attend(self, job: Job) -> None:

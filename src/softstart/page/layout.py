@@ -7,7 +7,6 @@ from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from types import new_class
 from typing import Any
 
 import nicegui
@@ -38,14 +37,10 @@ PANELS = (
 )
 
 
-@cache
-def instrument() -> type[Element]:
-    """The element that draws everything live: `web/softstart_instrument.js`, over the modules beside it."""
-    return new_class(
-        "Instrument",
-        (Element,),
-        {"component": WEB / "softstart_instrument.js", "esm": {"softstart-page": str(WEB / "modules")}},
-    )
+class Instrument(
+    Element, component=WEB / "softstart_instrument.js", esm={"softstart-page": str(WEB / "modules")}
+):
+    """Draws everything live: `web/softstart_instrument.js`, over the modules beside it."""
 
 
 def style() -> str:
@@ -78,7 +73,7 @@ def build(drive: Loaded) -> Session:
     session.select(first_strategy(drive))
     session.restore(session.inputs)  # the page begins here: that is no step to undo
     frames = FrameBuilder(session)
-    with instrument()() as element:
+    with Instrument() as element:
         _panels(session, client)
 
     def send(number: int, frame: Frame) -> None:
@@ -93,7 +88,7 @@ def build(drive: Loaded) -> Session:
     live = Live(frames, send, show)
     controls = Controls(session, frames, live.poke)
 
-    def take(message: Any) -> None:
+    def take(message: object) -> None:
         if isinstance(message, dict) and message.get("what") == "drawn":
             live.drawn(number if isinstance(number := message.get("number"), int) else 0)
         else:
@@ -139,7 +134,7 @@ def _panels(session: Session, client: Client) -> None:
     def fill(title: str) -> None:
         if (place := places.pop(title, None)) is None:  # it is there already
             return
-        module, name = next(one[1:] for one in PANELS if one[0] == title)
+        module, name = next((module, name) for tab, module, name in PANELS if tab == title)
         with place:
             try:
                 getattr(import_module(f"softstart.page.{module}"), name)(session, user)
@@ -148,5 +143,5 @@ def _panels(session: Session, client: Client) -> None:
                 ui.label(sentence_of(error))
 
     tabs.on_value_change(lambda event: fill(str(event.value)))
-    for title in [one for one in places if one != LARGE]:
+    for title in [title for title in places if title != LARGE]:
         fill(title)

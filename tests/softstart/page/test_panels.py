@@ -39,7 +39,7 @@ class Hasty:
         self._state, self.result, self.sentences = JobState.RUNNING, None, ()
         self.share, self.message, self.ahead, self.stopping = None, "", 0, False
         self.looks, self.clock = -1, itertools.count()
-        self.subject = None
+        self.machine = None
 
     @property
     def seconds(self) -> float:
@@ -102,7 +102,7 @@ def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
     second.refresh()
     other.refresh()
     assert (first.mine, second.mine, second.busy) == (True, False, True)
-    assert job.subject is first.session.inputs.machine
+    assert job.machine is first.session.inputs.machine
     assert other.job is None
     second.start()  # one at a time at one place
     assert second.job is job
