@@ -15,7 +15,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
 from softstart.drive import PARAMETERS, Drive
-from softstart.errors import InputError, listed
+from softstart.errors import InputError, Sentence, listed
 from softstart.identification.fitting import (
     MOST_RIPPLE,
     STEP,
@@ -40,7 +40,6 @@ from softstart.identification.unknowns import (
 )
 from softstart.parallel import on_one_thread
 from softstart.quantities import show, to_si
-from softstart.results import Sentence
 from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps of a chain, at the motor shaft

@@ -6,10 +6,9 @@ import logging
 from typing import Any, NamedTuple
 
 from softstart.drive.machine import Machine
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError, Sentence, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest
-from softstart.results import Sentence
 from softstart.views.numbers import unit, units_of
 
 log = logging.getLogger("softstart.page")
