@@ -30,6 +30,7 @@ from softstart.page.panel_parts import (
     action,
     box,
     choice,
+    follow,
     hint,
     notify,
     save,
@@ -46,7 +47,7 @@ class FilesPanel:
     """Drive files, exports and the command line; built in the current slot."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
-        parts = {"Drive": (DriveFiles,), "Export": (Exports, ReportPanel), "Command line": (CommandLine,)}
+        parts = {"Drive": (DriveFiles,), "Export": (Exports, ReportPanel), "Command line": (command_line,)}
         for title, panels in parts.items():
             ui.html(title, tag="h3", sanitize=False).classes("panel-title")
             for panel in panels:
@@ -115,21 +116,17 @@ class Exports:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        self._seen = -1
         with box("panel-actions"):
             self._caption = ui.label().classes("panel-caption").props('data-testid="export-strategy"')
             action("Traces CSV", self._traces, "export-traces")
             with box("panel-actions") as self._of_profile:
                 for suffix, text in ((".csv", "Profile CSV"), (".toml", "Profile TOML"), (".c", "C code")):
                     action(text, partial(self._profile, suffix), f"export-profile-{suffix[1:]}")
-        ui.timer(POLL, self._refresh)
-        self._refresh()
+        follow(session, self._refresh)
 
     def _refresh(self) -> None:
         """The strategy to which the buttons refer."""
-        if self._session.version == self._seen:
-            return
-        self._seen, inputs = self._session.version, self._session.inputs
+        inputs = self._session.inputs
         self._caption.set_text(f"Selected: {inputs.selected}")
         self._of_profile.set_visibility(profile_of(inputs.controllers[inputs.selected]) is not None)
 
@@ -174,36 +171,23 @@ class ReportPanel(JobPanel):
         return tasks.report_task, inputs.both_ends, list(inputs.controllers.values()), command, name
 
 
-class CommandLine:
+def command_line(session: Session, user: Hashable) -> None:
     """What to type in a terminal for the same drive and strategies."""
+    command = ui.label().classes("command").props('data-testid="command" tabindex=0')
+    note = ui.label().classes("panel-hint")
 
-    def __init__(self, session: Session, user: Hashable) -> None:
-        self._session = session
-        self._seen = -1
-        self._text = ui.label().classes("command").props('data-testid="command" tabindex=0')
-        self._note = ui.label().classes("panel-hint")
-        ui.timer(2 * POLL, self._refresh)
-        self._refresh()
-
-    def _refresh(self) -> None:
-        session = self._session
-        if session.version == self._seen:
-            return
-        self._seen = session.version
-        text = command_text(
-            session.inputs.machine,
-            {label: session.inputs.controllers[label] for label in session.inputs.drawn},
-        )
-        self._text.set_text(text)
+    def refresh() -> None:
+        inputs = session.inputs
+        drawn = {label: inputs.controllers[label] for label in inputs.drawn}
+        text = command_text(inputs.machine, drawn)
+        command.set_text(text)
         words = text.replace(",", " ").replace("=", " ").split()
-        needed = [word for word in words if word.endswith((".toml", ".csv"))]
-        profiles = [
-            label
-            for label in session.inputs.drawn
-            if profile_of(session.inputs.controllers[label]) is not None
-        ]
-        notes = [f"First save from here: {', '.join(needed)}." if needed else
-                 "It gives the strategies that are drawn as a table in a terminal."]  # fmt: skip
-        if len(profiles) > 1:
-            notes.append(f"Of the {len(profiles)} profiles a command takes one.")
-        self._note.set_text(" ".join(notes))
+        files = [word for word in words if word.endswith((".toml", ".csv"))]
+        notes = [f"First save from here: {', '.join(files)}." if files else
+                 "It prints the strategies that are drawn as a table in a terminal."]  # fmt: skip
+        profiles = sum(profile_of(controller) is not None for controller in drawn.values())
+        if profiles > 1:
+            notes.append(f"Of the {profiles} profiles a command takes one.")
+        note.set_text(" ".join(notes))
+
+    follow(session, refresh, 2 * POLL)

@@ -16,6 +16,8 @@ from softstart.page.sentences import page_sentence, sentence_of
 if TYPE_CHECKING:
     from nicegui.events import UiEventArguments, UploadEventArguments
 
+    from softstart.page.session import Session
+
 POLL = 0.2  # s between two checks of a job
 MOST_SENTENCES = 12  # about one input; the next ones appear when these are corrected
 TERMINALS = {
@@ -170,6 +172,20 @@ def reveal(part: Element, block: str = "start") -> None:
     """Scroll to a part of a panel once the browser has drawn it."""
     seen = f"getHtmlElement({part.id})?.scrollIntoView({{block: '{block}', behavior: 'smooth'}})"
     ui.timer(POLL, lambda: ui.run_javascript(seen), once=True)
+
+
+def follow(session: Session, refresh: Callable[[], None], seconds: float = POLL) -> None:
+    """Call `refresh()` now, and later whenever the session has changed, checked every so many seconds."""
+    seen = -1
+
+    def check() -> None:
+        nonlocal seen
+        if session.version != seen:
+            seen = session.version
+            refresh()
+
+    check()
+    ui.timer(seconds, check)
 
 
 def notify(sentence: str) -> None:

@@ -61,14 +61,8 @@ class LimitPanel(JobPanel):
 
     def task(self) -> Task:
         """The curve."""
-        controllers = list(self.session.inputs.controllers.values())
-        return (
-            "best profile over start time",
-            tasks.curve,
-            self.session.inputs.machine_in_units,
-            controllers,
-            self.end.value,
-        )
+        inputs = self.session.inputs
+        return tasks.curve, inputs.machine_in_units, list(inputs.controllers.values()), self.end.value
 
 
 class ChecksPanel(JobPanel):
@@ -82,13 +76,8 @@ class ChecksPanel(JobPanel):
 
     def task(self) -> Task:
         """All checks."""
-        session = self.session
-        return (
-            "positions, limits and life",
-            tasks.checked,
-            session.inputs.both_ends,
-            dict(session.inputs.controllers),
-        )
+        inputs = self.session.inputs
+        return tasks.checked, inputs.both_ends, dict(inputs.controllers)
 
 
 class TuningPanel(JobPanel):

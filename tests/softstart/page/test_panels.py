@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import itertools
 import math
 import weakref
@@ -179,6 +180,21 @@ def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> 
         'Gaps = "0,5x, 1x"',
         'Load inertias = "0,35"',
     ]
+
+
+def test_each_panel_asks_for_a_task_with_its_fields(client: Any) -> None:
+    """As pressed at once, with the defaults of all fields: a function that takes these arguments."""
+    from softstart.page import files_panel, panels
+
+    session = Session("crane-4amtkf", controllers=["direct"])
+    classes = (panels.OptimumPanel, panels.LimitPanel, panels.ChecksPanel, panels.TuningPanel)
+    for panel in (*classes, files_panel.ReportPanel):
+        function, *arguments = panel(session, "A", Queue()).task()
+        inspect.signature(function).bind(*arguments, progress=None)
+    log = panels.LogPanel(session, "A", Queue())
+    log.take(b"time,torque\n", "rig.csv")
+    function, *arguments = log.task()
+    inspect.signature(function).bind(*arguments, progress=None)
 
 
 def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
