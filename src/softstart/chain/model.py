@@ -21,6 +21,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.arrays import ChainArrays, arrays_at
+from softstart.chain.checks import BRANCHES, mistakes_of, no_such_mass, warnings_of
 from softstart.chain.elements import (
     LIBRARY,
     MASS,
@@ -39,8 +40,8 @@ from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machin
 from softstart.drive.checks import wrong_units
 from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import TwoMasses
-from softstart.errors import InputError, Sentence
-from softstart.hints import did_you_mean, nearest
+from softstart.errors import InputError
+from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, construct, document_text, read_document
 from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameters import Parameter, ParameterValue, Wording, read_values, sentences_of
@@ -54,11 +55,6 @@ INSTEAD: Mapping[str, dict[str, Any]] = {
     "damping": {"damping_ratio": None},
     "damping_ratio": {"damping": 0.0},
 }
-BRANCHES = (
-    "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
-    "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "
-    "inertias, stiffnesses and torques add (docs/howto/reduce-a-driveline.md)."
-)
 OF_A_DRIVE = re.compile(r"(^|: )\[?(limits|gear)[\].].*no such (key|table)")
 OWN_LIMITS = (
     " The gears of a chain are in its shafts, and each shaft has a permissible torque of its own, on the "
@@ -160,7 +156,7 @@ class Chain(Machine):
             load_mass = load_mass or moving[-1]
             if motor is not None and not motor.mass:
                 motor = motor.replace(mass=moving[0])
-        wrong = sentences_of(mistakes) + _mistakes(masses, shafts, motor, load_mass)
+        wrong = sentences_of(mistakes) + mistakes_of(masses, shafts, motor, load_mass)
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
@@ -241,7 +237,7 @@ class Chain(Machine):
             return names.index(place)
         if place == "motor":
             return 0 if self.motor is None else names.index(self.motor.mass)
-        raise InputError(f"{show(place)}: {_no_such(place, names)}")
+        raise InputError(f"{show(place)}: {no_such_mass(place, names)}")
 
     def gear_with(self, **given: object) -> str:
         """Why nothing is "at output", as `Drive.gear_with`."""
@@ -323,29 +319,7 @@ class Chain(Machine):
         >>> Chain.load("tractor-like").warnings
         ()
         """
-        held = [mass.name for mass in self.masses if math.isinf(mass.inertia)]
-        fixed = [
-            f"{name} stays at rest: strategies are set up for the two masses of the chain without it."
-            for name in held
-        ]
-        if self.motor is not None and self.motor.starting_torque <= float(self.at_motor_shaft().Mc.sum()):
-            fixed.append(
-                "The starting torque is not above the load torque: K_dyn, which refers to it, says little. "
-                "For a motor torque over speed see docs/howto/motor-torque-over-speed.md."
-            )
-        damped = any(s.damping or s.damping_ratio or s.efficiency < 1.0 for s in self.shafts)
-        inelastic = any(s.restitution is not None and s.restitution < 1.0 for s in self.shafts)
-        if damped or inelastic or any(mass.damping for mass in self.masses):
-            return tuple(fixed)
-        if not any(shaft.gap > 0.0 for shaft in self.shafts):
-            return tuple(fixed)
-        return (
-            *fixed,
-            Sentence(
-                "This chain is undamped; late contacts of light masses determine the peaks.",
-                "Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
-            ),
-        )
+        return tuple(warnings_of(self))
 
     # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------
 
@@ -756,47 +730,6 @@ class Chain(Machine):
 
 def _without_defaults(table: DocumentTable, values: Mapping[str, object]) -> dict[str, object]:
     return {p.name: values[p.name] for p in table.parameters if values.get(p.name) != p.default}
-
-
-def _no_such(place: str, names: list[str]) -> str:
-    meant = nearest(place, names)
-    hint = f"did you mean {show(meant)}?" if meant else f"its masses are {', '.join(map(show, names))}."
-    return f"the chain has no mass of this name; {hint}"
-
-
-def _mistakes(
-    masses: tuple[Mass, ...], shafts: tuple[Shaft, ...], motor: Motor | None, load_mass: str
-) -> list[str]:
-    """What the parts of a chain say against one another."""
-    wrong = []
-    if len(masses) < 2:
-        wrong.append(f"mass: a chain has at least 2 masses, and there are {len(masses)}.")
-    elif len(shafts) != len(masses) - 1:
-        wrong.append(
-            f"shaft: {len(masses)} masses in a row are joined by {len(masses) - 1} shafts, and there are "
-            f"{len(shafts)}. {BRANCHES}"
-        )
-    names = [mass.name for mass in masses]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        wrong.append(
-            f"mass name = {show(name)}: {names.count(name)} masses have this name; give each its own."
-        )
-    if names and load_mass not in names:
-        wrong.append(f"load = {show(load_mass)}: {_no_such(load_mass, names)}")
-    if names and motor is not None and motor.mass not in names:
-        wrong.append(f"[motor] mass = {show(motor.mass)}: {_no_such(motor.mass, names)}")
-    held = [i for i, mass in enumerate(masses) if math.isinf(mass.inertia)]
-    if not held or wrong:
-        return wrong
-    at_end = held == [0] or held == [len(masses) - 1]
-    joint = shafts[0 if held[0] == 0 else -1]
-    if not at_end:
-        wrong.append("inertia = inf: one mass may stay at rest, the first or the last of the chain.")
-    elif joint.rigid and joint.gap == 0.0:
-        wrong.append("inertia = inf: a rigid joint without a gap holds its other mass too; leave that out.")
-    if names[held[0]] == load_mass or (motor is not None and names[held[0]] == motor.mass):
-        wrong.append(f"{show(names[held[0]])}: motor and load are on masses that move.")
-    return wrong
 
 
 class Aggregate(NamedTuple):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -53,6 +54,8 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
         yield wording.sentence(", ".join(listed), BROADCAST)
         return
 
+    given = _symbols(values)
+
     def at(name: str, index: tuple[int, ...]) -> str:
         """A parameter and its value at this index of the broadcast shape."""
         value, label = values[name], wording.label(parameters[name])
@@ -65,94 +68,76 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
         place = f"[{', '.join(map(str, own))}]" if own else ""
         return f"{label}{place} = {float(array[own]):.6g} {parameters[name].unit}"
 
-    for name, other, wrong, reason in _rules(values):
+    for name, other, rule, reason in RULES:
+        wrong = rule(given)
         if wrong is not False and np.any(wrong):
             index = tuple(np.argwhere(np.broadcast_to(wrong, shape))[0].tolist())
             yield wording.sentence(at(name, index), reason.format(other=at(other, index)))
 
 
-def _rules(values: Values) -> Iterator[tuple[str, str, Any, str]]:
-    """Two parameters, whether their values contradict each other, and why; NaN, never true, where unknown."""
+def _symbols(values: Values) -> SimpleNamespace:
+    """The values that rules compare, by symbols; NaN, never true in comparisons, where one is unknown."""
 
-    def get(*names: str) -> list[Any]:
-        return [math.nan if values.get(name) is None else values[name] for name in names]
+    def get(name: str) -> Any:
+        return math.nan if values.get(name) is None else values[name]
 
-    J1, J2, Ms, most, torque = get(
-        "motor_inertia", "load_inertia", "starting_torque", "maximum_torque", "load_torque"
-    )
-    Mc = torque + values.get("load_friction", 0.0)
-    friction, b1, b2 = (values.get(name, 0.0) for name in FRICTIONS)
-    target, w1, w2 = get("target_speed", "initial_motor_speed", "initial_load_speed")
-    rated, power, speed = get("rated_torque", "rated_power", "rated_speed")
-    reactive = values.get("load_kind") == "reactive"
-    yield (
-        "maximum_torque", "starting_torque", most < Ms,
-        "the largest torque must not be below {other}; raise it, or leave it out",
+    where, friction = values.get("start_position"), values.get("load_friction", 0.0)
+    drag, b1, b2 = (values.get(name, 0.0) for name in FRICTIONS)
+    Ms, most, torque = get("starting_torque"), get("maximum_torque"), get("load_torque")
+    Mc, push = torque + friction, Ms - drag
+    left = np.fmax(most, Ms) - drag - Mc  # for viscous friction
+    return SimpleNamespace(
+        Ms=Ms, most=most, torque=torque, Mc=Mc, drag=drag, b1=b1, b2=b2, push=push,
+        ratio=get("motor_inertia") / get("load_inertia"), target=get("target_speed"),
+        w1=get("initial_motor_speed"), w2=get("initial_load_speed"), rated=get("rated_torque"),
+        power=get("rated_power"), speed=get("rated_speed"), permitted=get("permissible_torque"),
+        output=get("permissible_output_torque"), gear_ratio=get("gear_ratio"),
+        slow=(left > 0.0) & ((b1 + b2) * get("target_speed") >= left),
+        busy=get("permissible_start_time") * get("starts_per_hour"),  # s in an hour
+        reactive=values.get("load_kind") == "reactive", braked=values.get("brake") == "motor",
+        hangs=isinstance(where, str) and where == "hanging",
     )  # fmt: skip
-    yield (
-        "starting_torque", "load_torque", Ms <= torque,
-        "the starting torque cannot move the load against {other}; raise the one or lower the other",
-    )  # fmt: skip
-    yield (
-        "starting_torque", "load_friction", (Ms > torque) & (Ms <= Mc),
-        "the starting torque cannot move the load against its torque and {other}; raise the one or lower the "
-        "other",
-    )  # fmt: skip
-    push = Ms - friction
-    yield (
-        "motor_friction", "starting_torque", (friction > 0.0) & (push <= Mc) & (Ms > Mc),
-        "with this friction {other} cannot move the load; lower the friction, or raise the torque",
-    )  # fmt: skip
-    left = np.fmax(most, Ms) - friction - Mc
-    slow = (left > 0.0) & ((b1 + b2) * target >= left)
-    for name, b in zip(FRICTIONS[1:], (b1, b2), strict=True):
-        yield (
-            name, "target_speed", (b > 0.0) & slow,
-            "at {other} this takes more torque than the motor has left; lower the one or the other",
-        )  # fmt: skip
-    yield (
-        "load_torque", "load_kind", reactive & (torque < 0.0),
-        'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"',
-    )  # fmt: skip
-    yield (
-        "rated_torque", "rated_power", abs(rated * speed - power) > 0.05 * power,
-        "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong",
-    )  # fmt: skip
-    yield (
-        "initial_load_speed", "target_speed", w2 >= target,
-        "the load must start below {other}, the speed that it is to reach",
-    )  # fmt: skip
-    permitted, longest, starts = get("permissible_torque", "permissible_start_time", "starts_per_hour")
-    yield (
-        "permissible_torque", "load_torque", abs(torque) >= permitted,
-        "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft",
-    )  # fmt: skip
-    output, ratio = get("permissible_output_torque", "gear_ratio")
-    yield (
-        "permissible_output_torque", "load_torque", np.maximum(abs(torque), Mc) * ratio >= output,
-        "at constant speed the output already carries more: {other} at the motor shaft, and the friction of "
-        "the load, times the gear ratio; give the permissible peak, at the output",
-    )  # fmt: skip
-    yield (
-        "permissible_torque", "load_friction", (abs(torque) < permitted) & (Mc >= permitted),
-        "at constant speed the shaft already carries the load torque and {other}; give the permissible peak, "
-        "at the motor shaft",
-    )  # fmt: skip
-    yield (
-        "starts_per_hour", "permissible_start_time", longest * starts > 3600.0,
-        "so many starts of {other} take more than an hour; lower one of the two",
-    )  # fmt: skip
-    hangs = isinstance(where := values.get("start_position"), str) and where == "hanging"
-    yield (
-        "start_position", "load_kind", reactive and hangs,
-        'only an active load hangs; friction holds a reactive one where it stands, write "unknown"',
-    )  # fmt: skip
-    yield (
-        "initial_motor_speed", "brake", (values.get("brake") == "motor") & (abs(w1) > 0.0),
-        'a motor that is held stands still; leave the speed out, or write brake "none"',
-    )  # fmt: skip
-    yield (
-        "load_torque", "starting_torque", (push > Mc) & ((push + Mc * (J1 / J2)) / (1.0 + J1 / J2) <= 0.0),
-        "against {other} this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), to "
-        "which K_dyn refers, is not above 0; use a weaker one",
-    )  # fmt: skip
+
+
+VISCOUS = "at {other} this takes more torque than the motor has left; lower the one or the other"
+# two parameters, whether their values contradict each other, and why
+# fmt: off
+RULES: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
+    ("maximum_torque", "starting_torque", lambda v: v.most < v.Ms,
+     "the largest torque must not be below {other}; raise it, or leave it out"),
+    ("starting_torque", "load_torque", lambda v: v.Ms <= v.torque,
+     "the starting torque cannot move the load against {other}; raise the one or lower the other"),
+    ("starting_torque", "load_friction", lambda v: (v.Ms > v.torque) & (v.Ms <= v.Mc),
+     "the starting torque cannot move the load against its torque and {other}; raise the one or lower the "
+     "other"),
+    ("motor_friction", "starting_torque", lambda v: (v.drag > 0.0) & (v.push <= v.Mc) & (v.Ms > v.Mc),
+     "with this friction {other} cannot move the load; lower the friction, or raise the torque"),
+    ("motor_viscous_friction", "target_speed", lambda v: (v.b1 > 0.0) & v.slow, VISCOUS),
+    ("load_viscous_friction", "target_speed", lambda v: (v.b2 > 0.0) & v.slow, VISCOUS),
+    ("load_torque", "load_kind", lambda v: v.reactive & (v.torque < 0.0),
+     'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"'),
+    ("rated_torque", "rated_power", lambda v: abs(v.rated * v.speed - v.power) > 0.05 * v.power,
+     "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong"),
+    ("initial_load_speed", "target_speed", lambda v: v.w2 >= v.target,
+     "the load must start below {other}, the speed that it is to reach"),
+    ("permissible_torque", "load_torque", lambda v: abs(v.torque) >= v.permitted,
+     "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft"),
+    ("permissible_output_torque", "load_torque",
+     lambda v: np.maximum(abs(v.torque), v.Mc) * v.gear_ratio >= v.output,
+     "at constant speed the output already carries more: {other} at the motor shaft, and the friction of the "
+     "load, times the gear ratio; give the permissible peak, at the output"),
+    ("permissible_torque", "load_friction", lambda v: (abs(v.torque) < v.permitted) & (v.Mc >= v.permitted),
+     "at constant speed the shaft already carries the load torque and {other}; give the permissible peak, at "
+     "the motor shaft"),
+    ("starts_per_hour", "permissible_start_time", lambda v: v.busy > 3600.0,
+     "so many starts of {other} take more than an hour; lower one of the two"),
+    ("start_position", "load_kind", lambda v: v.reactive and v.hangs,
+     'only an active load hangs; friction holds a reactive one where it stands, write "unknown"'),
+    ("initial_motor_speed", "brake", lambda v: v.braked & (abs(v.w1) > 0.0),
+     'a motor that is held stands still; leave the speed out, or write brake "none"'),
+    ("load_torque", "starting_torque",
+     lambda v: (v.push > v.Mc) & ((v.push + v.Mc * v.ratio) / (1.0 + v.ratio) <= 0.0),
+     "against {other} this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), to "
+     "which K_dyn refers, is not above 0; use a weaker one"),
+)
+# fmt: on

@@ -9,38 +9,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self, get_args
 
-from softstart.drive.checks import GRAVITY
-from softstart.drive.data_sheet_words import (
-    ABOUT,
-    INSTEAD,
-    NEEDED,
-    ROPE,
-    STIFFNESSES,
-    USUAL,
-    Machine,
-    converted,
-)  # fmt: skip
-from softstart.drive.model import Drive
+from softstart.drive.data_sheet_checks import contradictions
+from softstart.drive.data_sheet_file import Entry, drive_entries, drive_text
+from softstart.drive.data_sheet_mechanics import BAND, METAL, MotorSide, arm, motor_side, slope_sine
+from softstart.drive.data_sheet_words import RESISTANCE, ROPE, STIFFNESSES, USUAL, MachineKind, converted
+from softstart.drive.model import OTHER_DOCUMENTS, Drive
 from softstart.drive.plausibility import motion_warnings, plausibility_warnings
 from softstart.errors import InputError
-from softstart.input.documents import document_text, literal, parsed
+from softstart.input.documents import document_text, parsed
 from softstart.input.files import file_text
-from softstart.input.gear import Gear
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
 from softstart.input.parameters import Mistake, Wording, bare, without_unit
-from softstart.quantities import Units, shortest
 
-# elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
-# K_dyn is the higher one, and results are compared with those of the soft end
-BAND = (3.0, 30.0)
-STEEL = 79.3e9  # N/m^2, shear modulus
-RESISTANCE = {"travel": 0.008, "belt": 0.02}  # share of the weight
-METAL = 0.46  # metallic cross-section of a rope over its diameter squared, EN 12385: class 6x36, steel core
-
-TWICE = {
-    "rope_length": "how stiff the rope is", "radius": "how large the wheel or drum is",
-    "rise": "how steep the track is",
-}  # fmt: skip
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
 FORCES = {"load_torque", "load_friction"}
@@ -49,38 +29,6 @@ SETTLE = {
     "backlash": {"gap"}, "rope": {"stiffness"}, "rope_modulus": {"stiffness"}, "resistance": FORCES,
     "damping_ratio": {"damping"}, "stiffness": {"stiffness"},
 }  # fmt: skip
-
-SHOWN_IN = {"kW": 1e3, "ms": 1e-3}  # units of a drive file that are not those of SI
-
-
-class _Load(NamedTuple):
-    """The load at the output: kg m2 and N m, each with what it is from."""
-
-    inertia: float
-    inertia_from: str
-    active: float
-    active_from: str
-    friction: float
-    friction_from: str
-
-
-class _MotorSide(NamedTuple):
-    """One motor and its share of the load, at the motor shaft: kg m2 and N m."""
-
-    J1: float
-    J2: float
-    Ms: float
-    active: float
-    friction: float
-    overhauling: bool  # whether the load drives the motor
-
-
-class _Entry(NamedTuple):
-    """A line of a drive file: the value in SI at the motor shaft, as it is shown, and what it is from."""
-
-    value: Any
-    text: str
-    about: str
 
 
 def _maybe(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
@@ -152,8 +100,8 @@ class DataSheet(ParameterSet):
     name: str = parameter("name", "", "name of the drive", '"hoist A"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "where the numbers are from", '"motor plate"', "one line",
         default="data sheets")
-    machine: Machine = parameter("load.machine", "", "kind of the machine", '"travel"',
-        choices=get_args(Machine))
+    machine: MachineKind = parameter("load.machine", "", "kind of the machine", '"travel"',
+        choices=get_args(MachineKind))
     rated_power: MaybeNumber = parameter("motor.rated_power", "W", "rated power", '"3 kW"', "above 0",
         default=None)
     rated_torque: MaybeNumber = _maybe("motor.rated_torque", "N*m", "rated torque", '"20 N*m"')
@@ -307,85 +255,7 @@ class DataSheet(ParameterSet):
             yield wording.missing(of["rated_power"], f", or {other} in its place").sentence
 
     def contradictions(self) -> Iterator[str]:
-        """What is missing for this machine, what contradicts something else, and what stands alone."""
-        given, of = self.given(), self.PARAMETERS
-        for name in NEEDED[self.machine]:
-            if not getattr(self, name) and not (name == "diameter" and self.radius):
-                p, instead = of[name], ", or [load] radius" if name == "diameter" else ""
-                yield (
-                    f"{p.place} is missing: a {self.machine} needs the {p.meaning}; "
-                    f"write for example {p.key} = {p.example}{instead}."
-                )
-        for name, machines in ABOUT.items():
-            if name in given and self.machine not in machines:
-                yield (
-                    f"{of[name].place} is for a {' or '.join(machines)}, and this is a {self.machine}; "
-                    "leave it out."
-                )
-        for one, other in (
-            ("coupling_play", "coupling_diameter"), ("output_play", "play_diameter"),
-            ("shaft_length", "shaft_diameter"), ("shaft_diameter", "shaft_length"),
-            ("rope_length", "rope_diameter"), ("rope_diameter", "rope_length"),
-            ("rope_modulus", "rope_diameter"), ("rise", "length"), ("length", "rise"),
-        ):  # fmt: skip
-            if given.get(one) and not given.get(other):
-                p, q = of[one], of[other]
-                yield f"{p.place} says nothing without {q.place}; write for example {q.key} = {q.example}."
-        for name in ("starting_ratio", "maximum_ratio", "efficiency"):
-            p, value, usual = of[name], given.get(name), "0.1 or more" if name == "efficiency" else "below 10"
-            if value is not None and (value < 0.1 if name == "efficiency" else value >= 10.0):
-                yield (
-                    f"{p.place} is read as {value:.5g}, where the {p.meaning} is {usual}; write for example "
-                    f'{p.example} or "{100.0 * float(p.example):g} %".'
-                )
-        yield from self._load_in_doubt()
-        yield from self._said_twice()
-        if self._stiffnesses and self.elastic_frequency is not None:
-            yield (
-                f"{of['elastic_frequency'].place} says how stiff all parts are together, and "
-                f"{', '.join(self._stiffnesses)} are given as well; leave out the one or the others."
-            )
-
-    def _load_in_doubt(self) -> Iterator[str]:
-        """What of the load would mean something else than what it says."""
-        given, of = self.given(), self.PARAMETERS
-        if self.active_torque and self.machine != "hoist" and "friction" not in given:
-            yield (
-                f"{of['active_torque'].place} = {self.active_torque:.5g} N*m: does it act always, as a lift, "
-                "wind or an imbalance, or only against the motion? If always, write friction = 0 as well, or "
-                f"what friction there is; if it is friction, write it as {of['friction'].place}."
-            )
-        if self.rise and self.length and abs(self.rise) >= self.length:
-            yield (
-                f"{of['rise'].place} = {self.rise:.5g} m: a track of {self.length:.5g} m cannot rise so far; "
-                "give the length along the slope."
-            )
-        if abs(self.slope) >= 0.5 * math.pi:
-            yield f"{of['slope'].place} = {self.slope:.5g} rad: a slope is below 90 deg; check the unit."
-        if "goods" in given and not self._sine:
-            yield f"{of['goods'].place} says nothing without a slope; give slope, or rise and length."
-        if self.goods is not None and self.mass is not None and self.goods > self.mass:
-            yield (
-                f"{of['goods'].place} = {self.goods:.5g} kg is more than {of['mass'].place} = "
-                f"{self.mass:.5g} kg, of which it is a part."
-            )
-
-    def _said_twice(self) -> Iterator[str]:
-        """Pairs of values that say the same thing, and not the same value."""
-        given, of, rated = self.given(), self.PARAMETERS, self.rated
-        for name, other in INSTEAD.items():
-            if not {name, other} <= given.keys():
-                continue
-            if name in TWICE:
-                yield f"{of[other].place} and {of[name].place} both say {TWICE[name]}; leave one out."
-                continue
-            first = given[name] * (self.rated_speed if name == "rated_torque" else rated or math.nan)
-            if abs(first - given[other]) > 0.05 * given[other]:
-                p, q = of[name], of[other]
-                yield (
-                    f"{p.place} = {given[name]:.5g} and {q.place} = {given[other]:.5g} {q.unit} contradict "
-                    f"each other: the first makes {first:.5g} {q.unit}; leave one out."
-                )
+        return contradictions(self)
 
     # what is filled in ------------------------------------------------------------------------------------
 
@@ -416,10 +286,11 @@ class DataSheet(ParameterSet):
 
     def assumed_still(self, settled: Iterable[str]) -> str:
         """What is assumed, less what no longer counts where these parameters of the drive are set."""
-        settled = {*settled, *({"load_friction"} - self._follows.keys())}
+        settled = {*settled, *({"load_friction"} - self._entries.keys())}
         return "; ".join(one for name, one in self.assumed.items() if not SETTLE.get(name, {""}) <= settled)
 
-    def _mark(self, name: str) -> str:
+    def mark(self, name: str) -> str:
+        """A mark behind a value that is assumed."""
         return ", assumed" if name in self.assumed else ""
 
     # at the motor shaft -----------------------------------------------------------------------------------
@@ -430,58 +301,6 @@ class DataSheet(ParameterSet):
         if self.rated_torque is not None or self.rated_power is None:
             return self.rated_torque
         return self.rated_power / self.rated_speed
-
-    @property
-    def _eta(self) -> float:
-        """The efficiency; 1 where there are no gears."""
-        return self.efficiency if {"efficiency", "ratio"} & self.given().keys() else 1.0
-
-    @property
-    def _gear(self) -> Gear:
-        return Gear(self.ratio, self._eta, self._load.active + self._load.friction)
-
-    @property
-    def _arm(self) -> float:
-        """Radius on which the load moves with the output, m."""
-        radius = self.radius if self.diameter is None else 0.5 * self.diameter
-        return (radius or 0.0) / self.reeving
-
-    @cached_property
-    def _stiffnesses(self) -> dict[str, float]:
-        """By part that is given, N m/rad at the motor shaft."""
-        gear = self._gear
-        rope, found = self.rope_stiffness, {}
-        if self.rope_length and self.rope_diameter:
-            rope = self.rope_modulus * METAL * self.rope_diameter**2 / self.rope_length
-        if self.coupling_stiffness is not None:
-            found["coupling"] = self.coupling_stiffness
-        if self.gear_stiffness is not None:
-            found["gears"] = gear.to_motor(self.gear_stiffness, "N*m/rad")
-        if self.shaft_diameter and self.shaft_length:
-            twist = STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length)
-            found["output shaft"] = gear.to_motor(twist, "N*m/rad")
-        if rope:
-            # car and counterweight hang on ropes of their own; they store (m1^2 + m2^2) a^2/(2 k) together
-            m1, m2 = self.mass or 0.0, self.counterweight
-            both = (m1 + m2) ** 2 / (m1**2 + m2**2)
-            drum = rope * self.reeving * self._arm**2 * both / self.motors
-            found[f"rope{self._mark('rope_modulus')}"] = gear.to_motor(drum, "N*m/rad")
-        return found
-
-    @property
-    def _stiffness(self) -> tuple[float, str]:
-        """Of all parts in series, N m/rad at the motor shaft, and what it is from."""
-        if parts := self._stiffnesses:
-            rigid = "; rope assumed rigid" if "rope" in self.assumed else ""
-            return 1.0 / sum(1.0 / one for one in parts.values()), f"in series, {_parts(parts)}{rigid}"
-        frequency, of = self.elastic_frequency or BAND[1], self._motor_side
-        c = (2.0 * math.pi * frequency) ** 2 * of.J1 * of.J2 / (of.J1 + of.J2)  # [G](8)
-        soft = (
-            f"; {c * (BAND[0] / BAND[1]) ** 2:.5g} at {BAND[0]:g} Hz"
-            if self.elastic_frequency is None
-            else ""
-        )
-        return c, f"elastic frequency {frequency:g} Hz{self._mark('stiffness')}{soft}"
 
     @property
     def possible(self) -> Drive | UnknownStiffness:
@@ -498,79 +317,24 @@ class DataSheet(ParameterSet):
         return UnknownStiffness(self.drive, soft.replace(assumed=self.drive.assumed))
 
     @cached_property
-    def _gaps(self) -> dict[str, float]:
-        """By part, rad at the motor shaft."""
-        found = {}
-        if self.coupling_play and self.coupling_diameter:
-            found["coupling"] = 2.0 * self.coupling_play / self.coupling_diameter
-        if self.backlash:
-            found["gears"] = self._gear.to_motor(self.backlash, "rad")
-        if self.output_play and self.play_diameter:
-            play = 2.0 * self.output_play / self.play_diameter
-            found["behind the gears"] = self._gear.to_motor(play, "rad")
-        return found
+    def _motor_side(self) -> MotorSide:
+        return motor_side(self)
 
     @cached_property
-    def _load(self) -> _Load:
-        """The whole load at the output."""
-        inertia, friction, active = self.output_inertia, self.friction, self.active_torque
-        J = [f"{inertia:.5g} kg m^2 at the output"] if inertia else []
-        F = [f"{friction:.5g} N m of friction at the output"] if friction else []
-        M = [f"{active:.5g} N m at the output"] if active else []
-        if self.machine == "rotor":
-            return _Load(inertia, ", ".join(J), active, ", ".join(M), friction, ", ".join(F))
-        mass, arm, balance = self.mass or 0.0, self._arm, self.counterweight
-        inertia += (mass + balance) * arm**2
-        moved = f"{mass:.5g} kg" + (f" and a counterweight of {balance:.5g} kg" if balance else "")
-        J.insert(0, f"{moved} on a radius of {arm:.5g} m")
-        if self.machine == "hoist":
-            lifted = mass - balance
-            what = f"the weight of {lifted:.5g} kg" if balance else "the weight"
-        else:
-            # the two strands of a belt balance one another: what an incline lifts is the goods on it
-            rising = mass if self.goods is None else self.goods
-            lifted, share = rising * self._sine, self._share
-            what = f"the weight of {rising:.5g} kg times {self._sine:.5g}, the sine of the slope"
-            friction += share * mass * GRAVITY * arm * math.sqrt(1.0 - self._sine**2)
-            F.insert(0, f"{share:.5g} of the weight{self._mark('resistance')} on {arm:.5g} m")
-        if lifted:
-            active += lifted * GRAVITY * arm
-            M.insert(0, f"{what} on {arm:.5g} m")
-        return _Load(inertia, ", ".join(J), active, ", ".join(M), friction, ", ".join(F))
-
-    @property
-    def _share(self) -> float:
-        """Resistance to motion over weight."""
-        return RESISTANCE.get(self.machine, 0.0) if self.resistance is None else self.resistance
-
-    @property
-    def _sine(self) -> float:
-        """Of the slope of track or belt."""
-        return self.rise / self.length if self.rise and self.length else math.sin(self.slope)
-
-    @cached_property
-    def _motor_side(self) -> _MotorSide:
-        """Inertias and torques at the motor shaft, of one of the motors."""
-        gear, load, starting = self._gear, self._load, self.starting_torque
-        if starting is None:
-            starting = self.starting_ratio * (self.rated or math.nan)
-        return _MotorSide(
-            J1=self.motor_inertia + self.added_inertia,
-            J2=gear.to_motor(load.inertia / self.motors, "kg*m^2"), Ms=starting,
-            active=gear.to_motor(load.active / self.motors, "N*m"),
-            friction=gear.to_motor(load.friction / self.motors, "N*m"), overhauling=gear.load < 0.0,
-        )  # fmt: skip
+    def _entries(self) -> dict[str, Entry]:
+        return drive_entries(self, self._motor_side)
 
     @property
     def speed(self) -> float:
         """Speed of the load at the rated speed of the motor: m/s, of a rotor rad/s."""
-        return self.rated_speed / self.ratio * (1.0 if self.machine == "rotor" else self._arm)
+        return self.rated_speed / self.ratio * (1.0 if self.machine == "rotor" else arm(self))
 
     @property
     def acceleration(self) -> float:
         """Mean acceleration of the load under the starting torque, m/s2, of a rotor rad/s2."""
-        of = self._motor_side
-        return self.speed / self.rated_speed * (of.Ms - of.active - of.friction) / (of.J1 + of.J2)
+        side = self._motor_side
+        accelerating = side.Ms - side.active - side.friction
+        return self.speed / self.rated_speed * accelerating / (side.J1 + side.J2)
 
     @property
     def motion(self) -> str:
@@ -592,114 +356,12 @@ class DataSheet(ParameterSet):
         if self.machine == "rotor":
             return []
         a, balanced = self.acceleration, self.counterweight > 0.0
-        return list(motion_warnings(self.machine, self.speed, a, self._sine, balanced))
+        return list(motion_warnings(self.machine, self.speed, a, slope_sine(self), balanced))
 
     @property
     def plausibility_warnings(self) -> list[str]:
         """What is possible and hardly ever true, of the drive and of the motion of its load."""
         return [*plausibility_warnings(self.drive), *self.motion_warnings]
-
-    @cached_property
-    def _follows(self) -> dict[str, _Entry]:
-        """What follows, by parameter of a drive."""
-        gear, rated, mark, given = self._gear, self.rated, self._mark, self.given()
-        of, load, (stiffness, stiffness_from) = self._motor_side, self._load, self._stiffness
-        damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * of.J1 * of.J2 / (of.J1 + of.J2))
-        gap, assumed = sum(self._gaps.values()), "; ".join(self.assumed.values())
-        no_gap, unsaid = mark("backlash") and "none given, assumed", assumed and "source" not in given
-        more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
-        soft_behind = self._stiffnesses and "coupling" not in self._stiffnesses
-
-        def of_ratio(name: str, ratio: float | None) -> _Entry:
-            torque = getattr(self, f"{name}_torque")
-            if torque is not None or ratio is None or rated is None:
-                return _entry(torque, "N*m", "data sheet")
-            return _entry(ratio * rated, "N*m", f"{ratio:.5g} times the rated torque{mark(f'{name}_ratio')}")
-
-        entries = {
-            "name": _entry(self.name),
-            "source": _entry(f"{self.source} and assumed values" if unsaid else self.source),
-            "assumed": _entry(assumed or None),
-            "motor_inertia": _entry(of.J1, "kg*m^2", f"rotor {self.motor_inertia:.5g}{more}"),
-            "starting_torque": of_ratio("starting", self.starting_ratio),
-            "maximum_torque": of_ratio("maximum", self.maximum_ratio),
-            "rated_power": _entry(self.rated_power, "kW", "plate"),
-            "rated_torque": _entry(self.rated_torque, "N*m", "plate"),
-            "rated_speed": _entry(self.rated_speed, "rad/s", "plate"),
-            "torque_lag": _entry(self.torque_lag or None, "ms", "of the inverter"),
-            "stiffness": self._there(stiffness, "N*m/rad", stiffness_from, soft_behind),
-            "damping": _entry(damping, "N*m*s/rad",
-                              f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
-            "gap": self._there(gap, "rad", _parts(self._gaps) if gap else no_gap or "given as 0",
-                               gap and "coupling" not in self._gaps),
-            "load_inertia": self._there(of.J2, "kg*m^2", f"{load.inertia_from}; {self._through(of.J2)}"),
-            **self._torques(),
-            "target_speed": _entry(self.rated_speed, "rad/s", f"rated speed: {self.motion}"),
-        }  # fmt: skip
-        limits = self.permissible_torque, self.permissible_output_torque
-        if self._geared:
-            entries["gear_ratio"] = _Entry(gear.ratio, f"{gear.ratio!r}".removesuffix(".0"), "")
-            efficiency = f"of all gears{mark('efficiency')}"
-            entries["gear_efficiency"] = _Entry(gear.efficiency, f"{gear.efficiency:.9g}", efficiency)
-        else:  # one shaft, for which the smaller one counts
-            limits = min((one for one in limits if one is not None), default=None), None
-        names = "permissible_torque", "permissible_output_torque"
-        entries |= {name: _entry(value, "N*m") for name, value in zip(names, limits, strict=True)}
-        return {name: one for name, one in entries.items() if one.value is not None}
-
-    @property
-    def _geared(self) -> bool:
-        return bool({"ratio", "efficiency"} & self.given().keys())
-
-    def _through(self, at_motor: float) -> str:
-        """What a value comes through from the load, and what it is at the motor."""
-        gear, driven = self._gear, "driving the motor " * self._motor_side.overhauling
-        shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
-        if gear.ratio == gear.efficiency == 1.0:
-            return f"{driven}without gears{shared}" if driven else f"no gears{shared}"
-        before = f"at the motor {at_motor:.5g}, " if self._geared else ""
-        efficiency = f"efficiency {gear.efficiency:.5g}{self._mark('efficiency')}"
-        return f"{before}{driven}through {gear.ratio:.5g}:1, {efficiency}{shared}"
-
-    def _there(self, value: float, unit: str, about: str, behind: object = True) -> _Entry:
-        """An entry that is shown at the output, where it can be known there: as the sheet says it."""
-        if not (self._geared and behind):
-            return _entry(value, unit, about)
-        there = float(self._gear.to_output(value, unit))
-        if unit == "rad":  # as catalogues give a backlash
-            return _Entry(value, f'"{Units("arcmin").shown(there, unit):.9g} arcmin at output"', about)
-        return _Entry(value, f'"{_written(there, unit, 6)} at output"', about)
-
-    def _torques(self) -> dict[str, _Entry]:
-        """The torque of the load by its parts, and where a start begins that they decide."""
-        load, of = self._load, self._motor_side
-        active, friction, hoist = of.active, of.friction, self.machine == "hoist"
-
-        def torque(value: float, about: str) -> _Entry:
-            return self._there(value, "N*m", f"{about or 'none'}; {self._through(value)}")
-
-        if not active:
-            unknown = _entry("unknown", "", "every figure is the worst of both flanks and mid-gap")
-            return {
-                "load_torque": torque(friction, load.friction_from),
-                "load_kind": _entry("reactive", "", "friction"),
-                **({"start_position": unknown} if self._gaps else {}),
-            }
-        entries = {
-            "load_torque": torque(active, load.active_from),
-            "load_kind": _entry("active", "", "a load that hangs" if hoist else "it acts always"),
-            **({"load_friction": torque(friction, load.friction_from)} if friction else {}),
-        }
-        if friction >= abs(active):
-            return entries | {
-                "start_position": _entry("unknown", "", "friction holds the load where it stopped")
-            }
-        holds = f"the {'brake' if hoist else 'brake or backstop'} holds the motor"
-        return entries | {
-            "start_position": _entry("hanging", "", f"{holds}, the load winds up the shaft"),
-            "brake": _entry("motor"),
-            "release": _entry("torque", "", "torque proving"),
-        }
 
     def drive_toml(self) -> str:
         """The drive file: each number where it is known, with what it is from in a comment.
@@ -707,20 +369,12 @@ class DataSheet(ParameterSet):
         That of a part behind the gear is "at output" there, which `Drive` brings to the motor shaft. What is
         computed has five or six digits, what is typed all.
         """
-        blocks, follows = [], self._follows
-        for table in Drive.TABLES:
-            entries = [(p.key, follows[p.name]) for p in table.parameters if p.name in follows]
-            lines = [(f"{key} = {one.text}", one.about) for key, one in entries]
-            wide = max((len(line) for line, about in lines if about), default=0)
-            rows = [f"{line:{wide}}  # {about}" if about else line for line, about in lines]
-            if rows:
-                blocks.append("\n".join([f"[{table.name}]", *rows] if table.name else rows))
-        return "\n\n".join(blocks) + "\n"
+        return drive_text(self._entries)
 
     @cached_property
     def drive(self) -> Drive:
         """The drive that follows, exactly; the numbers of `drive_toml` may have fewer digits."""
-        values = {name: one.value for name, one in self._follows.items()}
+        values = {name: one.value for name, one in self._entries.items()}
         try:
             return Drive._made(values, Wording("the drive that follows", style="toml"), [])
         except InputError as error:
@@ -728,27 +382,6 @@ class DataSheet(ParameterSet):
             raise InputError([one + cause * ("cannot move" in one) for one in error.sentences]) from None
 
 
-def _parts(values: Mapping[str, float]) -> str:
-    """Parts of a sum at the motor shaft."""
-    return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in values.items())
-
-
-def _entry(value: Any, unit: str = "", about: str = "") -> _Entry:
-    """A word or a number in SI, shown in this unit.
-
-    >>> _entry(147.65485471872029, "rad/s").text, _entry("hanging").text, _entry(2e3 / 3.0, "kW").text
-    ('"1410 rpm"', '"hanging"', '"0.66667 kW"')
-    """
-    if not unit or value is None:
-        return _Entry(value, literal(value), about)
-    return _Entry(value, f'"{_written(value / SHOWN_IN.get(unit, 1.0), unit, 5)}"', about)
-
-
-def _written(value: float, unit: str, digits: int) -> str:
-    """A value as it was typed, whatever shaft it was brought to since; if computed, with so many digits.
-
-    >>> _written(0.1 + 0.2, "N*m", 5), _written(1.0 / 3.0, "N*m", 5)
-    ('0.3 N*m', '0.33333 N*m')
-    """
-    text = shortest(value, unit, within=1e-12)
-    return text if " " in text else f"{text if len(text) <= 15 else f'{value:.{digits}g}'} {unit}"
+OTHER_DOCUMENTS.append(
+    (DataSheet.describes, lambda tables, where: DataSheet._from_document(tables, where).drive)
+)

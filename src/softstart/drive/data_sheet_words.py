@@ -10,7 +10,7 @@ from typing import Literal
 from softstart.input.parameters import Parameter, bare, read_value
 from softstart.quantities import RefusedError
 
-Machine = Literal["hoist", "travel", "belt", "rotor"]
+MachineKind = Literal["hoist", "travel", "belt", "rotor"]
 MACHINES: Mapping[str, str] = {
     "hoist": "a load on ropes",
     "travel": "a crane, trolley or vehicle on wheels",
@@ -28,6 +28,7 @@ WORDS: Mapping[str, frozenset[str]] = {
     ),
 }
 
+RESISTANCE = {"travel": 0.008, "belt": 0.02}  # share of the weight
 ROPE = {"rope_stiffness", "rope_length", "elastic_frequency"}  # any of them says how a rope yields
 STIFFNESSES = ROPE | {"coupling_stiffness", "gear_stiffness", "shaft_diameter"}
 
@@ -53,7 +54,7 @@ USUAL: Mapping[str, str] = {
          "play_diameter", "rope_diameter", "diameter"), "mm"),
 }  # fmt: skip
 # parameters that say something about these machines only
-ABOUT: Mapping[str, tuple[Machine, ...]] = {
+ABOUT: Mapping[str, tuple[MachineKind, ...]] = {
     **dict.fromkeys(("mass", "diameter", "radius"), ("hoist", "travel", "belt")),
     **dict.fromkeys(("resistance", "slope", "rise", "length"), ("travel", "belt")),
     "goods": ("belt",), "counterweight": ("hoist",),

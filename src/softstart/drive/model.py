@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
@@ -39,6 +39,9 @@ Brake = Literal["none", "motor"]
 UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
 SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
 LOAD: Final = ("load_torque", "load_friction")  # the parts of the load torque
+
+# documents of another kind from which a drive follows: a test for them, and the drive; see `DataSheet`
+OTHER_DOCUMENTS: list[tuple[Callable[[Mapping[str, Any]], bool], Callable[[dict[str, Any], str], Drive]]] = []
 
 library = Library("softstart.drive", "a drive", "drives")
 
@@ -308,11 +311,10 @@ class Drive(ParameterSet, Machine):
 
         The tables of a data sheet give the drive that follows from it (`softstart.DataSheet`).
         """
-        from softstart.drive.data_sheet import DataSheet
-
-        if DataSheet.describes(document):
-            drive = DataSheet._from_document(dict(document), where).drive
-            return cls._made(drive.given(), Wording(where, style="toml"), [])
+        for describes, drive_of in OTHER_DOCUMENTS:
+            if describes(document):
+                drive = drive_of(dict(document), where)
+                return cls._made(drive.given(), Wording(where, style="toml"), [])
         return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------

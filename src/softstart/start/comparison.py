@@ -15,7 +15,8 @@ from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
-from softstart.drive.data_sheet import BAND, DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet_mechanics import BAND
 from softstart.drive.machine import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.drive.records import Records

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.drive.data_sheet import BAND
+from softstart.drive.data_sheet_mechanics import BAND
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
 from softstart.views.numbers import (

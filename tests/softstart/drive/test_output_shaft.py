@@ -250,7 +250,7 @@ AXIS = Subject(GEARED, Recipe("direct")).coordinate
         (lambda: records(CHAIN, gap=["9 arcmin at output"]), "the gears of a chain are in its shafts"),
         (lambda: Shaft(100.0, gap="9 arcmin at output"), 'write side = "before" or "after"'),
         (lambda: Mass("3 kg*m^2 at output"), 'inertia on its own shaft does not take "at output"'),
-        (lambda: simulate(GEARED, "ramp", parameters={"time": "1 s at output"}), "does not apply here"),
+        (lambda: simulate(GEARED, "ramp", parameters={"time": "1 s at output"}), 'does not take "at output"'),
         (lambda: AXIS("motor.inertia", ["1 kg*m^2 at output"]), 'does not take "at output"'),
     ],
 )  # fmt: skip
