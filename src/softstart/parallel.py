@@ -44,15 +44,15 @@ ATTEMPTS = 2  # at a task whose process dies
 GRACE = 0.4  # s, for a process whose pipe has closed to end by itself
 LOADED_FROM_FILE = "softstart_loose_"  # modules of controllers that were loaded from a file
 CLUSTER_TIMEOUT = 30.0  # s, for the scheduler to answer and for the first worker
-AHEAD = 256  # tasks that a cluster is given at a time
+QUEUED_ON_CLUSTER = 256  # tasks that a cluster is given at a time
 
 
-def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
+def single_threaded_blas(function: Callable[P, R]) -> Callable[P, R]:
     """Make libraries of linear algebra compute on one thread while `function` runs; then as before.
 
     In processes whose environment is not softstart's own: see ONE_THREAD.
 
-    >>> on_one_thread(sum)([3.0, 4.0])
+    >>> single_threaded_blas(sum)([3.0, 4.0])
     7.0
     """
 
@@ -260,7 +260,7 @@ def checked_workers(workers: object, scheduler: str | None = None) -> int:
     raise InputError(f"workers = {workers!r}: the number of processes is a whole number from 1 to 1024.")
 
 
-class _Elsewhere(pickle.Unpickler):
+class _ImportableOnly(pickle.Unpickler):
     """Loads only what another process can load too."""
 
     def find_class(self, module: str, name: str) -> Any:
@@ -269,31 +269,31 @@ class _Elsewhere(pickle.Unpickler):
         return super().find_class(module, name)
 
 
-def why_not_sendable(value: object) -> str:
+def reason_not_picklable(value: object) -> str:
     """Why no other process can load a value; "" if it can.
 
-    >>> why_not_sendable(("ramp", {"time": 0.1}))
+    >>> reason_not_picklable(("ramp", {"time": 0.1}))
     ''
     """
     try:
-        _Elsewhere(io.BytesIO(pickle.dumps(value))).load()
+        _ImportableOnly(io.BytesIO(pickle.dumps(value))).load()
     except (pickle.PicklingError, AttributeError, TypeError, ImportError) as error:
         return " ".join(str(error).split()) or type(error).__name__
     return ""
 
 
-def sharing(
+def usable_workers(
     value: object, what: str, workers: int | None, scheduler: str | None, threads: bool = False
 ) -> int:
     """How many workers share work on a value; 1 if no other process can load it, and none was asked for.
 
-    >>> sharing(lambda: 1, "the metric", None, None), sharing(abs, "the metric", 3, None)
+    >>> usable_workers(lambda: 1, "the metric", None, None), usable_workers(abs, "the metric", 3, None)
     (1, 3)
     """
     count = checked_workers(workers, scheduler)
     if scheduler is None and (threads or count == 1):
         return count
-    if reason := why_not_sendable(value):
+    if reason := reason_not_picklable(value):
         if workers is None and scheduler is None:
             return 1
         given = f"workers = {workers}" if scheduler is None else "scheduler"
@@ -365,7 +365,7 @@ class Pool:
             call = partial(_same_version, __version__, function)
         elif not self.threads:
             call = partial(self._in_process, function)
-        rest, most = iter(tasks), AHEAD if self.scheduler is not None else self.count + 1
+        rest, most = iter(tasks), QUEUED_ON_CLUSTER if self.scheduler is not None else self.count + 1
         running: dict[Future[R], T] = {}
         while True:
             for task in islice(rest, most - len(running)):

@@ -251,13 +251,13 @@ def test_where_another_machine_made_the_log_no_interval_is_stated(coarse: Log, t
     angle = np.floor((states["phi1"] - states["phi1"][0]) / coarse.count + 0.3) * coarse.count
     found = identify(Log(coarse.time, coarse.torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
     assert not found.stated
-    assert any("Something else moves this drive" in note for note in found.notes)
-    assert any("no interval is stated" in note for note in found.notes)
+    assert any("Unmodelled effects are likely" in note for note in found.notes)
+    assert any("without confidence intervals" in note for note in found.notes)
     assert not any(one.known for one in found.estimates)
     found.save(tmp_path)
     read = Identification.load(tmp_path)
     assert all(math.isnan(one.upper) for one in read.estimates)
-    with pytest.raises(InputError, match="states no intervals"):
+    with pytest.raises(InputError, match="has no confidence intervals"):
         read.draws()
 
 
@@ -274,7 +274,7 @@ def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None
 def test_a_wrong_unit_of_speed_is_noticed(log: Log) -> None:
     rpm = demanded(log).at(log.time)["w1"] * 30.0 / math.pi
     bad = Log(log.time, log.torque, speed=rpm, torque_is="demand")
-    assert any("look at the units of the log" in note for note in identify(bad, TRUTH, searches=1).notes)
+    assert any("check the units of the log" in note for note in identify(bad, TRUTH, searches=1).notes)
 
 
 @pytest.mark.slow
@@ -313,7 +313,7 @@ def test_a_speed_of_encoder_differences_is_summed_to_the_angle(log: Log) -> None
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (lambda t, u, y: (t[::-1], u, y), "it must rise"),
+        (lambda t, u, y: (t[::-1], u, y), "time does not rise"),
         (lambda t, u, y: (t, -u, y), "has the wrong sign"),
         (lambda t, u, y: (t[:10], u[:10], y[:10]), "10 samples; a fit needs 30 or more"),
         (lambda t, u, y: (t, u, 0.0 * y), "the angle never changes"),
@@ -353,7 +353,7 @@ def test_what_cannot_be_found_is_refused(log: Log) -> None:
     )
     for each, free, sentence in (
         (demand, ["gpa"], "did you mean gap"),
-        (demand, ["position"], "nothing to find"),
+        (demand, ["position"], "nothing to identify"),
         (demand, [FILTER, "gap"], "an angle has no filter"),
         (measured, ["gap", "torque_lag"], "log the demand"),
         (slow, None, "look at the units"),

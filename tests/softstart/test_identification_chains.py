@@ -48,7 +48,7 @@ def test_a_chain_is_found_through_its_reduction() -> None:
     found = identify(logged(chain, drive), chain, searches=1)
     (note,) = [note for note in found.notes if "has 4 masses" in note]
     first, second = natural_vibration(chain).Omega[1:3] / (2.0 * np.pi)
-    assert f"first natural frequency, {first:.4g} Hz. Those from {second:.4g} Hz on are left out" in note
+    assert f"first natural frequency, {first:.4g} Hz. Modes from {second:.4g} Hz on are neglected" in note
     errors = {"motor_inertia": -0.012, "stiffness": -0.01, "damping": 0.03}  # the pinion flies with the load
     for one in found.shared:
         # what the reduction says, moved by its error on this chain, is in twice the interval

@@ -135,10 +135,10 @@ def test_stamps_that_are_too_coarse_are_spread(period: float, rounded) -> None: 
 def test_stamps_that_tell_no_period_are_a_question(time: Vector) -> None:
     time = time.copy()
     time[70] = time[69]
-    with pytest.raises(InputError, match=r"time goes from .* at sample 71; it must rise"):
+    with pytest.raises(InputError, match=r"time does not rise at sample 71"):
         rebuilt(time=time)
     time = np.floor(LOG.time / 0.01) * 0.01  # stamps that leave the period open by 2 %
-    with pytest.raises(InputError, match="it must rise"):
+    with pytest.raises(InputError, match="time does not rise"):
         rebuilt(time=time)
 
 
@@ -148,7 +148,7 @@ def test_stamps_that_tell_no_period_are_a_question(time: Vector) -> None:
 def test_the_direction_of_rotation_does_not_matter_to_friction() -> None:
     log = rebuilt(torque=-LOG.torque, angle=-LOG.values).forward()
     assert_same(log)
-    assert "both turned round" in log.notes[-1]
+    assert "both inverted" in log.notes[-1]
     assert (log.sign, LOG.sign) == (-1.0, 1.0)  # of what is not friction, as an offset of the torque
     assert LOG.forward() is LOG
 

@@ -248,7 +248,7 @@ def test_a_fit_that_another_step_makes_better_by_four_is_none(gain: float, named
     root = np.sqrt(spot.variance(point.sizes))
     left = spot._replace(residual=math.sqrt(gain) * derivative / np.linalg.norm(derivative) * root)
     notes = model_mismatch(fitter, point._replace(spots=(left,), drift=np.zeros(x.size)))
-    assert any("The fit would be better" in note for note in notes) == named
+    assert any("The fit improves" in note for note in notes) == named
 
 
 def test_the_chance_of_correlations_is_that_of_ljung_and_box() -> None:

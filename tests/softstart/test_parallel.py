@@ -15,7 +15,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from softstart.errors import InputError, SimulationError
-from softstart.parallel import DiedError, Pool, Progress, Worker, on_one_thread
+from softstart.parallel import DiedError, Pool, Progress, Worker, single_threaded_blas
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
@@ -192,7 +192,7 @@ def test_libraries_of_linear_algebra_compute_on_one_thread_and_then_as_before() 
     with threadpool_limits(2, user_api="blas"):
         before = threads()
         assert set(before) == {2}
-        assert set(on_one_thread(threads)()) == {1}
+        assert set(single_threaded_blas(threads)()) == {1}
         assert threads() == before
 
 

@@ -330,9 +330,7 @@ def balance(
         layouts.append((name, about, shafts, places))
     against, along = couple_shaft(engine, -1), couple_shaft(engine, 1)
     if against:
-        layouts.append(
-            ("couple-shaft", "a shaft against the crank with two opposite imbalances", against, None)
-        )
+        layouts.append(("couple-shaft", "a shaft against the crank, two opposite imbalances", against, None))
     if along:
         layouts.append(("two-couple-shafts", "a second one that turns with the crank", against + along, None))
     residuals = tuple(_residual(engine, all_speeds, torque, *layout) for layout in layouts)

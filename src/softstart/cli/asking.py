@@ -86,12 +86,8 @@ class _Answers:
         machine = converted("machine", self.values().get("load.machine"))
         about = machine in ABOUT.get(p.name, (machine,))
         after = any(map(self.known, AFTER.get(p.name, ()))) or p.name not in AFTER
-        return (
-            p.path not in self.settings
-            and about
-            and after
-            and not any(map(self.known, UNLESS.get(p.name, ())))
-        )
+        instead = any(map(self.known, UNLESS.get(p.name, ())))
+        return p.path not in self.settings and about and after and not instead
 
     def needed(self, p: Parameter) -> bool:
         """Whether it cannot be left empty."""

@@ -60,9 +60,8 @@ class Commands(click.Group):
         """The command of this name, imported; None if there is none."""
         if cmd_name not in COMMANDS:
             return super().get_command(ctx, cmd_name)
-        command: click.Command = getattr(
-            import_module(f"softstart.cli.{COMMANDS[cmd_name]}"), f"{cmd_name}_command"
-        )
+        module = import_module(f"softstart.cli.{COMMANDS[cmd_name]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -75,9 +74,8 @@ class Commands(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options that begin with `incomplete`."""
-        items = [
-            CompletionItem(name, help=short_help(name)) for name in COMMANDS if name.startswith(incomplete)
-        ]
+        names = [name for name in COMMANDS if name.startswith(incomplete)]
+        items = [CompletionItem(name, help=short_help(name)) for name in names]
         return items + click.Command.shell_complete(self, ctx, incomplete)
 
     def resolve_command(
@@ -86,9 +84,7 @@ class Commands(click.Group):
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
-            raise click.UsageError(
-                f'there is no command "{name}"; {did_you_mean(name, known, "softstart ")}', ctx
-            )
+            raise click.UsageError(f'no command "{name}"; {did_you_mean(name, known, "softstart ")}', ctx)
         return super().resolve_command(ctx, args)
 
 

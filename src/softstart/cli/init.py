@@ -129,7 +129,5 @@ def template_text() -> str:
         )
         return f"# {p.key} = {p.example}  # {'; '.join(filter(None, about))}"
 
-    blocks = [
-        [f"[{table.name}]"] * bool(table.name) + [*map(row, table.parameters)] for table in DataSheet.TABLES
-    ]
+    blocks = [[*[t.bracket] * bool(t.name), *map(row, t.parameters)] for t in DataSheet.TABLES]
     return TEMPLATE + "\n\n".join(map("\n".join, blocks)) + "\n"

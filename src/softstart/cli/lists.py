@@ -47,9 +47,7 @@ def drives_command(*, name: str | None) -> Answer:
         shown = Sheet("Drives", ["Shipped drives"], tables=[table], notes=notes, commands=OWN)
         return lambda: {"drives": data}, shown
     if name not in drive_names():
-        raise InputError(
-            f'"{name}": there is no shipped drive of this name; {did_you_mean(name, drive_names())}'
-        )
+        raise InputError(f'"{name}": no shipped drive has this name; {did_you_mean(name, drive_names())}')
     return lambda: {"name": name, "drive": Drive.load(name).values()}, library.text(name)
 
 
@@ -161,9 +159,8 @@ def _studies() -> Answer:
     rows = [[study.name, study.title, ", ".join(study.pictures) or "-"] for study in studies]
     run = "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR"
     table = TextTable.of_texts(("study", "question", "pictures, each as .svg and .png"), rows)
-    return lambda: {"studies": data}, Sheet(
-        "Studies", ["Studies"], tables=[table], notes=[run, *broken.sentences]
-    )
+    sheet = Sheet("Studies", ["Studies"], tables=[table], notes=[run, *broken.sentences])
+    return lambda: {"studies": data}, sheet
 
 
 def _study_sheet(study: Study, result: StudyResult) -> Sheet:

@@ -172,9 +172,7 @@ def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | Unknown
     known = (*drive_names(), *CHAINS.names())
     if re.fullmatch(r"[\w-]+", name) and name not in known and refusal_of(name) == ABSENT:
         hint = did_you_mean(name, known)
-        raise InputError(
-            f'"{name}": there is no such file, and no shipped drive or chain of this name; {hint}'
-        )
+        raise InputError(f'"{name}": no such file, and no shipped drive or chain has this name; {hint}')
     return _drive(name, settings)
 
 
@@ -205,9 +203,8 @@ def named_as_options(**also: str) -> Iterator[None]:
     softstart.errors.InputError: --axis = 3: name the axes, or leave --axis out.
     """
     options = click.get_current_context().command.params
-    names = {
-        str(parameter.name): parameter.opts[0] for parameter in options if isinstance(parameter, click.Option)
-    } | also
+    flags = {str(one.name): one.opts[0] for one in options if isinstance(one, click.Option)}
+    names = flags | also
 
     def renamed(sentence: str) -> str:
         keyword = re.match(r"(\w+)(?= =|:|,| \")", sentence)
@@ -320,9 +317,8 @@ def described(text: str) -> dict[str, tuple[str | None, str]]:
     >>> described("--until TIME\\n    End of the simulation,\\n    in s.\\n--json\\n    Print JSON.")
     {'--until': ('TIME', 'End of the simulation, in s.'), '--json': (None, 'Print JSON.')}
     """
-    return {
-        flag: (metavar or None, " ".join(lines.split())) for flag, metavar, lines in DESCRIBED.findall(text)
-    }
+    rows = DESCRIBED.findall(text)
+    return {flag: (metavar or None, " ".join(lines.split())) for flag, metavar, lines in rows}
 
 
 SHARED = described(__doc__ or "")
@@ -396,17 +392,14 @@ def controller_option(flag: str, several: bool = False, **settings: Any) -> Deco
 
     The command gets a name or, of several, a list of names.
     """
-    names = option(
-        flag, read_names if several else check_name, shell_complete=one_of(controller_names), **settings
-    )
+    read = read_names if several else check_name
+    names = option(flag, read, shell_complete=one_of(controller_names), **settings)
     return lambda command: names(allow_code_option(command))
 
 
 def keys_of(tables: Iterable[DocumentTable]) -> list[str]:
     """The keys of a file as --set names them; the first of a list of tables stands for all."""
-    return [
-        p.path.replace(".", "[1].", 1) if table.many else p.path for table in tables for p in table.parameters
-    ]
+    return [p.path.replace(".", "[1].", 1) if one.many else p.path for one in tables for p in one.parameters]
 
 
 def set_option(tables: Iterable[DocumentTable]) -> Decorator:
@@ -422,10 +415,14 @@ allow_code_option = click.option(
     "--allow-code", is_flag=True, expose_value=False,
     callback=lambda context, _, allowed: context.meta.update({CODE: allowed}),
 )  # fmt: skip
+
+
+def _read_fitted_to(name: str, option: str) -> Drive:
+    return read_drive(name, ())
+
+
 until_option = option("--until", quantity("s", above=0.0))
-fitted_to_option = option(
-    "--fitted-to", lambda name, _: read_drive(name, ()), shell_complete=one_of(drive_names)
-)
+fitted_to_option = option("--fitted-to", _read_fitted_to, shell_complete=one_of(drive_names))
 json_option = option("--json as_json", is_flag=True)
 workers_option = option("--workers", count())
 scheduler_option = option("--scheduler")

@@ -62,9 +62,8 @@ def reduce_command(
 
     try:
         with working("reducing the chain ..."):
-            reduction = reduce_chain(
-                chain, **{name: value for name, value in arguments.items() if value is not None}
-            )
+            given = {name: value for name, value in arguments.items() if value is not None}
+            reduction = reduce_chain(chain, **given)
     except InputError as error:
         vibration, refused = natural_vibration(chain), error.sentences
         if option_value("as_json"):

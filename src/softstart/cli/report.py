@@ -141,9 +141,8 @@ def _printed(page: str, browser: str) -> bytes:
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             words.append("--no-sandbox")  # which root cannot have
         try:
-            done = subprocess.run(
-                [*words, source.as_uri()], capture_output=True, timeout=PRINTING, check=False
-            )
+            command = [*words, source.as_uri()]
+            done = subprocess.run(command, capture_output=True, timeout=PRINTING, check=False)
             said = " ".join(done.stderr.decode(errors="replace").split()[-20:])
             why = said or f"exit code {done.returncode}"
         except (OSError, subprocess.TimeoutExpired) as error:

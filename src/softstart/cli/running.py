@@ -102,9 +102,7 @@ def attributed(loading: str = "") -> Iterator[None]:
         if loading and (place or isinstance(error, ImportError | AttributeError | TypeError)):
             raise InputError(f'controller = "{loading}": it cannot be loaded{place} ({what}).') from error
         if place:
-            raise SimulationError(
-                f"The start was given up: the controller failed{place} ({what})."
-            ) from error
+            raise SimulationError(f"The start was aborted: the controller failed{place} ({what}).") from error
         raise
 
 

@@ -58,11 +58,9 @@ def compare_command(
         comparison = softstart.compare(drive, controllers_from_options(controllers, params), **arguments)
     from softstart.views.starts import comparison_sheet
 
-    rows = (
-        sorted(comparison.rows, key=lambda row: row.run.k_dyn)
-        if controllers is None
-        else list(comparison.rows)
-    )
+    rows = list(comparison.rows)
+    if controllers is None:
+        rows.sort(key=lambda row: row.run.k_dyn)
     sheet = comparison_sheet(comparison, rows, details or option_value("out") is not None)
     return comparison.summary, replace(sheet, commands=_next_steps(comparison))
 
@@ -71,10 +69,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     """Commands for the same machine that lead on, each with what it gives."""
     from softstart.tuning.ranges import tunable_parameters
 
-    machine = [
-        options.typed_machine(),
-        *(word for setting in options.typed_settings() for word in ("--set", setting)),
-    ]
+    settings = [word for setting in options.typed_settings() for word in ("--set", setting)]
     chosen = comparison.recommendation
     best = chosen.recommended or (chosen.best[-1] if chosen.best else None)
     steps: list[tuple[str, list[str], str]] = []
@@ -84,6 +79,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     if best is not None and best.name in controller_names() and tunable_parameters(best.controller):
         steps.append(("tune", ["--controller", best.name], "gains for other gaps and loads"))
     steps.append(("report", ["--out", "report.html"], "all results in one file"))
+    machine = [options.typed_machine(), *settings]
     return [(shlex.join(["softstart", name, *machine, *more]), gives) for name, more, gives in steps]
 
 
@@ -181,9 +177,8 @@ def fatigue_command(
         )
     from softstart.views.fatigue import fatigue_sheet
 
-    return result.summary, fatigue_sheet(
-        result, result.ranked if controllers is None else result.rows, fitted_to
-    )
+    rows = result.ranked if controllers is None else result.rows
+    return result.summary, fatigue_sheet(result, rows, fitted_to)
 
 
 @command("linear")

@@ -82,9 +82,7 @@ def sweep_command(
         interrupted command resumes. Without it only a summary is printed.
     """
     if controller is None and not any(text.partition("=")[0].strip() == "controller" for text in grid):
-        raise InputError(
-            "controller = None: name a strategy, or make several an axis, as --axis controller=direct,ramp."
-        )
+        raise InputError("controller = None: name one, or several as an axis, --axis controller=direct,ramp.")
     arguments = {name: value for name, value in arguments.items() if value is not None}
     begin, last = time.monotonic(), None
 

@@ -38,17 +38,17 @@ from softstart.quantities import number_in
 from softstart.results import Result
 
 MOST_STEPS = 400_000
-MOST_AT_ONCE = 40
+MOST_SIMULTANEOUS = 40
 REVERSALS = 2  # of the twist after the lock-up, so that the run holds both peaks of a cycle
-STILL = 1e-9
+AT_REST = 1e-9
 ROUNDING = 2e-15  # of the time: accuracy of an event's instant
 SAME = 1.0 + 1e-13  # ratio of peaks that count as equal
-MANY = 500  # steps, each shorter than two radians of the fastest oscillation
+MANY_STEPS = 500  # steps, each shorter than two radians of the fastest oscillation
 FIGURES = (
     "status", "slip_time", "end_time", "peak_torque", "peak_time", "slip_peak_torque", "slip_peak_time",
     "locked_peak_torque", "peak_ratio", "friction_work", "slip_work", "work_while_engaging", "lining_heat",
 )  # fmt: skip
-PATIENCE = 20.0  # times the slip time on a rigid shaft, until an engagement is given up
+TIME_LIMIT_FACTOR = 20.0  # times the slip time on a rigid shaft, until an engagement is given up
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Engagement(Result, view="clutches.engagement_sheet"):
     @cached_property
     def t(self) -> Vector:
         """Instants in s for plots: 24 in each step, 8 where there are many steps."""
-        count = 24 if len(self.steps) < MANY else 8
+        count = 24 if len(self.steps) < MANY_STEPS else 8
         shares = np.arange(count) / count
         inner = [step.start + step.length * shares for step in self.steps]
         return np.concatenate([*inner, [self.end_time]])
@@ -249,7 +249,7 @@ def _time_limit(clutch: Clutch, law: Law) -> float:
     inertia = clutch.clutch_inertia + clutch.load_inertia
     needed = clutch.drive_speed * inertia + clutch.load_torque * law.engaged_at
     periods = 2.0 * math.pi / clutch.locked_frequency + 2.0 * math.pi / clutch.B
-    return PATIENCE * (law.engaged_at + needed / (law.held - clutch.load_torque) + periods)
+    return TIME_LIMIT_FACTOR * (law.engaged_at + needed / (law.held - clutch.load_torque) + periods)
 
 
 def _steps(
@@ -264,38 +264,39 @@ def _steps(
     steps: list[Step] = []
     state, mode = ClutchState(), start_mode(clutch)
     last = _time_limit(clutch, law) if until is None else until
-    watched = math.inf  # until then at least, once it has locked
-    lost, reversals, direction, at_once = 0.0, 0, 0.0, 0
+    earliest_end = math.inf  # until then at least, once it has locked
+    lost, reversals, direction, simultaneous = 0.0, 0, 0.0, 0
     while state.t < last:
         if len(steps) >= MOST_STEPS:
             raise SimulationError(
-                f"The engagement was given up at {state.t:.6g} s: {MOST_STEPS} steps were not enough; end it "
-                "sooner with until, or make the shaft less stiff."
+                f"The engagement was aborted at {state.t:.6g} s after {MOST_STEPS} steps; give an earlier until, "
+                "or reduce the stiffness."
             )
-        step = step_from(clutch, law, state, mode, min(last, watched) if state.t < watched else last)
+        stop = min(last, earliest_end) if state.t < earliest_end else last
+        step = step_from(clutch, law, state, mode, stop)
         step, name = _first_event(clutch, step)
         if step.length > 0.0:
             steps.append(step)
-            state, at_once = step.after(), 0
+            state, simultaneous = step.after(), 0
         if name:
-            at_once += 1
-            if at_once > MOST_AT_ONCE:
+            simultaneous += 1
+            if simultaneous > MOST_SIMULTANEOUS:
                 raise SimulationError(
-                    f"The engagement was given up at {state.t:.6g} s: {MOST_AT_ONCE} changes at one instant."
+                    f"The engagement was aborted: {MOST_SIMULTANEOUS} events at the instant {state.t:.6g} s."
                 )
             lost += mode.elastic_energy(clutch, state.theta)
             state, mode, event = next_mode(clutch, name, state, mode, float(step.M.sum()))
             lost -= mode.elastic_energy(clutch, state.theta)
             if event:
                 events.append(EngagementEvent(state.t, event))
-            if event == "locked" and watched == math.inf:
-                watched = state.t + 2.0 * math.pi / clutch.locked_frequency
+            if event == "locked" and earliest_end == math.inf:
+                earliest_end = state.t + 2.0 * math.pi / clutch.locked_frequency
                 reversals, direction = 0, 0.0
         v = state.wM - state.wc
-        if abs(v) > STILL * clutch.drive_speed and v * direction <= 0.0:
+        if abs(v) > AT_REST * clutch.drive_speed and v * direction <= 0.0:
             reversals, direction = reversals + (direction != 0.0), math.copysign(1.0, v)
         complete = clutch.gap == 0.0 or reversals >= REVERSALS
-        if until is None and mode.locked and state.t >= watched and complete:
+        if until is None and mode.locked and state.t >= earliest_end and complete:
             break
     return steps, mode, lost
 
@@ -329,9 +330,8 @@ def _figures(
     for locked, group in groupby(zip(steps, works, strict=True), lambda one: one[0].mode.locked):
         parts, done = zip(*group, strict=True)
         peak, when = _peak(parts)
-        phases.append(
-            Phase("locked" if locked else "slip", parts[0].start, parts[-1].end, peak, when, sum(done))
-        )
+        kind = "locked" if locked else "slip"
+        phases.append(Phase(kind, parts[0].start, parts[-1].end, peak, when, sum(done)))
     slip_time = next((event.t for event in events if event.name == "locked"), math.nan)
     slipping = [phase for phase in phases if not phase.start >= slip_time]
     top, slip_top = (max(some, key=lambda phase: phase.peak_torque) for some in (phases, slipping))

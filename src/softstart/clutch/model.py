@@ -122,9 +122,8 @@ class Clutch(ParameterSet, kw_only=False):
 
         `where` is put before each sentence; `also` holds changes by path, as {"load.torque": "100 N*m"}.
         """
-        return cls._from_document(
-            parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where, also
-        )
+        document = parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES)
+        return cls._from_document(document, where, also)
 
     def replace(self, **changes: Any) -> Self:
         """A clutch with some parameters changed, checked like a new one."""
@@ -143,9 +142,8 @@ class Clutch(ParameterSet, kw_only=False):
             assert self.law_times is not None
             assert self.law_torques is not None
             return table_law(self.law_times, self.law_torques)
-        return shaped_law(
-            cast("LawKind", self.law), self.clutch_torque, self.engagement_time, self.time_constant
-        )
+        kind = cast("LawKind", self.law)
+        return shaped_law(kind, self.clutch_torque, self.engagement_time, self.time_constant)
 
     @property
     def mean_torque(self) -> float:

@@ -35,7 +35,7 @@ from softstart.clutch.model import Clutch
 ORDER = 24
 REACH = 1.9
 POWERS = np.arange(ORDER + 1)
-NOTHING = 1e-13  # a term below this share of the largest one is rounding
+ROUNDING_SHARE = 1e-13  # a term below this share of the largest one is rounding
 NEARLY_REAL = 1e-6  # imaginary part of a root that may be a real one
 
 
@@ -263,7 +263,7 @@ def first_crossing(a: Vector, jitter: float = 0.0) -> float | None:
     (0.0, None)
     """
     sizes = np.abs(a)
-    noise = NOTHING * sizes.max() + jitter * np.append(np.arange(1, a.size) * sizes[1:], 0.0)
+    noise = ROUNDING_SHARE * sizes.max() + jitter * np.append(np.arange(1, a.size) * sizes[1:], 0.0)
     counts = sizes > noise
     if not counts.any():
         return None

@@ -132,14 +132,12 @@ class Fitter:
     @property
     def bounds(self) -> tuple[Vector, Vector]:
         """The least and the largest x."""
-        return np.array([unknown.lower for unknown in self.unknowns]), np.array(
-            [unknown.upper for unknown in self.unknowns]
-        )
+        return np.array([p.lower for p in self.unknowns]), np.array([p.upper for p in self.unknowns])
 
     @property
     def weights(self) -> Matrix:
         """What is known beforehand, as the curvature of L/2."""
-        return np.diag([unknown.weight for unknown in self.unknowns])
+        return np.diag([p.weight for p in self.unknowns])
 
     @property
     def largest_torque(self) -> float:
@@ -151,11 +149,9 @@ class Fitter:
     def residuals(self, points: Sequence[Vector], log: int, error: Vector | None = None) -> Matrix:
         """Model minus log in the samples that count, in units of their rounding, a row for each x."""
         model = self.models[log]
-        signals = model.signals([model_parameters(self.unknowns, x, log) for x in points], error)[
-            :, model.rows
-        ]
+        signals = model.signals([model_parameters(self.unknowns, x, log) for x in points], error)
         offsets = np.array([sum(x[i] for i in self._offset(log)) for x in points])
-        return np.asarray((signals + offsets[:, None] - model.values) / model.root)
+        return np.asarray((signals[:, model.rows] + offsets[:, None] - model.values) / model.root)
 
     def jacobian(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """The derivatives of the residual, by differences."""
@@ -172,16 +168,10 @@ class Fitter:
 
     def _moved(self, log: int) -> list[int]:
         """Which numbers the motion of a log depends on."""
-        return [
-            i
-            for i, unknown in enumerate(self.unknowns)
-            if unknown.kind != "offset" and unknown.log in (None, log)
-        ]
+        return [i for i, p in enumerate(self.unknowns) if p.kind != "offset" and p.log in (None, log)]
 
     def _offset(self, log: int) -> list[int]:
-        return [
-            i for i, unknown in enumerate(self.unknowns) if unknown.kind == "offset" and unknown.log == log
-        ]
+        return [i for i, p in enumerate(self.unknowns) if p.kind == "offset" and p.log == log]
 
     def response(self, x: Vector, log: int, error: Vector | None = None) -> Matrix:
         """G: how the samples that count answer to a torque error, in units of their rounding."""
@@ -221,9 +211,8 @@ class Fitter:
         for number in range(most):
             start = guess.copy()
             if number:
-                start[free] = [
-                    self.unknowns[i].search_start(one) for i, one in zip(free, draws[number - 1], strict=True)
-                ]
+                ends = zip(free, draws[number - 1], strict=True)
+                start[free] = [self.unknowns[i].search_start(draw) for i, draw in ends]
             self.progress(f"search {number + 1}")
             try:
                 minima.append(self._followed(np.clip(start, *self.bounds)))
@@ -258,9 +247,8 @@ class Fitter:
     def most_likely(self, x: Vector, held: int | None = None) -> FitPoint:
         """The most likely x near this one. `held`: the number that stays."""
         errors = [np.zeros(model.blocks) for model in self.models]
-        return self.minimized(
-            self.linearized(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque)), held
-        )
+        point = self.linearized(x, errors, ErrorScales(1.0, RIPPLE * self.largest_torque))
+        return self.minimized(point, held)
 
     def linearized(self, x: Vector, errors: Sequence[Vector], sizes: ErrorScales) -> FitPoint:
         """The covariance at x about the torque errors that are most likely there, sought from `errors`."""
@@ -404,9 +392,7 @@ class Fitter:
         freedom: were f linear, the ends are those of Student's t. It is 1.96^2 if the size is known. Minus
         twice the log likelihood of the logarithm of a deviation with nu of them has the curvature 4 nu.
         """
-        low, middle, high = (
-            self.restricted(best.spots, scales) for scales in _ripples(best, [-0.1, 0.0, 0.1])
-        )
+        low, middle, high = (self.restricted(best.spots, one) for one in _ripples(best, [-0.1, 0.0, 0.1]))
         freedom = max((low - 2.0 * middle + high) / 0.04, 2.0)
         quantile = float(student.ppf(0.5 + 0.5 * INTERVAL.inside, freedom))
         return freedom * math.log1p(quantile**2 / freedom)
@@ -426,9 +412,8 @@ class Fitter:
         along = self.covariance(near)[:, i]
         x = np.clip(near.x + along / along[i] * (number - near.x[i]), *self.bounds)
         x[i] = number
-        return self.with_likelihood(
-            self.minimized(self.linearized(x, near.errors, near.sizes), i, best), best
-        )
+        point = self.linearized(x, near.errors, near.sizes)
+        return self.with_likelihood(self.minimized(point, i, best), best)
 
     def end(self, i: int, sign: float, half: float, best: FitPoint, others: Sequence[FitPoint]) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half of it, were f linear.

@@ -144,9 +144,7 @@ def _sheet(
     above = [_heading(lines[i].lstrip("# "), mark, width) for i in range(first) if lines[i].strip()]
     headings = list(_headings([row for row in above if len(row) >= width], width))
     if not headings:
-        raise RefusedError(
-            f"no line above the numbers names the columns; write it there, as {FORM.replace(';', mark)}"
-        )
+        raise RefusedError(f"no line above the numbers names the columns, as {FORM.replace(';', mark)}")
     refusals = []
     for names, units in headings:
         sheet = LogTable(names, units, CellTable(numbers, width, mark))
@@ -257,9 +255,8 @@ def _places(names: Sequence[str], wanted_columns: Mapping[str, WantedColumn]) ->
     """In which column each signal stands."""
     places: dict[str, list[int]] = {}
     for key, signal in SIGNALS.items():
-        known = [
-            name.lower() for name in ([wanted_columns[key].name] if key in wanted_columns else signal.names)
-        ]
+        names_known = [wanted_columns[key].name] if key in wanted_columns else signal.names
+        known = [name.lower() for name in names_known]
         whole = [i for i, name in enumerate(names) if name.lower() in known]
         places[key] = whole or [i for i, name in enumerate(names) if _tail(name)[0].lower() in known]
     motions = [key for key in ("angle", "speed") if key in wanted_columns]

@@ -84,7 +84,7 @@ class Log:
     name: str
     count: float  # rad or rad/s; 0 where none is seen
     notes: tuple[str, ...] = field(default=())
-    sign: float = 1.0  # -1 where torque and motion were turned round
+    sign: float = 1.0  # -1 where torque and motion were inverted
 
     def __init__(
         self,
@@ -188,10 +188,10 @@ class Log:
         return self.changed(time=self.time[:count], torque=self.torque[:count], values=self.values[:count])
 
     def forward(self) -> Log:
-        """The log with torque and motion turned round, if the motor first turns backward in it."""
+        """The log with torque and motion inverted, if the motor first turns backward."""
         if float(np.sum(self.speed_and_impulse[0][self._early])) >= 0.0:
             return self
-        note = "the drive first turns backward, and torque and motion were both turned round"
+        note = "the drive first turns backward; torque and motion were both inverted"
         return self.changed(
             torque=-self.torque, values=-self.values, sign=-self.sign, notes=(*self.notes, note)
         )
@@ -211,7 +211,7 @@ class Log:
             return self
         angle = np.concatenate([[0.0], np.cumsum(self.values[1:] * steps)])
         log = Log(self.time, self.torque, angle=angle, torque_is=self.torque_is, name=self.name)
-        note = "the speed is the difference of encoder counts, and was summed to the angle"
+        note = "the speed is a difference of encoder counts and was integrated to the angle"
         return log.changed(notes=(*self.notes, note))
 
     @property
@@ -243,9 +243,7 @@ class Log:
         name, kind = self.name, self.kind
         seen = np.isfinite(self.values)
         if int(seen.sum()) < FEWEST:
-            raise InputError(
-                f"{name}: {int(seen.sum())} samples of the {kind}; a fit needs {FEWEST} or more."
-            )
+            raise InputError(f"{name}: {int(seen.sum())} samples of the {kind}; a fit needs {FEWEST}.")
         if not np.any(self.torque):
             raise InputError(f"{name}: the torque is 0 in every sample; log the torque of the motor with it.")
         speed, impulse = self.speed_and_impulse
@@ -275,9 +273,7 @@ def _check_times(time: Vector, name: str) -> None:
     steps = np.diff(time)
     if np.any(steps <= 0.0):
         i = int(np.argmax(steps <= 0.0))
-        raise InputError(
-            f"{name}: time goes from {time[i]:g} s to {time[i + 1]:g} s at sample {i + 2}; it must rise."
-        )
+        raise InputError(f"{name}: time does not rise at sample {i + 2}: {time[i]:g} s, {time[i + 1]:g} s.")
     i, typical = int(np.argmax(steps)), float(np.median(steps))
     if steps[i] > HOLE * typical:
         raise InputError(

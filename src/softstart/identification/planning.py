@@ -187,10 +187,8 @@ def plan_experiments(
     test = VirtualTest(drive, period, error, names, tuple(aims), progress or (lambda _: None))
     experiments = [test.experiment(name, *levels) for name, levels in standard.items()]
     if optimise:
-        torque, travel = (
-            drive.limits.shaft_torque or max(experiment.peak for experiment in experiments),
-            math.inf,
-        )
+        torque = drive.limits.shaft_torque or max(one.peak for one in experiments)
+        travel = math.inf
         if max_torque is not None:
             # a limit, as that of the drive: "at output" without losses
             most = quantity_of(drive, "permissible_torque", max_torque, "max_torque")
@@ -259,9 +257,8 @@ def _at_rest(drive: Drive) -> Drive:
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:
     names = [name for name in default_parameters(drive, lag=True) if float(getattr(drive, name))]
-    asked = selected_parameters(
-        free, names, [*DEFAULT_PARAMETERS, "load_torque", "torque_lag", *FRICTIONS], "this log"
-    )
+    possible = [*DEFAULT_PARAMETERS, "load_torque", "torque_lag", *FRICTIONS]
+    asked = selected_parameters(free, names, possible, "this log")
     if missing := [name for name in asked if not float(getattr(drive, name))]:
         raise InputError(f"free = {show(missing[0])}: it is 0 in the drive; give a guess of it.")
     return tuple(asked)
@@ -348,9 +345,8 @@ class VirtualTest:
         self.progress(name)
         profile, end = stepped_torque(durations, levels)
         widths = self.widths(profile, end, SAMPLES)
-        return Experiment(
-            name, profile, end, widths, *self.worst_peak_and_travel(profile, end), self.score(widths)
-        )
+        peak, travel = self.worst_peak_and_travel(profile, end)
+        return Experiment(name, profile, end, widths, peak, travel, self.score(widths))
 
     def score(self, widths: dict[str, float]) -> float:
         """Of logarithms, so that units do not matter: A-optimal.
@@ -384,10 +380,10 @@ class VirtualTest:
         variances = np.diag(fitter.covariance(FitPoint(x, sizes, (spot,))))
         reach = np.minimum(INTERVAL.quantile * np.sqrt(variances), 50.0).tolist()
         widths = {}
-        for unknown, number, half in zip(unknowns, x.tolist(), reach, strict=True):
-            if unknown.log is None:
-                share = math.sinh(half) if unknown.kind == "logarithm" else unknown.share(number, half)
-                widths[unknown.name] = share if vague or unknown.known(number, half) else math.inf
+        for p, number, half in zip(unknowns, x.tolist(), reach, strict=True):
+            if p.log is None:
+                share = math.sinh(half) if p.kind == "logarithm" else p.share(number, half)
+                widths[p.name] = share if vague or p.known(number, half) else math.inf
         return widths
 
     def worst_peak_and_travel(self, profile: TorqueProfile, end: float) -> tuple[float, float]:

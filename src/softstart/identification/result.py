@@ -134,7 +134,7 @@ class Identification(Result, view="identification.identification_sheet"):
         """Drives that the logs leave possible, drawn from the joint distribution of the estimates."""
         if not self.stated:
             raise InputError(
-                f"{self.drive.name}: its identification states no intervals ({self.notes[0]}) Give "
+                f"{self.drive.name}: its identification has no confidence intervals ({self.notes[0]}) Use "
                 f"{DRIVE_FILE} alone, as a drive without intervals."
             )
         rows = [i for i, one in enumerate(self.estimates) if one.name in PARAMETERS]
@@ -187,9 +187,9 @@ class Identification(Result, view="identification.identification_sheet"):
             kept = json.loads(read_text(path))
             if kept["format"] != FORMAT:
                 raise ValueError(f"it is not of the format {FORMAT}")
+            keys = [field.name for field in fields(Estimate)]
             estimates = tuple(
-                Estimate(**{f.name: _or_nan(one[f.name]) for f in fields(Estimate)})
-                for one in kept["estimates"]
+                Estimate(**{key: _or_nan(one[key]) for key in keys}) for one in kept["estimates"]
             )
             guess = Drive.from_toml(kept["guess"], where=f"{path}, guess")
             found = cls(
@@ -199,9 +199,8 @@ class Identification(Result, view="identification.identification_sheet"):
                 notes=tuple(map(str, kept["notes"])), residuals=(),
             )  # fmt: skip
         except RefusedError as refusal:
-            raise InputError(
-                f"{path}: {refusal.reason}; name a folder that softstart identify --out has written."
-            ) from None
+            reason = "name a folder that softstart identify --out has written"
+            raise InputError(f"{path}: {refusal.reason}; {reason}.") from None
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise InputError(
                 f"{path}: this is not what softstart identify wrote ({type(error).__name__}: {error}); "

@@ -38,7 +38,7 @@ from softstart.identification.unknowns import (
     selected_parameters,
     unknowns_of,
 )
-from softstart.parallel import on_one_thread
+from softstart.parallel import single_threaded_blas
 from softstart.quantities import show, to_si
 from softstart.vibration import reduce_chain
 
@@ -55,7 +55,7 @@ STEP_ALIKE: Final = 1e-3  # error of the step of an encoder by log and lines
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
 
-@on_one_thread
+@single_threaded_blas
 def identify(
     logs: Log | Sequence[Log],
     drive: MachineLike,
@@ -64,7 +64,7 @@ def identify(
     searches: int = 12,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
+    """Identify the parameters of a drive, with confidence intervals, from inverter logs of its starts.
 
     The exact plant under the torque of the log is fitted to the angle or speed of the motor: by searches from
     the guess and from points up to a factor of 4 around it, then by maximum likelihood, with the covariance
@@ -119,7 +119,7 @@ def identify(
     given_logs = [logs] if isinstance(logs, Log) else logs
     read = [_directed(one.integrated(float(drive.encoder_lines)), drive) for one in given_logs]
     if not read or searches < 1:
-        raise InputError("logs, searches: there is none; give a log and a whole number of 1 or more.")
+        raise InputError("logs, searches: give at least one log and one search.")
     names, moving = _free(free, drive, read)
     for one in read:
         _check_inertia(one, drive)
@@ -147,8 +147,8 @@ def identify(
         *_neglected_modes(machine),
         *(misfit_warnings or _unknown_parameters(estimates)),
         *_scale_warning(drive, identified),
-        "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
-        "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
+        "The torque scale cannot be identified from motion: if the signal is 10 % low, so are both inertias, "
+        "stiffness, damping and load torque; K_dyn hardly changes.",
     ]
     return Identification(
         drive=identified,
@@ -170,8 +170,8 @@ def _directed(log: Log, drive: Drive) -> Log:
     if turned is log or float(drive.active_torque) == 0.0:
         return turned
     note = (
-        "the drive first turns backward, where the active load drives it; if the log counts the other way "
-        "than the drive file, change both signs: set columns to torque=-NAME,angle=-NAME"
+        "the drive first turns backward, driven by the active load; if the log has the opposite sign "
+        "convention, change both signs: set columns to torque=-NAME,angle=-NAME"
     )
     return log.changed(notes=(*log.notes, note.replace("angle", log.kind)))
 
@@ -186,15 +186,15 @@ def reduced_drive(machine: Any) -> Drive:
     """
     if isinstance(machine, Chain) and (held := machine.at_motor_shaft().held) is not None:
         raise InputError(
-            f"drive = {machine.name}: {machine.mass_names[held]} stays at rest, and a log is explained by "
-            "two masses that turn freely; leave it out if it did not hold the chain while that was logged."
+            f"drive = {machine.name}: {machine.mass_names[held]} stays at rest, but the model has two free "
+            "masses; remove it if it did not hold the chain during the log."
         )
     gaps = machine.gaps
     whole = float(gaps.sum())
     if whole > 0.0 and float(gaps.max()) <= DOMINANT * whole:
         raise InputError(
             f"drive = {machine.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
-            "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
+            "the model has one gap, so that one gap must be the larger part."
         )
     return machine.two_masses
 
@@ -205,9 +205,9 @@ def _neglected_modes(chain: Any) -> list[str]:
         return []
     first, second = (reduce_chain(chain, force=True).vibration.Omega[1:3] / TURN).tolist()
     return [
-        f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it, with "
-        f"its first natural frequency, {first:.4g} Hz. Those from {second:.4g} Hz on are left out, and the "
-        "intervals do not hold the error of that."
+        f"{chain.name} has {len(chain.masses)} masses; its two-mass model was identified, with the first "
+        f"natural frequency, {first:.4g} Hz. Modes from {second:.4g} Hz on are neglected; the intervals do "
+        "not include that error."
     ]
 
 
@@ -218,16 +218,18 @@ def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tupl
     chosen_names = selected_parameters(free, names, (*FREE, POSITION), "logs")
     reasons = {}
     if any(log.kind == "angle" for log in logs):
-        reasons[FILTER] = "an angle has no filter of the speed; leave it out."
+        reasons[FILTER] = "an angle has no speed filter; remove it."
     if not demand:
-        already = "with a measured torque it is in the samples already; leave it out, or log the demand "
-        reasons |= dict.fromkeys(("torque_lag", "computing_delay"), already + '(torque_is = "demand").')
+        already = (
+            'a measured torque contains it already; remove it, or log the demand (torque_is = "demand").'
+        )
+        reasons |= dict.fromkeys(("torque_lag", "computing_delay"), already)
     if not float(drive.load_torque):
-        reasons["load_torque"] = "the guess is 0; give one that has the right sign."
+        reasons["load_torque"] = "the guess is 0; give a guess with the right sign."
     if wrong := [name for name in chosen_names if name in reasons and free is not None]:
         raise InputError(f"free = {show(wrong[0])}: {reasons[wrong[0]]}")
     if chosen_names in ([], [POSITION]):
-        raise InputError("free: there is nothing to find; name parameters, as gap and stiffness.")
+        raise InputError("free: nothing to identify; name parameters, for example gap and stiffness.")
     # the filter, which is not the drive's, last
     return [name for name in FREE if name in chosen_names], POSITION in chosen_names
 
@@ -240,10 +242,10 @@ def _check_inertia(log: Log, drive: Drive) -> None:
     if low / SUSPECT <= inertia <= high * SUSPECT:
         return
     raise InputError(
-        f"{log.name}: torque and motion tell an inertia of about {inertia:.3g} kg m2, and the drive has "
-        f"{low + float(drive.J2):.3g} kg m2; look at the units of its columns: time in ms, speed in "
-        "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms], or "
-        'set by columns, "time=NAME [ms]".'
+        f"{log.name}: torque and motion give an inertia of about {inertia:.3g} kg m2, but the drive has "
+        f"{low + float(drive.J2):.3g} kg m2; check the units of the columns: write time in ms, speed in rpm, "
+        "angle in degrees or revolutions, torque in % in the first line, as time [ms], or set columns to "
+        '"time=NAME [ms]".'
     )
 
 
@@ -257,35 +259,33 @@ def _check_step(log: Log, lines: float) -> None:
         share = counts * float(to_si(f"1 {unit}", si))
         if abs(share - 1.0) < STEP_ALIKE and abs(counts - 1.0) > STEP_ALIKE:
             raise InputError(
-                f"{log.name}: the {log.kind} goes in steps of {log.count:.4g} {si}, which are the counts of "
+                f"{log.name}: the {log.kind} changes in steps of {log.count:.4g} {si}, the counts of "
                 f'{lines:g} encoder lines in {unit}; set columns to "{log.kind}=NAME[{unit}]", or '
-                "motor.encoder_lines to 0 if the log is of another encoder."
+                "motor.encoder_lines to 0 for another encoder."
             )
 
 
 def _any_undetermined(fitter: Fitter, best: FitPoint) -> bool:
     """Whether there is a number that the logs do not tell, were all intervals symmetric."""
     fits = zip(fitter.unknowns, best.x.tolist(), fitter.half_widths(best).tolist(), strict=True)
-    return any(
-        unknown.kind != "offset" and not unknown.known(x, half, unknown.guess) for unknown, x, half in fits
-    )
+    return any(one.kind != "offset" and not one.known(x, half, one.guess) for one, x, half in fits)
 
 
 def _without_intervals(unknowns: Sequence[Unknown], x: Vector) -> list[Estimate]:
     """The best fit, of which no number is called known."""
     return [
-        Estimate(unknown.title, unknown.value(number), math.nan, math.nan, False, "no interval is stated")
-        for unknown, number in zip(unknowns, x.tolist(), strict=True)
-        if unknown.kind != "offset"
+        Estimate(p.title, p.value(number), math.nan, math.nan, False, "no confidence interval")
+        for p, number in zip(unknowns, x.tolist(), strict=True)
+        if p.kind != "offset"
     ]
 
 
 def _correlations(fitter: Fitter, best: FitPoint) -> Matrix:
     """Of the estimates; the further forward a position, the smaller its number in the fit."""
     covariance = fitter.covariance(best)
-    signs = [-1.0 if unknown.kind == "position" else 1.0 for unknown in fitter.unknowns]
+    signs = [-1.0 if p.kind == "position" else 1.0 for p in fitter.unknowns]
     sizes = np.sqrt(np.diag(covariance)) * signs
-    kept = sum(unknown.kind != "offset" for unknown in fitter.unknowns)
+    kept = sum(p.kind != "offset" for p in fitter.unknowns)
     return np.asarray((covariance / np.outer(sizes, sizes))[:kept, :kept])
 
 
@@ -293,21 +293,19 @@ def _estimates(fitter: Fitter, best: FitPoint, others: Sequence[FitPoint]) -> li
     """Values and intervals: their ends are where the fit gets worse, with all else refitted."""
     estimates, lost = [], set[str]()
     halves, covariance = fitter.half_widths(best), fitter.covariance(best)
-    for i, (unknown, x, half) in enumerate(
-        zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)
-    ):
-        if unknown.kind == "offset":
+    for i, (p, x, half) in enumerate(zip(fitter.unknowns, best.x.tolist(), halves.tolist(), strict=True)):
+        if p.kind == "offset":
             continue
-        fitter.progress(f"interval of {unknown.title}")
+        fitter.progress(f"interval of {p.title}")
         ends = [fitter.end(i, sign, half, best, others) for sign in (-1.0, 1.0)]
-        known = unknown.known(x, half, unknown.guess) and unknown.known(x, 0.5 * (ends[1] - ends[0]))
-        known = known and not (unknown.kind == "position" and "gap" in lost)  # a share of the gap
-        limited = unknown.limited(x) or (known and any(map(unknown.limited, ends)))
+        known = p.known(x, half, p.guess) and p.known(x, 0.5 * (ends[1] - ends[0]))
+        known = known and not (p.kind == "position" and "gap" in lost)  # a share of the gap
+        limited = p.limited(x) or (known and any(map(p.limited, ends)))
         reason = AT_LIMIT if limited else "" if known else _reason(i, covariance, fitter.unknowns)
         if reason:
-            lost.add(unknown.name)
-        lower, upper = sorted(map(unknown.value, ends))
-        estimates.append(Estimate(unknown.title, unknown.value(x), lower, upper, not reason, reason))
+            lost.add(p.name)
+        lower, upper = sorted(map(p.value, ends))
+        estimates.append(Estimate(p.title, p.value(x), lower, upper, not reason, reason))
     return estimates
 
 
@@ -319,8 +317,8 @@ def _reason(i: int, covariance: Matrix, unknowns: Sequence[Unknown]) -> str:
     partner = int(np.argmax(ratio))
     if ratio[partner] > 0.9 and unknowns[partner].kind != "offset":
         name = unknowns[partner].title
-        return f"the logs tell it only together with {name} (correlation {ratio[partner]:.2f})"
-    return "the motion of the motor hardly depends on it in these logs"
+        return f"not separately identifiable from {name} (correlation {ratio[partner]:.2f})"
+    return "the motor motion in these logs hardly depends on it"
 
 
 def _unknown_parameters(estimates: Sequence[Estimate]) -> list[str]:
@@ -331,7 +329,7 @@ def _unknown_parameters(estimates: Sequence[Estimate]) -> list[str]:
             reasons.setdefault(estimate.reason, []).append(estimate.name)
     if not reasons:
         return []
-    remedy = "a log of an experiment that determines it"
+    remedy = "log an experiment that identifies it"
     if AT_LIMIT in reasons:
         remedy = f"start from another initial guess of {listed(reasons[AT_LIMIT])}"
     groups = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
@@ -344,14 +342,14 @@ def _scale_warning(guess: Drive, identified: Drive) -> list[str]:
     if 1.0 / DOUBTFUL < ratio < DOUBTFUL:
         return []
     return [
-        f"The inertias found are {ratio:.2g} times those of the guess. If that is not off so far, look at "
-        "the units of the log: rpm called rad/s makes inertias and stiffness 9.5 times too small and the gap "
-        "as much too wide, and fits as well."
+        f"The identified inertias are {ratio:.2g} times those of the guess. If the guess is better, check "
+        "the units of the log: rpm read as rad/s makes inertias and stiffness 9.5 times too small and the "
+        "gap as much too wide, with the same fit."
     ]
 
 
 def model_mismatch(fitter: Fitter, best: FitPoint) -> list[str]:
-    """What the logs show that the model has not."""
+    """What the logs contain that the model does not."""
     sizes, largest, shown = best.sizes, fitter.largest_torque, list[str]()
     usual_torque = max(largest, 0.5 * float(fitter.models[0].guess.Ms))
     if sizes.ripple > min(LARGE_RIPPLE * usual_torque, MOST_RIPPLE * largest):
@@ -368,9 +366,8 @@ def model_mismatch(fitter: Fitter, best: FitPoint) -> list[str]:
     notes = _effects(fitter, best)
     if shown:
         notes.append(
-            "Something else moves this drive (another friction or load, cogging, a second gap, an elastic "
-            "part, a demand that was not realised), or the signals are filtered, clipped, cut, poor or those "
-            "of another shaft: "
+            "Unmodelled effects are likely (another friction or load, cogging, a second gap, elastic parts, "
+            "a demand not realised; signals filtered, clipped, cut or of another shaft): "
             f"{'; '.join(shown)}."
         )
     wider = [
@@ -382,11 +379,9 @@ def model_mismatch(fitter: Fitter, best: FitPoint) -> list[str]:
     if replace(fitter, unknowns=wider).step(best)[1] > UNSETTLED:
         ends = [one.name for one, x in zip(fitter.unknowns, best.x.tolist(), strict=True) if one.limited(x)]
         where = f"beyond the limit of the search for {listed(ends)}" if ends else "elsewhere"
-        notes.append(f"The fit would be better {where}: start from another initial guess.")
+        notes.append(f"The fit improves {where}: start from another initial guess.")
     if notes:
-        notes.append(
-            "The drive does not explain the logs: the values are its best fit, and no interval is stated."
-        )
+        notes.append("The model does not fit the logs; best-fit values without confidence intervals.")
     return notes
 
 
@@ -426,7 +421,7 @@ def _effects(fitter: Fitter, best: FitPoint) -> list[str]:
         remedy = f"Remedy: identify it too, --free +{parameter.path}."
     value = had.get(effect, 0.0)
     fact = (
-        f"The logs show {what} of {value + amount:.3g} +- {2.0 * error:.2g} {unit}, and the drive has "
+        f"The logs contain {what} of {value + amount:.3g} +- {2.0 * error:.2g} {unit}, but the drive has "
         f"{value:.3g}: gap and load torque may be far off."
     )
     return [Sentence(fact, remedy, page="")]  # the page has no choice of unknowns

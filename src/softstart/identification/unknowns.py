@@ -166,9 +166,9 @@ def unknowns_of(
 def model_parameters(unknowns: Sequence[Unknown], x: Vector, log: int) -> dict[str, float]:
     """The parameters of the model of one log at x."""
     return {
-        unknown.name: unknown.value(number)
-        for unknown, number in zip(unknowns, x.tolist(), strict=True)
-        if unknown.kind != "offset" and unknown.log in (None, log)
+        p.name: p.value(number)
+        for p, number in zip(unknowns, x.tolist(), strict=True)
+        if p.kind != "offset" and p.log in (None, log)
     }
 
 

@@ -188,9 +188,7 @@ def follow_wear(
         read = one if isinstance(one, Identification) else Identification.load(one)
         gap = next((estimate for estimate in read.estimates if estimate.name == "gap"), None)
         if gap is None or not gap.known:
-            raise InputError(
-                f"wear: {name} does not know the gap; {gap.reason if gap else 'it was not free'}."
-            )
+            raise InputError(f"wear: gap unknown in {name}: {gap.reason if gap else 'it was not free'}.")
         rows.append((_date_of(when), name, read, gap))
     rows.sort(key=lambda row: row[0])
     days, names, each, gaps = zip(*rows, strict=True)

@@ -32,7 +32,7 @@ from softstart.optimal.result import (
     Trial,
 )
 from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve, rigid_start_time
-from softstart.parallel import on_one_thread
+from softstart.parallel import single_threaded_blas
 from softstart.profile import TorqueProfile
 from softstart.start.kernel_input import kernel_input
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
@@ -59,7 +59,7 @@ ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are
 TIGHT = 1e-5  # a bound within this share needs no other one
 
 
-@on_one_thread
+@single_threaded_blas
 def optimize(
     drive: MachineLike,
     start_time: float | str | None = None,
@@ -184,7 +184,7 @@ def optimize(
     return replace(best, why=best.why + why, alone=alone)
 
 
-@on_one_thread
+@single_threaded_blas
 def solve(
     problem: Problem, near: TorqueProfile | None = None, confirm: bool = False, follow: float = 0.0
 ) -> Optimum:

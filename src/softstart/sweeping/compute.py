@@ -38,46 +38,45 @@ class Task:
     """A chunk: its place among the chunks, its number of starts, and what varies, see `grid_values`."""
 
     index: tuple[int, ...]
-    question: SweepSettings
+    settings: SweepSettings
     starts: int
     values: dict[str, Any]
 
 
 def compute(task: Task) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
-    question = task.question
-    drive, parameters, name = _sorted(task.values)
+    settings = task.settings
+    drive, parameters, name = _by_owner(task.values)
     # the gap of every start, so that each chunk is a table
-    gaps = np.full(task.starts, question.drive.gap_and_inertia[0])
-    machines = varied(question.drive, {"gap": gaps, **drive})
-    fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
+    gaps = np.full(task.starts, settings.drive.gap_and_inertia[0])
+    machines = varied(settings.drive, {"gap": gaps, **drive})
+    fitted_to = None if settings.fitted_to is None else settings.fitted_to.design_drive
     results = prepared(machines).figures(
-        question.recipe.make(parameters, name).set_ups(fitted_to or machines),
+        settings.recipe.make(parameters, name).set_ups(fitted_to or machines),
         machines.mean_torque,
-        until=question.until,
+        until=settings.until,
     )
-    figures = {name: np.ascontiguousarray(results[name][0], dtype=np.float64) for name in question.figures}
+    figures = {name: np.ascontiguousarray(results[name][0], dtype=np.float64) for name in settings.figures}
     return figures | {"status": np.array([CODES[one] for one in results["status"][0]], dtype=np.int8)}
 
 
-def _sorted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any], str]:
+def _by_owner(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any], str]:
     """Values of the machine, parameters of the controller, and its name if that is from an axis."""
-    controller = {
-        name.removeprefix(f"{PREFIX}_"): one for name, one in values.items() if name.startswith(PREFIX)
-    }
+    own = {name: one for name, one in values.items() if name.startswith(PREFIX)}
+    controller = {name.removeprefix(f"{PREFIX}_"): one for name, one in own.items()}
     name = controller.pop(PREFIX, "")
     return {name: one for name, one in values.items() if not name.startswith(PREFIX)}, controller, name
 
 
-def check_corners(question: SweepSettings, grid: Grid) -> None:
+def check_corners(settings: SweepSettings, grid: Grid) -> None:
     """Raise the InputError of the first corner of the grid whose drive or controller is impossible."""
     for corner in islice(product(*(_ends(grid, dim) for dim in axis_lengths(grid))), MOST_CORNERS):
-        drive, parameters, name = _sorted({name: one for end in corner for name, one in end.items()})
+        drive, parameters, name = _by_owner({name: one for end in corner for name, one in end.items()})
         if any(isinstance(value, np.ndarray) for value in drive.values()):
-            varied(question.drive, drive)
+            varied(settings.drive, drive)
         else:
-            question.drive.with_values(drive)
-        question.recipe.make(parameters, name)
+            settings.drive.with_values(drive)
+        settings.recipe.make(parameters, name)
 
 
 def _ends(grid: Grid, dim: str) -> list[dict[str, Any]]:
@@ -89,7 +88,7 @@ def _ends(grid: Grid, dim: str) -> list[dict[str, Any]]:
     return [{dim: end} for end in dict.fromkeys(values if names else [min(values), max(values)])]
 
 
-def first_start(question: SweepSettings, grid: Grid) -> bool:
+def first_start(settings: SweepSettings, grid: Grid) -> bool:
     """Make the first start of the grid: compiles what is to be compiled, and finds controllers that fail.
 
     Returns whether all controllers are compiled, so that threads serve as well as processes.
@@ -97,7 +96,7 @@ def first_start(question: SweepSettings, grid: Grid) -> bool:
     compiled = True
     first = {name: one[:1] for name, one in grid.items()}
     for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:
-        compute(Task((), question, 1, grid_values(first) | ({PREFIX: name} if name else {})))
-        design = (question.fitted_to or question.drive).design_drive
-        compiled &= isinstance(question.recipe.make(name=name).set_up(design)[0], CompiledController)
+        compute(Task((), settings, 1, grid_values(first) | ({PREFIX: name} if name else {})))
+        design = (settings.fitted_to or settings.drive).design_drive
+        compiled &= isinstance(settings.recipe.make(name=name).set_up(design)[0], CompiledController)
     return compiled

@@ -21,7 +21,7 @@ from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
-from softstart.parallel import Pool, checked_workers, sharing
+from softstart.parallel import Pool, checked_workers, usable_workers
 from softstart.quantities import check_whole, show
 from softstart.start.batch import figure_columns
 from softstart.start.engine import check_limits
@@ -133,14 +133,14 @@ def sweep(
     if chunk is not None:
         check_whole(chunk, "chunk")
     checked_workers(workers, scheduler)
-    question = SweepSettings(drive, recipe, kept, until, fitted_to)
-    check_corners(question, axes)
+    settings = SweepSettings(drive, recipe, kept, until, fitted_to)
+    check_corners(settings, axes)
     shape = tuple(axis_lengths(axes).values())
     texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in axis_lengths(axes)]
     plan = ChunkGrid.of(shape, texts, chunk)
-    threads = first_start(question, axes)
-    count = sharing(recipe.given, "the controller", workers, scheduler, threads)
-    chunks = MemoryStore(plan, axes, question) if to is None else FolderStore(Path(to), plan, axes, question)
+    threads = first_start(settings, axes)
+    count = usable_workers(recipe.given, "the controller", workers, scheduler, threads)
+    chunks = MemoryStore(plan, axes, settings) if to is None else FolderStore(Path(to), plan, axes, settings)
     with chunks as store:
         begin, before = time.monotonic(), sum(map(plan.size, store.finished))
         done = before
@@ -152,7 +152,7 @@ def sweep(
         def task(index: tuple[int, ...]) -> Task:
             place = dict(zip(axis_lengths(axes), plan.place(index), strict=True))
             part = {name: one.isel({one.dims[0]: place[str(one.dims[0])]}) for name, one in axes.items()}
-            return Task(index, question, plan.size(index), grid_values(part))
+            return Task(index, settings, plan.size(index), grid_values(part))
 
         tell()
         left = plan.indices() if done < plan.starts else iter(())

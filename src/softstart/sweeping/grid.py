@@ -90,9 +90,8 @@ class Subject:
         if (parameter := self.machine.parameter_value(key)) is not None:
             return parameter.name
         of_controller = {name: f"{PREFIX}.{name}" for name in self.parameters}
-        words = {
-            word: word for word in (*self.machine.parameter_keys(), PREFIX, *of_controller.values())
-        } | of_controller
+        keys = (*self.machine.parameter_keys(), PREFIX, *of_controller.values())
+        words = dict(zip(keys, keys, strict=True)) | of_controller
         like = meant_by(key, PARAMETERS.values()) if "[" not in key else []
         meant = (
             [of_controller[key]]
@@ -113,9 +112,7 @@ class Subject:
         if isinstance(values, str | bytes) or not (
             isinstance(values, Sequence) or hasattr(values, "__array__")
         ):
-            raise InputError(
-                f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2]."
-            )
+            raise InputError(f"{key} = {show(values)}: give the values of an axis as a list, [0.5, 1, 2].")
         unit, meaning = "", PREFIX
         if name == PREFIX:
             read: Any = _texts(key, values)
@@ -158,9 +155,8 @@ class Subject:
                 for typed in texts:
                     read_value(parameter, typed)
                 return texts, "", parameter.meaning
-            multiples = (
-                {"x": current.value} if isinstance(current.value, float) and not parameter.many else {}
-            )
+            single = isinstance(current.value, float) and not parameter.many
+            multiples = {"x": float(current.value)} if single else {}
             alike(values)
             typed = [multiplied(value, key, multiples) for value in values]
             at_shaft = [
@@ -197,9 +193,7 @@ def read_grid(axes: object, recipe: Recipe, machine: Machine) -> Grid:
     from xarray import DataArray, Variable
 
     if not isinstance(axes, Mapping) or not axes:
-        raise InputError(
-            f'grid = {show(axes)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
-        )
+        raise InputError(f'grid = {show(axes)}: give a mapping of axes to values, as {{"gap": [0.5, 1, 2]}}.')
     if (PREFIX in axes) == bool(recipe.given):
         raise InputError("controller: name one, or make several an axis of the grid; one of the two.")
     if PREFIX in axes and recipe.values:

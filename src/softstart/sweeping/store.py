@@ -1,9 +1,9 @@
 """Where a sweep keeps its figures, and how it knows what is left to compute.
 
 The figures are arrays in memory or, with a folder, a Zarr group that any tool opens, whose chunks are those
-of the plan. `PartStore` list the inputs and each finished chunk with checksums of its values. A chunk that is
-not in the list, or of which one value is not as it was written, is left to compute. zarr writes a file beside
-its place and renames it, so that a process may be killed at any instant.
+of the plan. A `PartStore` lists the inputs and each finished chunk with checksums of its values. A chunk that
+is not in the list, or of which one value is not as it was written, is computed again. zarr writes a file
+beside its place and renames it, so that a process may be killed at any instant.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ LIST = f"{STATUS}/softstart.sqlite"  # beside the chunks of `status`, where Zarr
 MOST_IN_MEMORY = 10_000_000  # starts
 
 
-def empty_results(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> xarray.Dataset:
+def empty_results(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> xarray.Dataset:
     """The results before anything is computed; their figures take no memory, however large the grid."""
     import xarray
 
-    sizes, known, machine = axis_lengths(grid), figure_columns(question.drive.shaft_names), question.drive
+    sizes, known, machine = axis_lengths(grid), figure_columns(settings.drive.shaft_names), settings.drive
     data: dict[str, Any] = {
         name: (list(sizes), np.broadcast_to(np.nan, plan.shape), {"units": unit, "long_name": meaning})
-        for name, (_, unit, meaning) in ((name, known[name]) for name in question.figures)
+        for name, (_, unit, meaning) in ((name, known[name]) for name in settings.figures)
     }
     data[STATUS] = list(sizes), np.broadcast_to(np.int8(NOT_COMPUTED), plan.shape), {
         "long_name": "how the start ended",
@@ -58,7 +58,7 @@ def empty_results(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> xarra
         dim: (dim, np.arange(size, dtype=np.int64), {"units": "1", "long_name": "number of the sample"})
         for dim, size in sizes.items() if dim not in grid
     }  # fmt: skip
-    shown, fitted_to = question.recipe.label, question.fitted_to
+    shown, fitted_to = settings.recipe.label, settings.fitted_to
     attributes = {
         **({} if fitted_to is None else {"softstart_fitted_to": fitted_to.to_toml()}),
         "title": f"{machine.name}, {shown}" if shown else machine.name,
@@ -68,15 +68,15 @@ def empty_results(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> xarra
     return xarray.Dataset(data, {**numbers, **grid}, attributes)
 
 
-def inputs_of(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> dict[str, Any]:
+def inputs_of(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
     inputs: dict[str, Any] = {
-        "drive": question.drive.to_toml(),
-        "controller": question.recipe.about(),
+        "drive": settings.drive.to_toml(),
+        "controller": settings.recipe.about(),
         "order of the axes": list(axis_lengths(grid)),
-        "figures": list(question.figures),
-        "until": question.until,
-        "fitted_to": question.fitted_to and question.fitted_to.to_toml(),
+        "figures": list(settings.figures),
+        "until": settings.until,
+        "fitted_to": settings.fitted_to and settings.fitted_to.to_toml(),
         "softstart": __version__,
         "chunk": math.prod(plan.chunk),
     }
@@ -92,9 +92,9 @@ def inputs_of(plan: ChunkGrid, grid: Grid, question: SweepSettings) -> dict[str,
 class MemoryStore:
     """The figures of a sweep in memory. Use it in a `with`; `finished` holds the chunks that are finished."""
 
-    def __init__(self, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
+    def __init__(self, plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> None:
         self.plan, self.finished = plan, set[tuple[int, ...]]()
-        self._empty = empty_results(plan, grid, question)
+        self._empty = empty_results(plan, grid, settings)
         self._arrays: dict[str, Any] = {}
 
     def __enter__(self) -> Self:
@@ -126,10 +126,10 @@ class FolderStore(MemoryStore):
     `finished` holds the chunks that are finished and as they were written.
     """
 
-    def __init__(self, path: Path, plan: ChunkGrid, grid: Grid, question: SweepSettings) -> None:
-        super().__init__(plan, grid, question)
+    def __init__(self, path: Path, plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> None:
+        super().__init__(plan, grid, settings)
         self.path, self._target = path, Target("to", path, "sweep", LIST)
-        self._list = PartStore(self._target, inputs_of(plan, grid, question), ["part"])
+        self._list = PartStore(self._target, inputs_of(plan, grid, settings), ["part"])
         self._exit = ExitStack()
 
     def __enter__(self) -> Self:
@@ -201,7 +201,7 @@ class FolderStore(MemoryStore):
         with fresh_folder(folder.parent) as fresh:
             _describe(fresh, self._empty, self.plan)
             names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
-            damaged = [name for name in names if not _same(folder / name, fresh / name)]
+            damaged = [name for name in names if not _same_content(folder / name, fresh / name)]
             for name in damaged:
                 self._check_place(name)
             self._list.stay(True)
@@ -246,7 +246,7 @@ def _file(name: str, index: Sequence[int]) -> Path:
     return Path(name, "c", *map(str, index))
 
 
-def _same(file: Path, other: Path) -> bool:
+def _same_content(file: Path, other: Path) -> bool:
     return file.is_file() and filecmp.cmp(file, other, shallow=False)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SHARES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 READ_AT_ONCE = 1 << 20  # starts: of so many a figure takes 8 MiB of memory
-KEPT = 1 << 27  # values of a figure from which quantiles are taken: 1 GiB
+MOST_FOR_QUANTILES = 1 << 27  # values of a figure from which quantiles are taken: 1 GiB
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Summary:
     def share_kept(self) -> float | None:
         """Share of the starts that keep the limits; None where that was not computed."""
         kept = self.spreads.get("keeps_limits")
-        return (
-            None if kept is None else (kept["mean"] * kept["count"] if kept["count"] else 0.0) / self.starts
-        )
+        if (kept := self.spreads.get("keeps_limits")) is None:
+            return None
+        return (kept["mean"] * kept["count"] if kept["count"] else 0.0) / self.starts
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
@@ -70,7 +70,7 @@ def summarise(results: xarray.Dataset) -> Summary:
     names = ["NOT_COMPUTED", *(status.name for status in Status)]
     statuses = {name: int(count) for name, count in zip(names, codes, strict=True) if count}
     figures = [str(name) for name in results.data_vars if name != "status"]
-    thin = -(-starts // KEPT)
+    thin = -(-starts // MOST_FOR_QUANTILES)
     spreads = {name: spread((piece for _, piece in pieces(results, name)), thin) for name in figures}
     judged = "k_dyn" if "k_dyn" in figures else next(iter(figures), "")
     return Summary(starts, statuses, spreads, judged, _worst(results, judged) if judged else {})
@@ -79,9 +79,8 @@ def summarise(results: xarray.Dataset) -> Summary:
 def pieces(results: xarray.Dataset, name: str) -> Iterator[tuple[tuple[slice, ...], Any]]:
     """A figure in pieces that fit into memory: places on the grid, and the values there."""
     shape = results[name].shape
-    plan = ChunkGrid(
-        shape, results[name].encoding.get("chunks") or ChunkGrid.of(shape, [False] * len(shape)).chunk
-    )
+    chunk = results[name].encoding.get("chunks") or ChunkGrid.of(shape, [False] * len(shape)).chunk
+    plan = ChunkGrid(shape, chunk)
     plan = replace(plan, chunk=shape) if plan.starts <= READ_AT_ONCE else plan
     return ((place, results[name][place].values) for place in map(plan.place, plan.indices()))
 
@@ -117,10 +116,8 @@ def _worst(results: xarray.Dataset, name: str) -> dict[str, float | str]:
         if not np.isnan(piece).all() and (most := float(np.nanmax(piece))) > best:
             best = most
             index = np.unravel_index(int(np.nanargmax(piece)), piece.shape)
-            where = {
-                dim: part.start + int(i)
-                for dim, part, i in zip(results[name].dims, place, index, strict=True)
-            }
+            each = zip(results[name].dims, place, index, strict=True)
+            where = {dim: part.start + int(i) for dim, part, i in each}
     return {
         str(key): float(value) if value.dtype.kind in "fiu" else str(value.item())
         for key, value in (results[name].isel(where).coords.items() if where else ())

@@ -13,7 +13,7 @@ from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
-from softstart.parallel import Pool, checked_workers, sharing
+from softstart.parallel import Pool, checked_workers, usable_workers
 from softstart.quantities import check_whole
 from softstart.start.comparison import Uncertain, as_far_as_known
 from softstart.start.results import has_margin
@@ -200,7 +200,7 @@ def tune(
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
     with PartStore(target, question.inputs(), ["part"]) as kept:
         threads = next(iter(sides.values())).compiled
-        count = sharing(question, "the controller", workers, scheduler, threads)
+        count = usable_workers(question, "the controller", workers, scheduler, threads)
         with Pool(count, threads=threads, scheduler=scheduler, describe=_described) as pool:
             for name, trials in sides.items():
                 before = found.get("schedule")

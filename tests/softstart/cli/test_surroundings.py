@@ -73,6 +73,15 @@ def test_settings_of_the_user_do_not_change_the_figures(place):
         assert not any(text.get_usetex() for text in figure.findobj(type(figure.axes[0].title)))
 
 
+def test_netcdf_without_its_library_is_refused_before_the_sweep(place, capsys, monkeypatch):
+    """The library is an extra of the package."""
+    from softstart.cli import main
+
+    monkeypatch.setattr("softstart.cli.sweep.find_spec", lambda name: None)
+    assert main(["sweep", "--controller", "ramp", "--axis", "shaft.gap=0.5,2", "--netcdf", "grid.nc"]) == 2
+    assert "--netcdf: h5netcdf is missing" in capsys.readouterr().err
+
+
 def test_ipopt_reads_no_options_of_the_folder(place):
     """Among these is the name of a file that it writes."""
     import casadi

@@ -151,7 +151,7 @@ def test_what_cannot_be_followed_is_refused(new: Identification, tmp_path: Path)
         ([new, new], ["2025"], None, "there are 1 for 2 identifications"),
         ([new, new], 2 * ["2025-07-01"], None, "growth takes two dates"),
         ([new, new], ["2025-07-01", "31.5.2026"], None, "is no date; write one as 2026-05-31"),
-        ([new, unknown], DATES, None, "log 2 does not know the gap; no reversal"),
+        ([new, unknown], DATES, None, "gap unknown in log 2: no reversal"),
         ([new, free], DATES, None, "it was not free"),
         ([new, new], DATES, "-1 rad", "is above 0"),
         ([new, new], DATES, "1 mm", "limit = "),

@@ -38,7 +38,7 @@ ONE_SENTENCE = {
     "no such parameter": (
         {"controller.tim": [1]}, "ramp", "ramp has no such parameter; did you mean controller.time?"
     ),
-    "one value": ({"gap": 0.5}, "direct", "gap = 0.5: give the values of this axis in a list"),
+    "one value": ({"gap": 0.5}, "direct", "gap = 0.5: give the values of an axis as a list"),
     "negative": ({"gap": [0.5, -1]}, "direct", "gap[1] = -1.0: the total angular gap must be 0 or more"),
     "twice": ({"gap": [0.5, 1, 0.5]}, "direct", "gap = 0.5: this value is given twice"),
     "same axis": ({"gap": [1], "shaft.gap": [2]}, "direct", "shaft.gap: gap is an axis already"),
