@@ -307,7 +307,7 @@ def test_a_speed_of_encoder_differences_is_summed_to_the_angle(log: Log) -> None
     read = speed.integrated(float(TRUTH.encoder_lines))
     assert (speed.kind, read.kind) == ("speed", "angle")
     assert np.diff(read.values) == pytest.approx(np.diff(log.values), abs=1e-9)
-    assert "summed to the angle" in " ".join(read.notes)
+    assert "integrated to the angle" in " ".join(read.notes)
 
 
 @pytest.mark.parametrize(
@@ -354,9 +354,9 @@ def test_what_cannot_be_found_is_refused(log: Log) -> None:
     for each, free, sentence in (
         (demand, ["gpa"], "did you mean gap"),
         (demand, ["position"], "nothing to identify"),
-        (demand, [FILTER, "gap"], "an angle has no filter"),
+        (demand, [FILTER, "gap"], "an angle has no speed filter"),
         (measured, ["gap", "torque_lag"], "log the demand"),
-        (slow, None, "look at the units"),
+        (slow, None, "check the units"),
     ):
         with pytest.raises(InputError, match=sentence):
             identify(each, TRUTH, free=free)

@@ -153,7 +153,7 @@ def test_an_inertia_is_believed_within_a_factor_of_25(share: float, refused: boo
     log = Log(time, np.full(100, 40.0), speed=40.0 / (share * whole) * time)
     if not refused:
         return _check_inertia(log, TRUTH)
-    with pytest.raises(InputError, match="look at the units of its columns"):
+    with pytest.raises(InputError, match="check the units of the columns"):
         _check_inertia(log, TRUTH)
     return None
 

@@ -269,7 +269,7 @@ def _steps(
     while state.t < last:
         if len(steps) >= MOST_STEPS:
             raise SimulationError(
-                f"The engagement was aborted at {state.t:.6g} s after {MOST_STEPS} steps; give an earlier until, "
+                f"The engagement was aborted at {state.t:.6g} s after {MOST_STEPS} steps; set until, "
                 "or reduce the stiffness."
             )
         stop = min(last, earliest_end) if state.t < earliest_end else last

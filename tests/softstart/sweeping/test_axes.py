@@ -32,7 +32,7 @@ def test_names_and_units():
 
 
 ONE_SENTENCE = {
-    "not a grid": ([1, 2], "direct", "mapping of names to values"),
+    "not a grid": ([1, 2], "direct", "mapping of axes to values"),
     "unknown": ({"gapp": [1]}, "direct", "gapp: there is no such axis; did you mean gap?"),
     "a bare parameter": ({"full_torque": [1]}, "ramp", "did you mean controller.full_torque?"),
     "no such parameter": (
