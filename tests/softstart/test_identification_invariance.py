@@ -158,7 +158,7 @@ def test_a_load_that_drives_keeps_its_direction_and_that_is_said() -> None:
     back = rebuilt(torque=-LOG.torque, angle=-LOG.values)
     lift = TRUTH.replace(load_kind="active", start_position="hanging")
     assert np.array_equal(_directed(back, lift).torque, back.torque)
-    assert "--columns torque=-NAME,angle=-NAME" in _directed(back, lift).notes[-1]
+    assert "set columns to torque=-NAME,angle=-NAME" in _directed(back, lift).notes[-1]
     for alike in (TRUTH, lift.replace(load_torque=0.0, load_friction=7.16, start_position="mid-gap")):
         assert np.array_equal(_directed(back, alike).torque, LOG.torque)
 

@@ -57,7 +57,7 @@ REFUSED = [
     (RAMP + "--tolerance stiffness", "as stiffness=10%"),
     (RAMP + "--controller ramp,shaped", "give one controller", "once for each"),
     # sweep
-    ("sweep --axis gap=0.5,1", "--controller = None: name a"),
+    ("sweep --axis gap=0.5,1", "--controller = None: name one"),
     (GRID + "--axis gap", '--axis "gap": write a key'),
     (GRID + "--axis load.inertia=1:2:many", "--axis load.inertia", "from 2 to 1,000,000"),
     (GRID + "--axis load.kind=active:reactive:2", "commas between"),
