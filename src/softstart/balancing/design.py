@@ -44,7 +44,7 @@ def free_force(engine: Engine) -> complex:
     >>> round(free_force(Engine.load("vaz-11113")).real, 5)
     0.02414
     """
-    force = complex(engine.crank_shaking[0][-1])
+    force = complex(engine.crank_shaking[0][-1])  # index -1: turns once a turn against the crank
     scale = engine.cylinders.count * engine.masses.reciprocating * engine.cylinders.crank.r
     return force if abs(force) > NOTHING * scale else 0j
 
@@ -89,6 +89,7 @@ def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerS
     """
     force = -free_force(engine)
     phase = math.atan2(force.imag, force.real) % TURN
+    # ratio -1: both against the crank, so that they balance what the counterweights cannot
     half = BalancerShaft(0.5 * abs(force), -1, phase, place.real, place.imag)
     return half, half
 
@@ -203,6 +204,7 @@ class Balance(Result, view="balances.balance_sheet"):
         pressed = engine.gas is not None
         gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
         force, couple = (largest_of_orders(forces) * w**2 for forces in engine.crank_shaking)
+        # without a spacing of the cylinders forces are known, couples are not
         couple = couple if engine.cylinders.couples_known else math.nan * couple
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
@@ -325,7 +327,7 @@ def balance(
             continue
         speeds_of_arm = all_speeds if variable else np.full(all_speeds.size, tuning)
         places = np.array([arm(engine, float(w), load_used, gas=gas) for w in speeds_of_arm])
-        places = places if sideways else places.real + 0j
+        places = places if sideways else places.real + 0j  # [B] uses h alone
         shafts = two_shafts(engine, complex(places[np.argmin(np.abs(all_speeds - tuning))]))
         layouts.append((name, about, shafts, places))
     against, along = couple_shaft(engine, -1), couple_shaft(engine, 1)

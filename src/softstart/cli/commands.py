@@ -83,6 +83,7 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
+        # resilient_parsing: completion reads lines that are not finished
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
             raise click.UsageError(f'no command "{name}"; {did_you_mean(name, known, "softstart ")}', ctx)
         return super().resolve_command(ctx, args)
@@ -106,6 +107,7 @@ def cli(context: click.Context) -> None:
 @cache
 def first_sentences(module: str) -> dict[str, str]:
     """The first paragraph of the docstring of each command of a module, which is not imported for it."""
+    # importing all commands for their first sentences would take longer than most answers
     tree = ast.parse(get_data(__package__, f"{module}.py") or b"")
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     return {node.name: (ast.get_docstring(node) or "").split("\n\n")[0] for node in functions}

@@ -69,7 +69,7 @@ def _main(arguments: list[str]) -> int:
                 else:
                     usual(message, category, *where, **also)
 
-            warnings.simplefilter("always", DamagedWarning)
+            warnings.simplefilter("always", DamagedWarning)  # else once for each line of code
             warnings.showwarning = show
             code = _run(arguments)
             sys.stdout.flush()
@@ -132,7 +132,7 @@ def _fail(sentences: Sequence[str], code: int) -> int:
     lines = [printable(sentence.strip()) for sentence in sentences]
     if len(lines) > 1:
         lines = [f"{len(lines)} errors:", *(f"  {n}. {line}" for n, line in enumerate(lines, 1))]
-    with suppress(OSError):  # standard error is closed; the exit code remains
+    with suppress(OSError):  # standard error is closed: the exit code remains
         print("softstart: " + "\n".join(lines), file=sys.stderr, flush=True)
     return code
 
@@ -145,7 +145,7 @@ def _stop_on_signals() -> threading.Thread:
     where another thread waits for it. Whoever sets a handler of his own, as a server, is left alone.
     """
     reader, writer = socket.socketpair()
-    writer.setblocking(False)
+    writer.setblocking(False)  # required of a wakeup descriptor
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
 
     def handler(number: int, frame: object) -> None:

@@ -170,6 +170,7 @@ def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | Unknown
     if is_chain(name):
         return Chain.load(name, also=read_changes(settings))
     known = (*drive_names(), *CHAINS.names())
+    # a single word that is no file was meant as the name of a shipped machine
     if re.fullmatch(r"[\w-]+", name) and name not in known and refusal_of(name) == ABSENT:
         hint = did_you_mean(name, known)
         raise InputError(f'"{name}": no such file, and no shipped drive or chain has this name; {hint}')
@@ -204,7 +205,7 @@ def named_as_options(**also: str) -> Iterator[None]:
     """
     options = click.get_current_context().command.params
     flags = {str(one.name): one.opts[0] for one in options if isinstance(one, click.Option)}
-    names = flags | also
+    names = flags | also  # `also` wins: an option may stand for an argument of another function
 
     def renamed(sentence: str) -> str:
         keyword = re.match(r"(\w+)(?= =|:|,| \")", sentence)
@@ -235,7 +236,7 @@ def read_value_list(
     >>> read_value_list("0.5 rad:2 rad:3", "--gaps", lambda text: (to_si(text, "rad"), ""))
     [(0.5, ''), (1.25, ''), (2.0, '')]
     """
-    if ":" not in text:
+    if ":" not in text:  # no range
         return [read(part) for part in values_in(text, option)]
     parts = [part.strip() for part in text.split(":")]
     if len(parts) < 3 or parts[3:] not in ([], ["log"]):
@@ -329,6 +330,7 @@ class DocumentedCommand(click.Command):
 
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
+        # what stands behind the heading belongs to the options, not to the text of the command
         self.help, _, options = inspect.cleandoc(self.help or "").partition("\n\nOptions\n-------\n")
         meanings = SHARED | described(options)
         for parameter in self.params:
@@ -404,6 +406,7 @@ def keys_of(tables: Iterable[DocumentTable]) -> list[str]:
 
 def set_option(tables: Iterable[DocumentTable]) -> Decorator:
     """--set, for a file with these tables; it is read first, as the machine is loaded with its changes."""
+    # is_eager: click calls the callback of the machine argument after this one
     return click.option(
         "--set", "settings", multiple=True, is_eager=True, expose_value=False,
         callback=lambda context, _, texts: context.meta.update({SETTINGS: texts}),

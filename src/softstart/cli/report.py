@@ -137,6 +137,7 @@ def _printed(page: str, browser: str) -> bytes:
         source, target = Path(folder, "report.html"), Path(folder, "report.pdf")
         source.write_text(page, encoding="utf-8")
         words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+        # a profile of its own: a browser that runs already would take over and print nothing
         words += [f"--user-data-dir={folder}/profile", f"--print-to-pdf={target}"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             words.append("--no-sandbox")  # which root cannot have

@@ -46,7 +46,7 @@ def working(doing: str) -> Iterator[Progress]:
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False, markup=False)
-    began = said = time.monotonic()
+    began = said = time.monotonic()  # said: when the last line was printed
 
     def seldom(now: str) -> None:
         nonlocal said
@@ -94,7 +94,7 @@ def attributed(loading: str = "") -> Iterator[None]:
         raise
     except BaseException as error:
         modules, place = {point.module for point in registered(CONTROLLERS).values()}, ""
-        for frame, line in traceback.walk_tb(error.__traceback__):  # the innermost one is the last
+        for frame, line in traceback.walk_tb(error.__traceback__):  # the innermost frame is the last
             module = str(frame.f_globals.get("__name__", ""))
             if module in modules or module.startswith(LOADED_FROM_FILE):
                 place = f" in {frame.f_code.co_filename}, line {line}"
@@ -120,7 +120,7 @@ def answers(out: bool = False) -> Decorator:
             from softstart.views import sheet
 
             with named_as_options(), output_folder(out) as folder:
-                if out is not None:
+                if out is not None:  # before anything is computed
                     _check_report(out)
                 answer = command(**arguments)
                 if isinstance(answer, Result):
@@ -137,7 +137,7 @@ def answers(out: bool = False) -> Decorator:
                 sheet.print_sheet(shown)
                 if out is not None:
                     print(f"\nWritten to {out}: report.md, figures and tables.")
-            for failure in failures:
+            for failure in failures:  # after its data: tune shows what it has, and exits with 3
                 raise failure
 
         return json_option(option("--out", shell_complete=folders)(run) if out else run)
@@ -188,6 +188,7 @@ def controllers_from_options(
                 controllers.append(controller.make_controller(name, values, allow_code=code_allowed()))
         except InputError as error:
             before = f"--param {name}." if several else "--param "
+            # a controller of the user may say anything: one line each, of bounded length
             lines = [" ".join(sentence.split())[:1500] for sentence in error.sentences]
             raise InputError(before + s if s.startswith(tuple(values)) else s for s in lines) from None
     return controllers

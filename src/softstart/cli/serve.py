@@ -53,7 +53,7 @@ def serve_command(*, drive: Loaded, no_browser: bool, **arguments: Any) -> None:
     check_installed()
     from softstart.page.session import Session
 
-    Session(drive, [])  # refused before anything listens
+    Session(drive, [])  # a machine that cannot be shown is refused before anything listens
     with listening(address) as listener:
         with working("getting the engine ready ..."):
             _warm_up(drive)
@@ -72,7 +72,7 @@ def _warm_up(machine: Loaded) -> None:
     from softstart.page import machines
     from softstart.page.session import Session
 
-    for session in (Session(), Session(machine)):
+    for session in (Session(), Session(machine)):  # the shipped drive too: a click away
         _ = session.strategies
         if (axes := machines.axes_about(session.inputs.machine, 3, 3)) is not None:
             controller = session.inputs.controllers[session.inputs.selected]

@@ -112,7 +112,7 @@ def sweep_command(
         show("summing up")
         summary = summarise(results)
         if netcdf is not None:
-            part = netcdf.with_name(f"{netcdf.name}.part")  # nothing half-written under its name
+            part = netcdf.with_name(f"{netcdf.name}.part")  # no incomplete file under the final name
             try:
                 results.to_netcdf(part, engine="h5netcdf", encoding=dict.fromkeys(results.data_vars, PACKED))
                 part.replace(netcdf)
@@ -131,6 +131,7 @@ def sweep_command(
     }
     if last and not option_value("as_json"):
         pace = views.pace(last)
+        # after the answer, which `answers` prints
         click.get_current_context().call_on_close(lambda: print(pace))
     return lambda: data, views.sweep_sheet(results, summary, drive, fitted_to)
 

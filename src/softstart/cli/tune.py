@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from softstart.identification.result import Identification
 
 STATE = "tuning.sqlite"
-LARGEST_GRID = 100  # values of one axis
+LARGEST_GRID = 100  # values of one axis; each cell is a search of its own
 
 
 def read_axis(text: str, option: str, unit: str) -> list[Any]:
@@ -160,6 +160,7 @@ def tune_command(
         attributed(),
         _as_typed(),
     ):
+        # a wrong parameter is reported before the search begins
         controllers_from_options([controller], params, several=False)
         tuning = softstart.tune(drive, controller, save_to=state, progress=progress, **arguments)
     from softstart.views.tuning import any_in_time

@@ -284,6 +284,7 @@ def _steps(
                 raise SimulationError(
                     f"The engagement was aborted: {MOST_SIMULTANEOUS} events at the instant {state.t:.6g} s."
                 )
+            # a damped flank separates while compressed; its energy leaves the balance here
             lost += mode.elastic_energy(clutch, state.theta)
             state, mode, event = next_mode(clutch, name, state, mode, float(step.M.sum()))
             lost -= mode.elastic_energy(clutch, state.theta)
@@ -296,6 +297,7 @@ def _steps(
         if abs(v) > AT_REST * clutch.drive_speed and v * direction <= 0.0:
             reversals, direction = reversals + (direction != 0.0), math.copysign(1.0, v)
         complete = clutch.gap == 0.0 or reversals >= REVERSALS
+        # both peaks of the locked oscillation lie in the run
         if until is None and mode.locked and state.t >= earliest_end and complete:
             break
     return steps, mode, lost
@@ -365,8 +367,9 @@ def _peak(steps: Iterable[Step]) -> tuple[float, float]:
     """Largest |T| of the steps and its instant; of equal peaks the first."""
     top, when = 0.0, 0.0
     for step in steps:
-        if np.abs(step.T).sum() <= top:
+        if np.abs(step.T).sum() <= top:  # a bound of |T| in the step
             continue
+        # extrema: the ends, and the roots of T'
         u = np.concatenate([[0.0], roots(step.T[1:] * np.arange(1, step.T.size)), [1.0]])
         sizes = np.abs(values(step.T, u))
         if sizes.max() > top * SAME:

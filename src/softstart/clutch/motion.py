@@ -128,6 +128,7 @@ def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, la
     IM, Ic, c, d = clutch.clutch_inertia, clutch.load_inertia, clutch.stiffness, clutch.damping
     piece, end = law.piece_at(state.t)
     end = min(end, last)
+    # what is held by the drive or by friction has no acceleration
     per_M, per_c = 0.0 if mode.locked else 1.0 / IM, 0.0 if mode.load == 0 else 1.0 / Ic
     rate = abs(1.0 / piece.T) if piece.e else 0.0
     if mode.side:
@@ -136,20 +137,20 @@ def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, la
     if h * rate > REACH:
         h /= math.ceil(h * rate / REACH)
         end = state.t + h
-    R = clutch.load_torque * (1 if mode.load is None else mode.load)
+    R = clutch.load_torque * (1 if mode.load is None else mode.load)  # opposes the motion if reactive
     M = np.array(piece.series(state.t, ORDER)) * h**POWERS
     friction, constant = (mode.slip * M).tolist(), [R] + [0.0] * ORDER
     T, z, wM, wc = ([0.0] * (ORDER + 1) for _ in range(4))
     z[0], wM[0], wc[0] = mode.overlap(clutch, state.theta), state.wM, state.wc
-    for n in range(ORDER + 1):
+    for n in range(ORDER + 1):  # [C] (1), term by term: the n-th coefficients give the next ones
         v = wM[n] - wc[n]
         if mode.presses:
             T[n] = c * z[n] + d * v
         if n < ORDER:
-            z[n + 1] = h * v / (n + 1)
-            wM[n + 1] = h * per_M * (friction[n] - T[n]) / (n + 1)
-            wc[n + 1] = h * per_c * (T[n] - constant[n]) / (n + 1)
-    z[0] = state.theta
+            z[n + 1] = h * v / (n + 1)  # theta' = wM - wc
+            wM[n + 1] = h * per_M * (friction[n] - T[n]) / (n + 1)  # IM wM' = sigma MM(t) - T
+            wc[n + 1] = h * per_c * (T[n] - constant[n]) / (n + 1)  # Ic wc' = T - R
+    z[0] = state.theta  # from the overlap of the flank back to the twist
     shaft = np.array(T)
     return Step(
         state.t, end, mode, M, shaft if mode.locked else mode.slip * M, shaft,
@@ -237,7 +238,7 @@ def roots(a: Vector) -> Vector:
     [0.2, 0.4]
     """
     sizes = np.abs(a)
-    if 2.0 * sizes[0] > sizes.sum() or not sizes.any():
+    if 2.0 * sizes[0] > sizes.sum() or not sizes.any():  # a_0 outweighs all other terms: no root
         return np.empty(0)
     a = a[: np.flatnonzero(sizes > 1e-18 * sizes.max())[-1] + 1]
     candidates = polyroots(a)

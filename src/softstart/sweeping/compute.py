@@ -94,6 +94,7 @@ def first_start(settings: SweepSettings, grid: Grid) -> bool:
     Returns whether all controllers are compiled, so that threads serve as well as processes.
     """
     compiled = True
+    # one value of each axis; the figures are thrown away
     first = {name: one[:1] for name, one in grid.items()}
     for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:
         compute(Task((), settings, 1, grid_values(first) | ({PREFIX: name} if name else {})))

@@ -138,7 +138,7 @@ def sweep(
     shape = tuple(axis_lengths(axes).values())
     texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in axis_lengths(axes)]
     plan = ChunkGrid.of(shape, texts, chunk)
-    threads = first_start(settings, axes)
+    threads = first_start(settings, axes)  # compiled steps release the GIL
     count = usable_workers(recipe.given, "the controller", workers, scheduler, threads)
     chunks = MemoryStore(plan, axes, settings) if to is None else FolderStore(Path(to), plan, axes, settings)
     with chunks as store:

@@ -204,7 +204,7 @@ def read_grid(axes: object, recipe: Recipe, machine: Machine) -> Grid:
     names = axes.get(PREFIX, ())
     listed = () if isinstance(names, str) or not isinstance(names, Sequence) else names
     subject = Subject(machine, recipe, tuple(name for name in listed if isinstance(name, str)))
-    _ = subject.parameters  # wrong controllers are told first
+    _ = subject.parameters  # wrong controllers are reported first
     wrong, grid = Mistakes(), Grid()
     for key, values in axes.items():
         paired, read = isinstance(values, Mapping), list[DataArray]()
@@ -270,7 +270,7 @@ class ChunkGrid:
         """
         room = min(max(math.prod(shape) // PARTS, LEAST), MOST) if most is None else most
         chunk = list[int]()
-        for size, alone in zip(reversed(shape), reversed(single), strict=True):
+        for size, alone in zip(reversed(shape), reversed(single), strict=True):  # the last index fastest
             step = 1 if alone else max(1, min(size, room))
             room //= step
             chunk.insert(0, step)

@@ -140,6 +140,7 @@ class FolderStore(MemoryStore):
             stack.enter_context(self._list)
             stack.callback(self._clear)
             stack.callback(self._sweep_up)
+            # a process that is ended at once runs no callbacks of the stack
             stack.enter_context(at_stop(self._sweep_up))
             with self._target.errors():
                 self._open(self.path)
@@ -201,6 +202,7 @@ class FolderStore(MemoryStore):
         with fresh_folder(folder.parent) as fresh:
             _describe(fresh, self._empty, self.plan)
             names = sorted(one.relative_to(fresh) for one in fresh.rglob("*") if one.is_file())
+            # metadata and coordinates follow from the inputs: whatever differs was damaged
             damaged = [name for name in names if not _same_content(folder / name, fresh / name)]
             for name in damaged:
                 self._check_place(name)
@@ -225,7 +227,7 @@ class FolderStore(MemoryStore):
 
     def _changed(self, index: tuple[int, ...], checksums: dict[str, int]) -> Path | None:
         """A file of a finished chunk that does not hold what was written."""
-        for name, checksum in checksums.items():
+        for name, checksum in checksums.items():  # of the values: codecs may compress them differently
             file = _file(name, index)
             try:
                 values = self._arrays[name][self.plan.place(index)] if (self.path / file).is_file() else b""

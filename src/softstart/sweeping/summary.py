@@ -66,7 +66,7 @@ def summarise(results: xarray.Dataset) -> Summary:
     starts = results["status"].size
     codes = np.zeros(len(Status) + 1, dtype=np.int64)
     for _, piece in pieces(results, "status"):
-        codes += np.bincount(1 + piece.ravel(), minlength=codes.size)
+        codes += np.bincount(1 + piece.ravel(), minlength=codes.size)  # NOT_COMPUTED is -1
     names = ["NOT_COMPUTED", *(status.name for status in Status)]
     statuses = {name: int(count) for name, count in zip(names, codes, strict=True) if count}
     figures = [str(name) for name in results.data_vars if name != "status"]
