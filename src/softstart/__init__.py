@@ -1,4 +1,4 @@
-"""softstart: how a drive with a gap in its transmission is started gently and fast.
+"""softstart: torque strategies for the soft start of drives with backlash.
 
 The public names are listed in `__init__.pyi`, where type checkers look for them. Each is imported when first
 used, so that `import softstart` is quick.
@@ -38,4 +38,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

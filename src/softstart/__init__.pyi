@@ -3,6 +3,9 @@
 from softstart.balancing import Engine as Engine
 from softstart.balancing import balance as balance
 from softstart.chain import Chain as Chain
+from softstart.chain import Mass as Mass
+from softstart.chain import Motor as Motor
+from softstart.chain import Shaft as Shaft
 from softstart.chain import natural_vibration as natural_vibration
 from softstart.chain import reduce_chain as reduce_chain
 from softstart.chain import two_mass_error as two_mass_error
@@ -19,6 +22,9 @@ from softstart.controller import Effort as Effort
 from softstart.controller import Measured as Measured
 from softstart.controller import PlainController as PlainController
 from softstart.controller import Sensor as Sensor
+from softstart.controller import compiled_step as compiled_step
+from softstart.controller import make_controller as make_controller
+from softstart.controller import parameter as parameter
 from softstart.drive import Drive as Drive
 from softstart.drive import Machine as Machine
 from softstart.drive.data_sheet import DataSheet as DataSheet

@@ -18,8 +18,8 @@ from tests.twin import chain_of
 
 from softstart import Drive, InputError, Run, SimulationError, Status, formulas, records, simulate
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
-from softstart.controller.base import Measured
 from softstart.controller.compiled import Vector
+from softstart.kernel.records import Measured
 from softstart.start import engine
 from softstart.views.starts import clipped_torque
 

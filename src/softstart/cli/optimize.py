@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -210,14 +209,10 @@ def pareto_command(
         working("starting the drive ...") as progress,
         attributed(),
     ):
-        from softstart.optimal.optimize import start_time_of_direct
-
-        chosen, curve = controllers_from_options(controllers, {}), tuple(arguments.get("torque_speed", ()))
-        direct = cache(lambda: start_time_of_direct(drive, curve))
-        times = None if start_times is None else [time.seconds(direct) for time in start_times]
         front = softstart.pareto(
-            drive, times, controllers=chosen, save_to=state, progress=progress, **arguments
-        )
+            drive, start_times, controllers=controllers_from_options(controllers, {}), save_to=state,
+            progress=progress, **arguments,
+        )  # fmt: skip
     if not any(point.found for point in front.points):
         if option_value("as_json"):
             print_json(front.summary())

@@ -6,7 +6,6 @@ from softstart.controller.base import (
     CompiledController,
     Controller,
     Effort,
-    Measured,
     PlainController,
     Sensor,
     stack,
@@ -18,6 +17,7 @@ from softstart.controller.finding import (
     ready_controller_names,
 )
 from softstart.controller.parameters import declared_parameters, parameter
+from softstart.kernel.records import Measured
 from softstart.plugins import controller_names
 
 __all__ = [

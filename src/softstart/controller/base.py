@@ -23,6 +23,7 @@ from softstart.drive import Drive
 from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+from softstart.kernel.records import Measured
 from softstart.quantities import show
 
 
@@ -89,38 +90,6 @@ class Effort(Enum):
             Effort.ENCODER: "code of your own in the inverter, and an encoder",
             Effort.SENSOR: "a sensor that drives do not have",
         }[self]
-
-
-class Measured(NamedTuple):
-    """What is measured at the instant of asking. What the controller has not declared is NaN.
-
-    Parameters
-    ----------
-    time : s since the start.
-    motor_angle : rad, rounded to the counts of the encoder.
-    motor_speed : rad/s, difference of the encoder angles since the last asking.
-    motor_torque : N m, the realised torque, after limits, slew limiter and lag.
-    stage : 1, 2, ... as in [G]: odd with the gap open, even with the gap closed. Needs `Sensor.STAGE`.
-    shaft_torque : N m. Needs `Sensor.SHAFT_TORQUE`.
-    load_speed : rad/s. Needs `Sensor.LOAD_SPEED`.
-
-    Examples
-    --------
-    >>> Measured(0.1, 0.25, 12.0, 62.0, math.nan, math.nan, math.nan).motor_speed
-    12.0
-
-    References
-    ----------
-    The stages: [G].
-    """
-
-    time: float
-    motor_angle: float
-    motor_speed: float
-    motor_torque: float
-    stage: float
-    shaft_torque: float
-    load_speed: float
 
 
 NEVER = -math.inf  # as `ask_again`: not at gap events either, the torque stays as it is
@@ -310,7 +279,7 @@ class PlainController(Controller, ABC):
     initial_state: ClassVar[tuple[float, ...]] = ()
 
     @abstractmethod
-    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Command | float:
         """One control instant.
 
         Parameters
@@ -320,7 +289,7 @@ class PlainController(Controller, ABC):
 
         Returns
         -------
-        The answer.
+        The reply; of a controller with a `period` the torque alone is enough, if its state stays as it is.
         """
 
 

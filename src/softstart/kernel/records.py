@@ -282,15 +282,36 @@ class EventRow:
 
 
 class Measured(NamedTuple):
-    """What is measured at the instant of asking. What the controller has not declared is NaN."""
+    """What is measured at the instant of asking. What the controller has not declared is NaN.
 
-    time: float  # s since the start
-    motor_angle: float  # rad, rounded to the encoder's counts
-    motor_speed: float  # rad/s, difference of encoder angles since the last asking
-    motor_torque: float  # N m, the realised torque, after limits, slew and lag
-    stage: float  # 1, 2, ... as in [G]: odd gap open, even gap closed
-    shaft_torque: float  # N m
-    load_speed: float  # rad/s
+    Parameters
+    ----------
+    time : s since the start.
+    motor_angle : rad, rounded to the counts of the encoder.
+    motor_speed : rad/s, difference of the encoder angles since the last asking.
+    motor_torque : N m, the realised torque, after limits, slew limiter and lag.
+    stage : 1, 2, ... as in [G]: odd with the gap open, even with the gap closed. Needs `Sensor.STAGE`.
+    shaft_torque : N m. Needs `Sensor.SHAFT_TORQUE`.
+    load_speed : rad/s. Needs `Sensor.LOAD_SPEED`.
+
+    Examples
+    --------
+    >>> import math
+    >>> Measured(0.1, 0.25, 12.0, 62.0, math.nan, math.nan, math.nan).motor_speed
+    12.0
+
+    References
+    ----------
+    The stages: [G].
+    """
+
+    time: float
+    motor_angle: float
+    motor_speed: float
+    motor_torque: float
+    stage: float
+    shaft_torque: float
+    load_speed: float
 
 
 class Reply:

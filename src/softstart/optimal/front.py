@@ -6,7 +6,7 @@ import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from numbers import Real
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -16,12 +16,13 @@ from softstart import __version__
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.drive.machine import Machine
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.input.files import write_whole
 from softstart.optimal.descent import BEND
-from softstart.optimal.optimize import shortest_start_time, solve
-from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.optimize import shortest_start_time, solve, start_time_of_direct
+from softstart.optimal.problem import Problem, StartTime, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
+from softstart.optimal.torque_speed import Corners
 from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.results import OneLine, Result
@@ -231,7 +232,7 @@ class Front(Result, view="optima.front_sheet"):
 
 def pareto(
     drive: MachineLike,
-    start_times: Sequence[float] | None = None,
+    start_times: Sequence[float | str] | None = None,
     *,
     terminal: Terminal = "reached",
     controllers: Sequence[str | Controller] | None = None,
@@ -254,8 +255,9 @@ def pareto(
     ----------
     drive : Drive, Chain, str or path
         The machine, or its name or file.
-    start_times : sequence of float, optional
-        Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
+    start_times : sequence of float or str, optional
+        Bounds on the start time: in s, with a unit ("300 ms"), or as multiples of the start time of `direct`
+        ("1.2x"); by default `default_start_times(drive, terminal)`.
     terminal, torque_speed, smoothness, base : optional
         As in `optimize`.
     controllers : sequence of str or Controller, optional
@@ -296,7 +298,7 @@ def pareto(
     options["base"] = base = Problem(drive, 1.0, terminal, **options).base
     drive = as_machine(drive)
     tell = progress or (lambda doing: None)
-    times = None if start_times is None else _checked(start_times)
+    times = None if start_times is None else _seconds(start_times, drive, torque_speed)
     names = ready_controller_names() if controllers is None else controllers
     made = [make_controller(one) for one in names]
     inputs = {
@@ -480,13 +482,15 @@ def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]
             yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
 
 
-def _checked(start_times: Sequence[float]) -> list[float]:
-    """Start times above 0, sorted, each once."""
-    given = list(start_times)
-    good = [isinstance(t, Real) and not isinstance(t, bool) and 0.0 < float(t) < math.inf for t in given]
-    if not given:
+def _seconds(start_times: Sequence[float | str], drive: Machine, torque_speed: Corners) -> list[float]:
+    """Start times in s, sorted, each once; multiples are of that of `direct`."""
+    times: list[Any] = [start_times] if isinstance(start_times, str) else list(start_times)
+    if not times:
         raise InputError("start_times: the list is empty; give at least one start time in s.")
-    if not all(good):
-        wrong = (t for t, right in zip(given, good, strict=True) if not right)
-        raise InputError([f"start_times = {t!r}: give times above 0 s as numbers." for t in wrong])
-    return sorted({float(t) for t in given})
+    wrong, direct = Mistakes(), cache(lambda: start_time_of_direct(drive, torque_speed))
+    bounds = []
+    for time in times:
+        with wrong.collect():
+            bounds.append(StartTime.of(time, "start_times"))
+    wrong.raise_if_any()
+    return sorted({bound.seconds(direct) for bound in bounds})

@@ -41,6 +41,8 @@ class StartTime:
         >>> StartTime.of("250 ms"), StartTime.of("1.2x")
         (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
         """
+        if isinstance(given, StartTime):
+            return given
         either = 'or a multiple of the start time of direct, as "1.2x".'
         try:
             number, ending = read_multiple(given, name) or (given, "")

@@ -24,9 +24,9 @@ from softstart.hints import nearest
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import Units
-from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, SOFT_END, as_far_as_known, changed_case
+from softstart.start.comparison import REFERENCE, SOFT_END, as_far_as_known, changed_case
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
-from softstart.start.simulation import simulate
+from softstart.start.simulation import DEFAULT_DRIVE, simulate
 from softstart.views.numbers import units_of
 from softstart.views.starts import outcome
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy as np
 
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller
-from softstart.controller.finding import make_controller, ready_controller_names
+from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.data_sheet_mechanics import BAND
@@ -21,13 +22,14 @@ from softstart.drive.machine import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes, SimulationError
+from softstart.profile import TorqueProfile
 from softstart.results import Result
 from softstart.start import metrics
+from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import simulate
+from softstart.start.simulation import DEFAULT_DRIVE, simulate
 
-DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
@@ -61,7 +63,7 @@ def intervals(
     run: Run,
     drawn: Records,
     controller: str | Controller,
-    until: float | None = None,
+    until: float | str | None = None,
     fitted_to: Drive | None = None,
 ) -> dict[str, tuple[float, float]]:
     """The interval of 95 % of K_dyn, peak torque and start time over drives that are left possible.
@@ -162,10 +164,10 @@ class Comparison(Result, view="starts.comparison_sheet"):
 
 def compare(
     drive: MachineLike | Uncertain | DataSheet | UnknownStiffness = DEFAULT_DRIVE,
-    controllers: Sequence[str | Controller] | str | Controller | None = None,
+    controllers: Sequence[ControllerLike] | ControllerLike | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
-    until: float | None = None,
+    until: float | str | None = None,
     fitted_to: Drive | None = None,
     worst_case: Sequence[str] | None = None,
 ) -> Comparison:
@@ -180,12 +182,13 @@ def compare(
         an identification each row has `intervals` over 200 drives that its logs leave possible, and limits
         must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
-        Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
+        Names, `path/to/file.py:ClassName`, files of tuned gains, Controller objects, or torques over time, as
+        `simulate` takes them. By default all
         installed controllers that need no parameter, and those that are given parameters.
     parameters : mapping, optional
         A controller's name -> its parameters (SI numbers or strings with a unit).
-    until : float, optional
-        End of each start, s. By default one elastic period after the start time.
+    until : float or str, optional
+        End of each start, s or with a unit. By default one elastic period after the start time.
     fitted_to : Drive, optional
         The drive for which the controllers are set up, if not `drive`: how they fare on a drive that is not
         the one they assume.
@@ -248,13 +251,13 @@ def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, Records | None, 
 
 
 def make_controllers(
-    controllers: Sequence[str | Controller] | str | Controller | None,
+    controllers: Sequence[ControllerLike] | ControllerLike | None,
     parameters: Mapping[str, Mapping[str, object]],
 ) -> list[Controller]:
     """The controllers to compare, by default all that are ready; InputError holds all mistakes at once."""
-    if isinstance(controllers, str | Controller):
+    if isinstance(controllers, str | os.PathLike | Controller | TorqueProfile) or callable(controllers):
         controllers = [controllers]
-    asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters))
+    asked: list[Any] = list(ready_controller_names(parameters) if controllers is None else controllers)
     if not asked:
         raise InputError("controllers: name at least one; `softstart controllers` lists them.")
     wrong = Mistakes()
@@ -266,7 +269,7 @@ def make_controllers(
     made: list[Controller] = []
     for one in asked:
         with wrong.collect():
-            made.append(make_controller(one, parameters.get(one) if isinstance(one, str) else None))
+            made.append(as_controller(one, parameters.get(one) if isinstance(one, str) else None))
     wrong.raise_if_any()
     return made
 
@@ -275,7 +278,7 @@ def compared(
     drive: Machine,
     controller: Controller,
     direct: Run | None,
-    until: float | None = None,
+    until: float | str | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
     drawn: Records | None = None,
@@ -305,7 +308,7 @@ def changed_case(
     drive: Machine,
     controller: Controller,
     case: str,
-    until: float | None = None,
+    until: float | str | None = None,
     fitted_to: Drive | None = None,
     soft: Drive | None = None,
 ) -> Case:

@@ -16,7 +16,6 @@ from softstart.arrays import Vector
 from softstart.controller.base import (
     CompiledController,
     Controller,
-    Measured,
     PlainController,
     Sensor,
     label_of,
@@ -24,6 +23,7 @@ from softstart.controller.base import (
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.kernel.motor import M_TIME, NEW_STATE
+from softstart.kernel.records import Measured
 from softstart.quantities import number_in, show
 from softstart.start.status import Status, status_of
 from softstart.start.trajectory import StartRecorder
@@ -112,10 +112,10 @@ def _run_compiled(controller: CompiledController, drive: Any, recorder: StartRec
 def plain_answer(
     controller: PlainController, measured: Vector, state: tuple[float, ...]
 ) -> tuple[float, float, tuple[float, ...], float]:
-    """What a plain controller answers: torque, when to be asked again, its state, slope."""
+    """The reply of a plain controller: torque, when to be asked again, its state, slope."""
     try:
         with watched(controller):
-            answer = controller.step(Measured(*measured.tolist()), state)
+            reply: Any = controller.step(Measured(*measured.tolist()), state)
     except (Exception, SystemExit) as error:  # the user's own code may fail in any way
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(
@@ -123,13 +123,16 @@ def plain_answer(
             f"t = {measured[M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
             f"({type(error).__name__}: {error})."
         ) from error
+    period = getattr(controller, "period", None)
+    if isinstance(reply, float | int) and period:
+        return float(reply), float(measured[M_TIME]) + period, state, 0.0
     try:
-        slope = float(answer[3]) if len(answer) > 3 else 0.0
-        return float(answer[0]), float(answer[1]), tuple(answer[2]), slope
+        slope = float(reply[3]) if len(reply) > 3 else 0.0
+        return float(reply[0]), float(reply[1]), tuple(reply[2]), slope
     except (TypeError, IndexError, ValueError):
         raise InputError(
-            f"controller {type(controller).__name__}: its step answered {answer!r}; "
-            "answer with Command(torque, ask_again, state, slope)."
+            f"controller {type(controller).__name__}: its step returned {reply!r}; return Command(torque, "
+            "ask_again, state, slope), or, of a controller with a `period`, the torque alone."
         ) from None
 
 

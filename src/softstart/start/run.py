@@ -73,6 +73,19 @@ class Stage:
         return self.end - self.start
 
 
+class Trace:
+    """A state of a `Run` at the instants `t`, by its name in `Run.at`."""
+
+    def __init__(self, meaning: str) -> None:
+        self.__doc__ = meaning
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, run: Run, owner: type) -> Vector:
+        return self if run is None else run._traces[self.name]
+
+
 class Clipped(NamedTuple):
     """What a start's demand lost at the torque limits: its largest excess in N m, and for how long, s."""
 
@@ -85,7 +98,8 @@ class Run(Result, view="starts.run_sheet"):
     """One start under one controller. Angles in rad, speeds and torques at the motor shaft, in SI units.
 
     It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
-    peaks and events are located, not read off the traces. N is the number of masses, 2 for a drive.
+    peaks and events are located, not read off the traces. Traces have the shape (n,); those of all masses or
+    shafts have a column for each.
 
     Attributes
     ----------
@@ -97,42 +111,8 @@ class Run(Result, view="starts.run_sheet"):
         The machine to whose mean torque K_dyn refers, if not `drive`.
     status : Status
         How the start ended.
-    t : array of shape (n,)
-        Instants of the traces, s.
-    phi1, phi2, w1, w2, theta : array of shape (n,)
-        Angles and speeds of motor and load, and phi1 - phi2.
-    phi, w : array of shape (n, N)
-        Angles and speeds of all masses.
-    twist : array of shape (n, N - 1)
-        Twists of the shafts.
-    u : array of shape (n,)
-        Motor torque after limits and lag, N m.
-    torques : array of shape (n, N - 1)
-        Torques of the shafts, N m; `T` is that of a single one, of shape (n,), or the same.
-    k_dyn, k_dyn_first_contact : float
-        Dynamic coefficient of the whole run, and of stage 2 alone, of the shaft that is loaded most.
-    k_dyns, utilisation : array of shape (N - 1,)
-        K_dyn of each shaft, and its torque over its permissible torque (NaN where none is given).
-    peak_torques, peak_times, peak_impulses : array of shape (N - 1,)
-        Largest |T| of each shaft, N m, its instant, s, and the largest impulse of its impacts, N m s.
-    peak_torque, peak_time : float
-        Largest |T| of all shafts, N m, and its instant, s.
-    clipped : Clipped
-        How far (`excess`, N m) and for how long (`time`, s) the controller's demand lay beyond the torque
-        limits of the drive, where it is cut off.
-    start_time, end_time : float
-        First instant at which the load has its target speed (NaN if never), and end of the run, s.
-    events : tuple of Event
-        Contacts and others, in order of time.
-    stages : tuple of Stage
-        Spans with a gap between motor and load open (odd number), or none (even).
-    energy : metrics.Energy
-        Energy balance, J.
-    recorded : Recorded
-        The records of the kernel.
-    position : str
-        Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
-        with the largest |T|, whose start is `shown`.
+    trajectory : Trajectory
+        The start as the kernel recorded it.
     positions : mapping of str to Run
         The starts from each position, if it is unknown. Then K_dyn, peaks with their instants, impulses,
         impact speed, excess of the demand, start and settled times are the largest among them, each by
@@ -144,8 +124,8 @@ class Run(Result, view="starts.run_sheet"):
     --------
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
-    >>> run.status.value
-    'The load reached its target speed.'
+    >>> run.status.success, run.status.message
+    (True, 'The load reached its target speed.')
     >>> [round(stage.duration, 4) for stage in run.stages[:2]]
     [0.0166, 0.0367]
     >>> float(run.at(run.peak_time)["T"].round(6)) == round(run.peak_torque, 6)
@@ -292,13 +272,13 @@ class Run(Result, view="starts.run_sheet"):
         Where the run ends within stage 2 it is the one so far. A start in contact begins with stage 2.
         """
 
-        def own(run: Run) -> float:
-            first = float(np.abs(run.trajectory.shafts["first_peak"]).max())
+        def of_stage_2(run: Run) -> float:
             if math.isnan(run.trajectory.notes["stage_2_end"]):
                 return math.nan
-            return float(formulas.dynamic_coefficient(first, self.base_torque))
+            peak = float(np.abs(run.trajectory.shafts["first_peak"]).max())
+            return float(formulas.dynamic_coefficient(peak, self.base_torque))
 
-        return self._worst(own, np.fmax)
+        return self._worst(of_stage_2, np.fmax)
 
     @property
     def shaft_factors(self) -> Vector:
@@ -309,8 +289,8 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def utilisation(self) -> Vector:
         """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
-        found: Vector = self.peak_torques / self.drive.permissible_torques
-        return found
+        utilisation: Vector = self.peak_torques / self.drive.permissible_torques
+        return utilisation
 
     @property
     def permissible_torque(self) -> float:
@@ -366,8 +346,8 @@ class Run(Result, view="starts.run_sheet"):
             begin, last = run.stages[-1].start, run.end_time - run.elastic_period
             if begin > last:
                 return math.nan  # too short to be called settled
-            found = run.trajectory.torque_settles(run.motor_shaft, begin, band * run.base_torque)
-            return found if found <= last else math.nan
+            time = run.trajectory.torque_settles(run.motor_shaft, begin, band * run.base_torque)
+            return time if time <= last else math.nan
 
         return self._worst(settled)
 
@@ -423,10 +403,10 @@ class Run(Result, view="starts.run_sheet"):
         return first, second
 
     def _kind(self, event: Any) -> str:
-        kind, place, given = int(event["kind"]), int(event["place"]), self.trajectory.input
+        kind, place, machine = int(event["kind"]), int(event["place"]), self.trajectory.input
         if kind in OF_GEAR:
-            mass = given.masses[0, place].view(rec.MASS)[0]
-            if mass.friction > 0.0 and place == int(given.machine.motor):
+            mass = machine.masses[0, place].view(rec.MASS)[0]
+            if mass.friction > 0.0 and place == int(machine.machine.motor):
                 return OF_MOTOR[kind]
             if mass.Mc == 0.0:
                 return OF_GEAR[kind]
@@ -446,15 +426,14 @@ class Run(Result, view="starts.run_sheet"):
         """All stages that take time; the last one ends with the run."""
         peaks, sides = self.trajectory.stage_peaks(), self.trajectory.of_shafts("side")[:, self.motor_shaft]
         at_start = self.trajectory.index(peaks[:, 1])
-        found = []
+        stages = []
         for row, span in zip(peaks, at_start, strict=True):
             number, torques, times = int(row[0]), row[3::2], row[4::2]
             worst = int(np.abs(torques).argmax())
             side = 0 if number % 2 else int(sides[span])
-            found.append(
-                Stage(number, float(row[1]), float(row[2]), side, float(torques[worst]), float(times[worst]))
-            )
-        return tuple(found)
+            peak = float(torques[worst]), float(times[worst])
+            stages.append(Stage(number, float(row[1]), float(row[2]), side, *peak))
+        return tuple(stages)
 
     @property
     def _continued(self) -> Run:
@@ -495,10 +474,10 @@ class Run(Result, view="starts.run_sheet"):
         }  # fmt: skip
         single = states["T"][:, 0] if self.trajectory.input.count == 2 else states["T"]
         v = of_masses["w1"] - of_masses["w2"]
-        found = {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
+        every = {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
         return {
             name: values.reshape(when.shape if values.ndim == 1 else (*when.shape, values.shape[1]))
-            for name, values in found.items()
+            for name, values in every.items()
         }
 
     @cached_property
@@ -514,60 +493,17 @@ class Run(Result, view="starts.run_sheet"):
     def _traces(self) -> dict[str, Vector]:
         return self.at(self.t)
 
-    @property
-    def phi(self) -> Vector:
-        """Angles of the masses, rad; that of the load is 0 at the start."""
-        return self._traces["phi"]
-
-    @property
-    def w(self) -> Vector:
-        """Speeds of the masses, rad/s."""
-        return self._traces["w"]
-
-    @property
-    def twist(self) -> Vector:
-        """Twists of the shafts, rad."""
-        return self._traces["twist"]
-
-    @property
-    def torques(self) -> Vector:
-        """Torques of the shafts, N m, a column for each."""
-        return self._traces["torques"]
-
-    @property
-    def T(self) -> Vector:
-        """Shaft torque, N m; of several shafts a column for each."""
-        return self._traces["T"]
-
-    @property
-    def u(self) -> Vector:
-        """Motor torque, N m."""
-        return self._traces["u"]
-
-    @property
-    def phi1(self) -> Vector:
-        """Angle of the motor, rad."""
-        return self._traces["phi1"]
-
-    @property
-    def phi2(self) -> Vector:
-        """Angle of the load, rad."""
-        return self._traces["phi2"]
-
-    @property
-    def w1(self) -> Vector:
-        """Speed of the motor, rad/s."""
-        return self._traces["w1"]
-
-    @property
-    def w2(self) -> Vector:
-        """Speed of the load, rad/s."""
-        return self._traces["w2"]
-
-    @property
-    def theta(self) -> Vector:
-        """Twist phi1 - phi2, rad."""
-        return self._traces["theta"]
+    phi = Trace("Angles of the masses, rad; that of the load is 0 at the start.")
+    w = Trace("Speeds of the masses, rad/s.")
+    twist = Trace("Twists of the shafts, rad.")
+    torques = Trace("Torques of the shafts, N m, a column for each.")
+    T = Trace("Shaft torque, N m; of several shafts a column for each.")
+    u = Trace("Motor torque, N m.")
+    phi1 = Trace("Angle of the motor, rad.")
+    phi2 = Trace("Angle of the load, rad.")
+    w1 = Trace("Speed of the motor, rad/s.")
+    w2 = Trace("Speed of the load, rad/s.")
+    theta = Trace("Twist phi1 - phi2, rad.")
 
     def columns(self, times: ArrayLike | None = None) -> dict[str, Vector]:
         """The states by headings with units, at `times` or the plot's instants."""
@@ -619,9 +555,9 @@ class Run(Result, view="starts.run_sheet"):
             "base": None if self.base is None else self.base.name,
             "base_torque": self.base_torque if known else None,
             "k_dyns": self.k_dyns.tolist() if known else None,
-            "shaft_factors": [None if math.isnan(one) else one for one in self.shaft_factors.tolist()],
+            "shaft_factors": [None if math.isnan(share) else share for share in self.shaft_factors.tolist()],
             "worst_shaft": self.drive.shaft_names[self.worst_shaft],
-            "utilisation": [None if math.isnan(one) else one for one in self.utilisation.tolist()],
+            "utilisation": [None if math.isnan(share) else share for share in self.utilisation.tolist()],
             "peak_torque": self.peak_torque,
             **({} if self.drive.gear is None else {"peak_torque_at_output": self.peak_torque_at_output}),
             "peak_time": self.peak_time,

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from numbers import Integral
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 from softstart.chain.machines import MachineLike, load_machine
-from softstart.controller.base import Controller
-from softstart.controller.finding import make_controller
+from softstart.controller.base import label_of
 from softstart.drive.machine import Machine
 from softstart.drive.records import Records
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
+from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.engine import check_limits, ended, run_one
 from softstart.start.kernel_input import MAX_EVENTS, KernelInput, kernel_input
+from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run, worst_run
 from softstart.start.trajectory import StartRecorder
 
@@ -24,44 +24,44 @@ if TYPE_CHECKING:
 
     from softstart.chain.periodic_torque import PeriodicTorque
 
+DEFAULT_DRIVE = "crane-4amtkf"
+
+
+class Options(TypedDict, total=False):
+    """The other arguments of `simulate`."""
+
+    parameters: Mapping[str, object] | None
+    fitted_to: Any
+    base: Any
+    time_limit: float | str | None
+    max_events: int
+    excitation: Mapping[str | int, PeriodicTorque] | None
+    workers: int | None
+
 
 @overload
 def simulate(
-    drive: MachineLike,
-    controller: str | Controller | None,
-    until: float | None = ...,
-    *,
-    parameters: Mapping[str, object] | None = ...,
-    fitted_to: Any = ...,
-    base: Any = ...,
-    time_limit: float | None = ...,
-    max_events: int = ...,
-    excitation: Mapping[str | int, PeriodicTorque] | None = ...,
-    workers: int | None = ...,
+    drive: MachineLike | None = ...,
+    controller: ControllerLike | None = ...,
+    until: float | str | None = ...,
+    **options: Unpack[Options],
 ) -> Run: ...
 @overload
 def simulate(
     drive: Records | Sequence[Machine],
-    controller: str | Controller | None,
-    until: float | None = ...,
-    *,
-    parameters: Mapping[str, object] | None = ...,
-    fitted_to: Any = ...,
-    base: Any = ...,
-    time_limit: float | None = ...,
-    max_events: int = ...,
-    excitation: Mapping[str | int, PeriodicTorque] | None = ...,
-    workers: int | None = ...,
+    controller: ControllerLike | None = ...,
+    until: float | str | None = ...,
+    **options: Unpack[Options],
 ) -> xarray.Dataset: ...
 def simulate(
-    drive: Any,
-    controller: str | Controller | None,
-    until: float | None = None,
+    drive: Any = None,
+    controller: ControllerLike | None = REFERENCE,
+    until: float | str | None = None,
     *,
     parameters: Mapping[str, object] | None = None,
     fitted_to: Any = None,
     base: Any = None,
-    time_limit: float | None = None,
+    time_limit: float | str | None = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, PeriodicTorque] | None = None,
     workers: int | None = None,
@@ -77,14 +77,17 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, Chain, Records, sequence of machines, str or path
+    drive : Drive, Chain, Records, sequence of machines, str or path, optional
         A drive, a chain, `records` of one, a list of drives or of chains (with the same number of masses,
-        their motors and loads on the same ones), or the name or file of a drive or chain.
-    controller : str, Controller or None
-        A name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
-    until : float, optional
-        End of the run, s. By default one elastic period 2 pi/Omega after the start time, the instant at
-        which the load first has its target speed.
+        their motors and loads on the same ones), or the name or file of a drive or chain. By default the
+        crane travel drive of [G].
+    controller : str, Controller, TorqueProfile, pair of arrays, function or None
+        A name, `path/to/file.py:ClassName`, a file of tuned gains, or a Controller object; a torque over time
+        as a TorqueProfile, as two arrays (t in s, u in N m), or as a function t -> u, which is sampled every
+        1 ms; None leaves the motor off. By default `direct`.
+    until : float or str, optional
+        End of the run, s or with a unit ("300 ms"). By default one elastic period 2 pi/Omega after the start
+        time, the instant at which the load first has its target speed.
     parameters : mapping, optional
         Parameters of a controller given by name: SI numbers or strings with a unit.
     fitted_to : Drive or Chain, optional
@@ -94,8 +97,8 @@ def simulate(
         records also records of the same shape.
     base : Drive or Chain, optional
         The machine to whose mean torque K_dyn refers, if not `drive`; or records likewise.
-    time_limit : float, optional
-        Time after which a start that has not reached its target speed ends as not reached, s.
+    time_limit : float or str, optional
+        Time after which a start that has not reached its target speed ends as not reached, s or with a unit.
     max_events : int
         Largest number of events and of control instants of one start; more of them is an error, not a
         result.
@@ -125,65 +128,64 @@ def simulate(
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
     >>> round(run.k_dyn, 4), round(run.start_time, 4)
     (3.1179, 0.3735)
+    >>> ramp = simulate("crane-4amtkf", ([0.0, 0.1], [0.0, 62.0]), until="0.6 s")
+    >>> round(ramp.k_dyn, 4), ramp.status.success
+    (2.1647, True)
 
     References
     ----------
     K_dyn: [G] (16); everything at one shaft: [R].
     """
-    if isinstance(drive, str | os.PathLike):
-        drive = load_machine(drive)
-    made = None if controller is None else make_controller(controller, parameters)
+    drive = DEFAULT_DRIVE if drive is None else drive
+    drive = load_machine(drive) if isinstance(drive, str | os.PathLike) else drive
+    strategy = None if controller is None else as_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
     if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
     if isinstance(drive, list | tuple | Records):
-        if made is None:
+        if strategy is None:
             raise InputError("controller is missing: many starts need one.")
-        if workers is not None and (
-            isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
-        ):
-            raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
-        return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
+        return simulate_many(drive, strategy, until, fitted_to, base, time_limit, max_events, workers)
     if not isinstance(drive, Machine):
         raise InputError(
             "drive: give one Drive or Chain, records or a list of them, the path of a file, or a name."
         )
     positions = drive.positions
-    given = {name: kernel_input(one, time_limit, max_events, excitation) for name, one in positions.items()}
-    check_end(drive, made, until, next(iter(given.values())))
-    ready, own = (None, None) if made is None else made.set_up((fitted_to or drive).design_drive)
-    of = "no motor torque" if ready is None else ready.name or type(ready).__name__
+    inputs = {name: kernel_input(one, time_limit, max_events, excitation) for name, one in positions.items()}
+    check_end(drive, strategy, until, next(iter(inputs.values())))
+    ready, design = (None, None) if strategy is None else strategy.set_up((fitted_to or drive).design_drive)
+    start = f"{drive.name}, controller {'no motor torque' if ready is None else label_of(ready)}"
     runs = {}
-    for name, rows in given.items():
-        recorder = StartRecorder(rows, 0 if ready is None else int(ready.sensors))
-        reason = run_one(ready, own, recorder, until)
-        status = ended(recorder.state, reason, until, max_events, f"{drive.name}, controller {of}")
-        runs[name] = Run(positions[name], ready, base, status, recorder.finished(), own)
+    for name, machine_input in inputs.items():
+        recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
+        reason = run_one(ready, design, recorder, until)
+        status = ended(recorder.state, reason, until, max_events, start)
+        runs[name] = Run(positions[name], ready, base, status, recorder.finished(), design)
     return worst_run(runs, drive) if len(runs) > 1 else next(iter(runs.values()))
 
 
 def _check_other(name: str, other: object, drive: object) -> None:
     """A machine given beside the simulated one: a single one, or one for each of several starts."""
     if isinstance(other, Records):
-        own = drive.shape if isinstance(drive, Records) else ()
-        if other.shape != own:
+        shape = drive.shape if isinstance(drive, Records) else ()
+        if other.shape != shape:
             raise InputError(
-                f"{name}: records of shape {other.shape} do not go with starts of shape {own}; give a single "
+                f"{name}: records of shape {other.shape} do not match starts of shape {shape}; give a single "
                 "machine, or records of the same shape."
             )
     elif other is not None and not isinstance(other, Machine):
         raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
 
 
-def check_end(machine: Any, controller: object, until: float | None, rows: KernelInput) -> None:
+def check_end(machine: Any, controller: object, until: float | None, start: KernelInput) -> None:
     """A run needs an end, and a controller a motor."""
     if controller is not None and machine.motor is None:
         raise InputError(
             "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
         )
-    if until is not None or rows.machine["time_limit"] < float("inf"):
+    if until is not None or start.machine["time_limit"] < float("inf"):
         return
     if controller is None or machine.target_speed is None:
         raise InputError(
@@ -192,7 +194,7 @@ def check_end(machine: Any, controller: object, until: float | None, rows: Kerne
     arrays = machine.at_motor_shaft()
     load = float((arrays.Mc / arrays.efficiency_from_motor).sum())
     lossy = " and through its gears" if (arrays.efficiency < 1.0).any() else ""
-    curves = ", nor do load curves over speed drive it" if rows.curves.size else ""
+    curves = ", nor do load curves over speed drive it" if start.curves.size else ""
     raise InputError(
         f"starting_torque: it is not above the load torques, {load:.6g} N*m at the motor "
         f"shaft{lossy}{curves}, so the load may never reach its target speed; give until or time_limit."

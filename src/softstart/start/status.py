@@ -10,17 +10,12 @@ from softstart.kernel import records as rec
 class Status(Enum):
     """How a start ended; the value is the sentence shown.
 
-    Attributes
-    ----------
-    REACHED, STOPPED_EARLY, NOT_REACHED, NOT_RELEASED : the run went to its end and its figures are
-        valid; `finished` is True.
-    TOO_MANY_EVENTS, TOO_LONG, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL : the start could not be
-        finished: an error for a single start, NaN in every figure in a batch.
+    A start that could not be `finished` is an error where it is single, and NaN in every figure of a batch.
 
     Examples
     --------
-    >>> Status.REACHED.value
-    'The load reached its target speed.'
+    >>> Status.REACHED.success, Status.REACHED.message
+    (True, 'The load reached its target speed.')
     >>> [status.name for status in Status if status.finished]
     ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'NOT_RELEASED']
     """
@@ -55,8 +50,18 @@ class Status(Enum):
 
     @property
     def finished(self) -> bool:
-        """True if the run went to its end, so that its figures stand."""
+        """Whether the run went to its end, so that its figures are valid."""
         return self in _FINISHED
+
+    @property
+    def success(self) -> bool:
+        """Whether the load reached its target speed."""
+        return self is Status.REACHED
+
+    @property
+    def message(self) -> str:
+        """The sentence that says how the start ended."""
+        return self.value
 
 
 _FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED})
