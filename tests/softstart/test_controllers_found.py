@@ -76,7 +76,7 @@ def test_wrong_names(mine: Path, monkeypatch: pytest.MonkeyPatch, name: str, wor
     [
         (lambda: Command(math.nan), SimulationError, "NaN or with a past instant"),
         (lambda: Command(1.0, 0.0), SimulationError, "NaN or with a past instant"),
-        (lambda: None, InputError, "answer with Command"),
+        (lambda: None, InputError, "return Command"),
         (
             lambda: Command(1 / 0),
             SimulationError,

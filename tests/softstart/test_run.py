@@ -16,7 +16,19 @@ from tests.patience import patient
 from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, Run, SimulationError, Status, formulas, records, simulate
+import softstart
+from softstart import (
+    Drive,
+    InputError,
+    Run,
+    SimulationError,
+    Status,
+    TorqueProfile,
+    compare,
+    formulas,
+    records,
+    simulate,
+)  # fmt: skip
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
 from softstart.controller.compiled import Vector
 from softstart.kernel.records import Measured
@@ -284,3 +296,53 @@ def test_controllers_that_come_and_go_in_many_threads_are_watched_to_the_last(
                 time.sleep(0.02)
         assert err.count("has been in step() for 0.2 s") == 1
     assert [one.name for one in threading.enumerate()].count("softstart-watch") == 1
+
+
+def test_a_torque_over_time_is_a_controller_in_any_form() -> None:
+    """A ramp as arrays, profile and function is the ramp of the controller `profile`, to the last digits."""
+    times, torques = [0.0, 0.1, 0.2], [10.0, 62.0, 62.0]
+    profile = TorqueProfile(times, torques)
+    wanted = simulate(CRANE, "profile", parameters={"profile": profile})
+    for controller in (profile, (times, torques), lambda t: float(np.interp(t, times, torques))):
+        run = simulate(CRANE, controller)
+        assert run.k_dyn == pytest.approx(wanted.k_dyn, rel=1e-9)
+        assert run.start_time == pytest.approx(wanted.start_time, rel=1e-9)
+    assert [row.name for row in compare(CRANE, [profile, "direct"]).rows] == ["profile", "direct"]
+
+
+def test_times_have_units_and_the_crane_is_the_default() -> None:
+    run = simulate(until="200 ms")
+    assert (run.drive, run.controller_name, run.end_time) == (CRANE, "direct", 0.2)
+    assert (run.status.success, run.status.message) == (False, run.status.value)
+    late = simulate(CRANE, "ramp", time_limit="100 ms")
+    assert (late.status.name, late.end_time) == ("NOT_REACHED", 0.1)
+
+
+class Sampled(PlainController):
+    """Returns its torque alone, every 1 ms."""
+
+    name = "sampled"
+    period = 0.001
+
+    def step(self, measured: Measured, state: tuple[float, ...]) -> float:
+        return min(62.0, 620.0 * measured.time)
+
+
+class Stepped(Sampled):
+    """The same, in full."""
+
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Any:
+        return Command(min(62.0, 620.0 * measured.time), measured.time + 0.001, state)
+
+
+def test_a_sampled_controller_may_return_the_torque_alone() -> None:
+    one, other = simulate(CRANE, Sampled()), simulate(CRANE, Stepped())
+    assert one.trajectory.states.tobytes() == other.trajectory.states.tobytes()
+    stepless = type("Stepless", (Sampled,), {"period": None})
+    with pytest.raises(InputError, match="of a controller with a `period`, the torque alone"):
+        simulate(CRANE, stepless())
+
+
+def test_the_public_names_are_what_dir_shows() -> None:
+    assert dir(softstart) == sorted(softstart.__all__)
+    assert {"Mass", "Motor", "Shaft", "compiled_step", "make_controller", "parameter"} <= set(dir(softstart))

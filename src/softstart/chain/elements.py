@@ -38,6 +38,13 @@ class Mass(ParameterSet):
     `curve_torque` is a load torque that acts besides, always: at the speeds `curve_speed` of the mass, or at
     its angles `curve_angle` (0 where the load mass begins), linear in between, constant beyond them.
 
+    Attributes
+    ----------
+    inertia, initial_speed : kg m^2 and rad/s.
+    torque, friction, curve_torque : load torques, N m.
+
+    Examples
+    --------
     >>> Mass("350 kg*cm^2", name="rotor").inertia
     0.035
     >>> fan = Mass(2.0, curve_speed=["0 rpm", "500 rpm", "1000 rpm"], curve_torque=[0.0, 10.0, 40.0])
@@ -111,6 +118,12 @@ class Shaft(ParameterSet):
     way it flows: of the torque T of the shaft, brought to the other side, eta T acts there while the shaft
     drives, and T/eta while it is driven. At rest the gear holds whatever lies between.
 
+    Attributes
+    ----------
+    stiffness, damping, gap : N m/rad, N m s/rad and rad, at the `side` of the gear.
+
+    Examples
+    --------
     >>> Shaft("2 kN*m/rad", backlash="0.2 mm", diameter="185 mm").gap
     0.002162...
     >>> Shaft(gap="1 deg", restitution=0.9).rigid
@@ -225,6 +238,12 @@ class Shaft(ParameterSet):
 class Motor(ParameterSet):
     """The motor's torque as a `Drive` has it, at the shaft of the mass on which it acts ("": the first).
 
+    Attributes
+    ----------
+    starting_torque, maximum_torque, minimum_torque : N m.
+
+    Examples
+    --------
     >>> Motor(62, torque_lag="2 ms").maximum_torque
     62.0
     """

@@ -83,6 +83,22 @@ def compiled_step(function: Callable[..., None]) -> Any:
     and must not allocate arrays (that keeps it near 10 ns a call). It is cached on disk, and the kernel is
     not compiled again for it.
 
+    Parameters
+    ----------
+    function : callable
+        The step, in the part of Python that numba compiles.
+
+    Returns
+    -------
+    A compiled step, as `CompiledController.kernel` takes it.
+
+    Raises
+    ------
+    numba.core.errors.TypingError
+        At the first call, where numba cannot compile the step.
+
+    Examples
+    --------
     >>> @compiled_step
     ... def step(parameters, measured, state, command):
     ...     command[TORQUE] = parameters[0]

@@ -68,6 +68,27 @@ def make_controller(
     name an installed controller; one that names a Python file of its own would run it, and is refused
     without `allow_code`.
 
+    Parameters
+    ----------
+    name : str or Controller
+        A name, `path/to/file.py:ClassName`, a file of tuned gains, or a finished controller.
+    parameters : mapping, optional
+        Its parameters: SI numbers or strings with a unit.
+    allow_code : bool
+        Whether a file of gains may run a Python file that it names.
+
+    Returns
+    -------
+    Controller
+        Not yet set up for a drive: what is not given follows from that.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, and for bad parameters.
+
+    Examples
+    --------
     >>> make_controller("ramp", {"time": "120 ms"}).time
     0.12
     """

@@ -83,6 +83,23 @@ def parameter(
         only in a range that the user names.
     choices : the texts that are allowed.
     python_only : the value is an object, which only Python can give.
+
+    Returns
+    -------
+    A field of a dataclass.
+
+    Raises
+    ------
+    InputError
+        When a controller is made with a value that is not allowed.
+
+    Examples
+    --------
+    >>> from softstart import PlainController
+    >>> class Pulse(PlainController):
+    ...     torque: float = parameter("N*m", "torque of the pulse", 20.0, limit="above 0")
+    ...     def step(self, measured, state):
+    ...         return Command(self.torque if measured.time < 0.1 else 0.0, measured.time + 0.1)
     """
     shown = default_text or ("" if default is None or callable(default) else str(default).removesuffix(".0"))
     declaration = ControllerParameter(

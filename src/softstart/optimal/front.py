@@ -482,7 +482,9 @@ def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]
             yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
 
 
-def _seconds(start_times: Sequence[float | str | StartTime], drive: Machine, torque_speed: Corners) -> list[float]:
+def _seconds(
+    start_times: Sequence[float | str | StartTime], drive: Machine, torque_speed: Corners
+) -> list[float]:
     """Start times in s, sorted, each once; multiples are of that of `direct`."""
     times: list[Any] = [start_times] if isinstance(start_times, str) else list(start_times)
     if not times:

@@ -252,7 +252,7 @@ def fatigue(
     (1.0, True, 0)
     >>> fatigue(simulate(Drive.load("crane-4amtkf"), "direct"))
     Traceback (most recent call last):
-    softstart.errors.InputError: damping is missing in motor - load: an undamped shaft rattles ...
+    softstart.errors.InputError: damping is missing in motor - load: an undamped shaft oscillates ...
     >>> crane = fatigue(simulate("crane-4-mass", "ramp"), estimate_damping={"gears": 2})
     >>> [life.shaft_name for life in crane.rows]
     ['rotor - pinion', 'pinion - wheel shaft', 'wheel shaft - crane']

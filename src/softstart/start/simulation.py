@@ -41,7 +41,7 @@ class Options(TypedDict, total=False):
 
 @overload
 def simulate(
-    drive: MachineLike | None = ...,
+    drive: MachineLike = ...,
     controller: ControllerLike | None = ...,
     until: float | str | None = ...,
     **options: Unpack[Options],
@@ -54,7 +54,7 @@ def simulate(
     **options: Unpack[Options],
 ) -> xarray.Dataset: ...
 def simulate(
-    drive: Any = None,
+    drive: Any = DEFAULT_DRIVE,
     controller: ControllerLike | None = REFERENCE,
     until: float | str | None = None,
     *,
@@ -136,7 +136,6 @@ def simulate(
     ----------
     K_dyn: [G] (16); everything at one shaft: [R].
     """
-    drive = DEFAULT_DRIVE if drive is None else drive
     drive = load_machine(drive) if isinstance(drive, str | os.PathLike) else drive
     strategy = None if controller is None else as_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
