@@ -38,6 +38,6 @@ def test_the_figure_of_the_report_for_the_readme(browser: Any, tmp_path: Path) -
     subprocess.run([SOFTSTART, "report", "--out", str(report)], check=True, capture_output=True)
     page = browser.new_page(viewport={"width": 1000, "height": 900}, color_scheme="light")
     page.goto(report.as_uri())
-    figure = page.locator("h2:has-text('How gentle could a start be') >> xpath=following::figure[1]")
+    figure = page.locator("h2:has-text('Lower bound and optimum') >> xpath=following::figure[1]")
     assert taken(figure, Path(FOLDER or tmp_path) / "report.png") < LARGEST
     page.close()

@@ -104,7 +104,7 @@ def test_what_was_saved_is_loaded_to_the_bit(found: Identification, folder: Path
     assert read.logs == ()
     with pytest.raises(InputError, match="loaded has none"):
         read.plot()
-    assert "found" in read._repr_html_()
+    assert "estimate" in read._repr_html_()
 
 
 def test_a_file_that_was_changed_is_refused(folder: Path, tmp_path: Path) -> None:

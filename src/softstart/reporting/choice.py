@@ -82,12 +82,12 @@ class Choice(OneLine):
 
     @cached_property
     def chosen(self) -> Row | None:
-        """The recommended strategy; without limits the gentlest of those that no other one beats."""
+        """The recommended strategy; without limits that with the lowest K_dyn of the Pareto-optimal ones."""
         return self.recommendation.shown[-1] if self.recommendation.shown else None
 
     @cached_property
     def ordinary(self) -> Row | None:
-        """That of an ordinary inverter with the least worst K_dyn, not flagged and within the limits."""
+        """That of an ordinary inverter with the lowest worst-case K_dyn, unflagged, within the limits."""
         ramps = [
             row
             for row in self.comparison.rows
@@ -122,7 +122,7 @@ class Choice(OneLine):
 
     @property
     def mapped(self) -> list[Row]:
-        """Those whose maps are shown: the two chosen, direct, and others with the least worst case."""
+        """Those whose maps are shown: the two chosen, direct, and others with the lowest worst case."""
         others = sorted(self._able, key=lambda row: np.nan_to_num(self.worst(row), nan=math.inf))
         shown = dict.fromkeys([*self.of_sheets, self.direct, *others])
         return [row for row in shown if row.name in self.maps][:MOST_MAPS]

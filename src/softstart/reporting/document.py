@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
 from matplotlib.patches import Rectangle
 
-from softstart.drive import plausibility
+from softstart.drive import Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
@@ -31,6 +31,7 @@ from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_
 from softstart.views.numbers import (
     RPM,
     Column,
+    DataColumn,
     TextTable,
     at_output,
     digits,
@@ -156,16 +157,16 @@ def document(report: Report) -> str:
     asked = several or drive.limits.fatigue is not None  # for lives
     lasts = asked and not isinstance(report.lives, str)
     sections = {
-        "recommendation": "The recommendation, and why",
+        "recommendation": "Recommendation",
         "strategies": "The strategies compared",
         "traces": "Torques of each start",
-        "shafts": "What each shaft carries" if several else "",
+        "shafts": "Torques of the shafts" if several else "",
         "drive": f"The {what}",
-        "limit": "How gentle could a start be?",
-        "robustness": "When the gap wears and the load changes" if report.choice.mapped else "",
+        "limit": "Lower bound and optimum",
+        "robustness": "Robustness to wear and load" if report.choice.mapped else "",
         "sheets": "Parameter sheets for the inverter",
-        "life": "How long the shaft line lasts" if lasts else "",
-        "validity": "What this report assumes, and where it holds",
+        "life": "Fatigue life of the shaft line" if lasts else "",
+        "validity": "Assumptions and validity",
         "provenance": "About this document",
     }
     ordinary = [report.choice.ordinary] if report.choice.ordinary else []
@@ -201,7 +202,7 @@ def document(report: Report) -> str:
 
 
 def limit_figure(report: Report) -> Any:
-    """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
+    """K_dyn against start time: the bound below which no start is possible, optima, every strategy."""
     rows = [row for row in report.comparison.rows if not math.isnan(row.run.start_time)]
     curve = report.limit
     return traces.trade_off_figure(
@@ -215,7 +216,7 @@ def limit_figure(report: Report) -> Any:
 
 def maps_figure(report: Report) -> Any:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
-    drive, units = report.drive, units_of(report.drive)
+    drive, units = report.drive.design_drive, units_of(report.drive)
     maps = {row.name: report.choice.maps[row.name] for row in report.choice.mapped}
     first = next(iter(maps.values()))
     gaps = [f"{units.shown(gap, 'rad'):.4g}" for gap in first.gaps]
@@ -244,16 +245,16 @@ def inverters() -> dict[str, Any]:
 
 
 def strategies(report: Report) -> TextTable:
-    """The figures of all strategies, the gentlest first."""
+    """The figures of all strategies, by K_dyn."""
     rows, gear = report.ordered, report.drive.gear
-    output = starts.Figure("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
+    output = DataColumn("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
     shown = (
         *starts.PEAK_COLUMNS, *([output] if gear else []), *starts.of_the_unknown(rows),
         starts.TIMES[0], *starts.TIME_COLUMNS, starts.TIMES[1], starts.AT_THE_GAP[-1],
     )  # fmt: skip
     # a digit more than a terminal holds
     exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
-    return starts.comparison_table(rows, exact, "Strategies on this drive, the gentlest first")
+    return starts.comparison_table(rows, exact, "Strategies on this drive, by K_dyn")
 
 
 def functions(report: Report) -> list[tuple[str, str]]:
@@ -272,7 +273,7 @@ def there_of(drive: Any, parameter: Parameter, numbers: list[float]) -> str:
     return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)
 
 
-def of_part(drive: Any, path: str, parameter: Parameter) -> str:
+def of_part(drive: Machine, path: str, parameter: Parameter) -> str:
     """What a parameter means, of a chain with the mass or shaft that has it: "fan: load torque"."""
     table, _, number = path.partition("]")[0].partition("[")
     names = {"mass": drive.mass_names, "shaft": drive.shaft_names}.get(table, ())
@@ -296,7 +297,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         numbers = [float(units.shown(v, si)) for v in exact]
         if numbers:
             text, there = ", ".join(map(short, numbers)), there_of(report.drive, parameter, numbers)
-            if parameter.at_output == "here":  # and the motor shaft is the other one
+            if gear is not None and parameter.at_output == "here":  # and the motor shaft is the other one
                 text, there = short(gear.lossless.to_motor(numbers[0], si)), text
         if path == "limits.life":
             hours = value / 3600.0

@@ -1,4 +1,4 @@
-"""How gentle any start could be: a bound for every start time, and the optima found in the time given."""
+"""Lower bound of K_dyn for every start time, and the optima found in the time given."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from softstart.drive import Machine
 from softstart.errors import InputError
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
 from softstart.optimal.front import FrontPoint, TimeRange
@@ -64,7 +65,7 @@ class OptimumCurve(OneLine):
         found = [p.k_dyn for p in self.found if p.k_dyn is not None and p.start_time_bound <= start_time]
         return min([*found, *(r.run.k_dyn for r in rows if r.run.start_time <= start_time)], default=None)
 
-    def proofs(self, drive: Any) -> tuple[list[float], list[tuple[float, float]], list[float]]:
+    def proofs(self, drive: Machine) -> tuple[list[float], list[tuple[float, float]], list[float]]:
         """Optima proved against every start, against starts whose gap closes once, and those not proved.
 
         Of the first and the last the per cent above the lower bound; of the second start time and per cent.
@@ -97,7 +98,7 @@ class OptimumCurve(OneLine):
         }
 
 
-def bound_at(drive: Any, start_time: float) -> float | None:
+def bound_at(drive: Machine, start_time: float) -> float | None:
     """The K_dyn that no start within `start_time` s can go below; None where there is no bound.
 
     >>> from softstart import Drive
@@ -114,7 +115,7 @@ def bound_at(drive: Any, start_time: float) -> float | None:
 
 
 def limit(
-    drive: Any,
+    drive: Machine,
     chosen: Sequence[float],
     own: Sequence[float],
     reference: float,
@@ -159,7 +160,7 @@ def limit(
     )
 
 
-def _by_formula(drive: Any, asked: Iterable[float]) -> Iterator[FrontPoint]:
+def _by_formula(drive: Machine, asked: Iterable[float]) -> Iterator[FrontPoint]:
     """Optima of the closed form, where it holds."""
     for start_time in asked:
         with suppress(NotApplicable):
@@ -168,7 +169,7 @@ def _by_formula(drive: Any, asked: Iterable[float]) -> Iterator[FrontPoint]:
 
 
 def _in_own_process(
-    drive: Any,
+    drive: Machine,
     asked: Sequence[float],
     budget: float,
     progress: Callable[[float, str], object],
@@ -200,7 +201,7 @@ def _in_own_process(
     return points
 
 
-def stream_optima(drive: Any, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
+def stream_optima(drive: Machine, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
     """Look for the optima of start times and send each at once: the first one first, then by distance to it.
 
     Each begins with the optimum of the nearest start time that has one.

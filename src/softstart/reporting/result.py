@@ -19,6 +19,7 @@ from softstart import __version__
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
+from softstart.drive import Machine
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, Mistakes, SimulationError, fact_of
 from softstart.input.files import write_whole
@@ -46,7 +47,7 @@ from softstart.views.starts import both_ends, machine_lines
 BUDGET, SHAFTS_BUDGET = 20.0, 60.0  # s for optima that take a search, on one shaft and on several
 
 
-def provenance(drive: Any, command: str) -> dict[str, Any]:
+def provenance(drive: Machine, command: str) -> dict[str, Any]:
     """Date (UTC), versions, file of the drive and command of a report made now.
 
     >>> from softstart import Drive
@@ -85,7 +86,7 @@ class Report(Result):
     choice : Choice
         The strategies that could be started, the recommendation, and the best one of an ordinary inverter.
     sheets : tuple of Sheet
-        Parameter sheets: of the recommended strategy (without limits: the gentlest that is not beaten), then
+        Parameter sheets: of the recommended strategy (without limits: that with the lowest K_dyn), then
         of the best one of an ordinary inverter, if these are two.
     resolution : Resolution
         The steps in which the inverter can be set.
@@ -108,7 +109,7 @@ class Report(Result):
     K_dyn: [G] (16).
     """
 
-    drive: Any
+    drive: Machine
     failed: tuple[tuple[str, str], ...]
     limit: OptimumCurve
     choice: Choice
@@ -145,7 +146,7 @@ class Report(Result):
 
     @cached_property
     def ordered(self) -> list[Row]:
-        """The strategies, the gentlest first; those that do not reach the target speed last."""
+        """The strategies by K_dyn; those that do not reach the target speed last."""
 
         def place(row: Row) -> tuple[bool, float]:
             return math.isnan(row.run.start_time), float(f"{row.run.k_dyn:.9g}")
@@ -193,7 +194,8 @@ class Report(Result):
     @property
     def most_torque(self) -> float:
         """The largest torque of the motor within the bound, N m."""
-        return float(min(self.drive.motor.starting_torque, self.drive.motor.maximum_torque))
+        motor: Any = self.drive.motor
+        return float(min(motor.starting_torque, motor.maximum_torque))
 
     @property
     def answer(self) -> str:
@@ -201,7 +203,7 @@ class Report(Result):
 
         >>> from softstart import report
         >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-49:]
-        ' below 0.977; the gentlest start known has 0.978.'
+        ' below 0.977; the lowest K_dyn known is 0.978.'
         """
         from softstart.reporting.document import text_answer  # which renders a Report
 
@@ -221,7 +223,7 @@ class Report(Result):
             "start_time": best.run.start_time if best else None,
             "peak_torque": best.run.peak_torque if best else None,
             "k_dyn_lower_bound": self.lower_bound(best) if best else None,
-            "k_dyn_gentlest_known": self.lowest_known(best) if best else None,
+            "k_dyn_lowest_known": self.lowest_known(best) if best else None,
             "k_dyn_direct": direct.k_dyn,
             "start_time_direct": direct.start_time,
             "ordinary": plain.name if plain else None,
@@ -313,10 +315,68 @@ def report(
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
     known, drawn, soft = as_far_as_known(drive)
-    machine: Any = as_machine(known)
+    machine = as_machine(known)
     if budget is None:
         budget = SHAFTS_BUDGET if len(machine.shaft_names) > 1 else BUDGET
+    steps = _checked_options(machine, budget, resolution, about)
+    made = _named_controllers(controllers, parameters or {})
+    show = progress or (lambda share, what: None)
     mapped = "load.inertia" in machine.parameters_by_path()  # what a map varies is a parameter of the file
+    started: list[tuple[Controller, Row]] = []
+    at_soft_end: list[Row] = []
+    maps: dict[str, RobustnessMap] = {}
+    failed: list[tuple[str, str]] = []
+    reference = simulate(machine, REFERENCE)
+    soft_reference = None if soft is None else simulate(soft, REFERENCE)
+    for number, one in enumerate(made):
+        name = label_of(one)
+        show(0.5 * number / len(made), f"starting the {machine.KIND} under {name}")
+        try:
+            row = compared(machine, one, reference, drawn=drawn, soft=soft)
+            if soft is not None:
+                at_soft_end.append(compared(soft, one, soft_reference))
+            if mapped:
+                maps[row.name] = robustness(machine.design_drive, one)
+            started.append((one, row))
+        except SimulationError as error:
+            if name == REFERENCE:
+                raise
+            failed.append((name, " ".join(str(error).split())))
+    rows = tuple(row for _, row in started)
+    compared_soft = None if soft is None else Comparison(soft, tuple(at_soft_end))
+    choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case, soft_end=compared_soft), maps)
+    sheets: list[ParameterSheet] = []
+
+    def round_off() -> None:
+        import softstart.reporting.document  # noqa: F401  takes half a second, for which nobody waits here
+
+        for row in choice.of_sheets:
+            show(0.5, f"rounding the values of {row.name}")
+            controller = next(one for one, other in started if other is row)
+            sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn, soft))
+
+    curve = limit(
+        machine,
+        [row.run.start_time for row in choice.of_sheets],
+        [row.run.start_time for row in rows if not math.isnan(row.run.start_time)],
+        choice.direct.run.start_time,
+        budget,
+        lambda share, text: show(0.5 + 0.5 * share, text),
+        meanwhile=round_off,
+    )
+    show(1.0, "done")
+    return Report(
+        machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about
+    )
+
+
+def _checked_options(
+    machine: Machine,
+    budget: float,
+    resolution: Resolution | Mapping[str, object] | str | None,
+    about: Project,
+) -> Resolution:
+    """The steps of the inverter; InputError with all that is wrong with the options."""
     mistakes, steps = Mistakes(), Resolution()
     if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < math.inf:
         mistakes.sentences.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")
@@ -331,62 +391,18 @@ def report(
                 "in its file."
             )
     mistakes.raise_if_any()
-    made = make_controllers(controllers, parameters or {})
+    return steps
+
+
+def _named_controllers(
+    controllers: Sequence[str | Controller] | None, parameters: Mapping[str, Mapping[str, object]]
+) -> list[Controller]:
+    """The controllers, each with a name of its own, `direct` among them."""
+    made = make_controllers(controllers, parameters)
     labels = [label_of(one) for one in made]
     if wrong := [one for one in dict.fromkeys(labels) if labels.count(one) > 1]:
         raise InputError(
             f"controllers: two of them are called {wrong[0]}; give one of the two another name (that of its "
             "file)."
         )
-    if REFERENCE not in labels:
-        made.append(make_controller(REFERENCE))
-
-    def show(share: float, what: str) -> None:
-        if progress is not None:
-            progress(share, what)
-
-    started: list[tuple[Controller, Row]] = []
-    at_soft_end: list[Row] = []
-    maps: dict[str, RobustnessMap] = {}
-    failed: list[tuple[str, str]] = []
-    reference, what = simulate(machine, REFERENCE), machine.WHAT.removeprefix("a ")
-    soft_reference = None if soft is None else simulate(soft, REFERENCE)
-    for number, one in enumerate(made):
-        show(0.5 * number / len(made), f"starting the {what} under {label_of(one)}")
-        try:
-            row = compared(machine, one, reference, drawn=drawn, soft=soft)
-            if soft is not None:
-                at_soft_end.append(compared(soft, one, soft_reference))
-            if mapped:
-                maps[row.name] = robustness(machine, one)
-            started.append((one, row))
-        except SimulationError as error:
-            if label_of(one) == REFERENCE:
-                raise
-            failed.append((label_of(one), " ".join(str(error).split())))
-    rows = tuple(row for _, row in started)
-    there = None if soft is None else Comparison(soft, tuple(at_soft_end))
-    choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case, soft_end=there), maps)
-    sheets: list[ParameterSheet] = []
-
-    def round_off() -> None:
-        import softstart.reporting.document  # noqa: F401  takes half a second, for which nobody waits here
-
-        for row in choice.of_sheets:
-            show(0.5, f"rounding the values of {row.name}")
-            controller = next(one for one, other in started if other is row)
-            sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn, soft))
-
-    found = limit(
-        machine,
-        [row.run.start_time for row in choice.of_sheets],
-        [row.run.start_time for row in rows if not math.isnan(row.run.start_time)],
-        choice.direct.run.start_time,
-        budget,
-        lambda share, text: show(0.5 + 0.5 * share, text),
-        meanwhile=round_off,
-    )
-    show(1.0, "done")
-    return Report(
-        machine, tuple(failed), found, choice, tuple(sheets), steps, provenance(machine, command), about
-    )
+    return made if REFERENCE in labels else [*made, make_controller(REFERENCE)]

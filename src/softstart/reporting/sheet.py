@@ -13,7 +13,7 @@ import numpy as np
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.controller.parameters import declared_parameters
-from softstart.drive import Drive
+from softstart.drive import Drive, Machine
 from softstart.drive.records import Records
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
@@ -222,7 +222,7 @@ class ParameterSheet(OneLine):
 
 
 def make_sheet(
-    machine: Any,
+    machine: Machine,
     controller: Controller,
     exact: Run,
     resolution: Resolution,
@@ -289,7 +289,7 @@ def _alone(count: int) -> list[tuple[int, ...]]:
 
 
 def _within_the_rule(
-    machine: Any, ready: Controller, own: Drive, varied: Sequence[Setting], row: Row | None,
+    machine: Machine, ready: Controller, own: Drive, varied: Sequence[Setting], row: Row | None,
     drawn: Records | None, soft: Drive | None,
 ) -> dict[str, float]:  # fmt: skip
     """The values at the steps nearest to the exact ones that keep what the row keeps.
@@ -317,7 +317,7 @@ def _within_the_rule(
 
 
 def _broken(
-    machine: Any, controller: Controller, own: Drive, row: Row, drawn: Records | None, soft: Drive | None
+    machine: Machine, controller: Controller, own: Drive, row: Row, drawn: Records | None, soft: Drive | None
 ) -> str:
     """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
     cases = tuple(case for case in row.worst_case if case in CASES)
@@ -329,7 +329,7 @@ def _broken(
     return next((str(one) for one in found.margins(limits) if before[one.name] and not one.kept), "")
 
 
-def _rises(drive: Drive, ready: Any, own: Drive, rated: float, step: float) -> dict[str, Any]:
+def _rises(drive: Machine, ready: Any, own: Drive, rated: float, step: float) -> dict[str, Any]:
     """The same ramp as other inverters ask for it; nothing where there is no rise."""
     share = (ready.full_torque - ready.initial) / rated
     if not (share > 0.0 and ready.time > 0.0):
@@ -348,7 +348,9 @@ def _rises(drive: Drive, ready: Any, own: Drive, rated: float, step: float) -> d
     return found
 
 
-def _half_steps_off(sheet: ParameterSheet, machine: Any, ready: Controller, corners: bool) -> ParameterSheet:
+def _half_steps_off(
+    sheet: ParameterSheet, machine: Machine, ready: Controller, corners: bool
+) -> ParameterSheet:
     """The sheet with the worst of the starts whose values are half a step off, and of that of the sheet."""
     varied, count, rounded = sheet.varied, len(sheet.varied), sheet.rounded
     assert rounded is not None

@@ -123,7 +123,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
     K_dyn: [G] (16).
     """
 
-    drive: Any
+    drive: Machine
     rows: tuple[Row, ...]
     fitted_to: Drive | None = None
     worst_case: tuple[str, ...] = CASES

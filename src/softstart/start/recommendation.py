@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Controller, Effort, effort_of, label_of
-from softstart.drive import Limit, Limits
+from softstart.drive import Limit, Limits, Machine
 from softstart.errors import Sentence
 from softstart.results import OneLine
 from softstart.start.fatigue import undamped, worst_damage
@@ -318,7 +318,7 @@ class Recommendation(OneLine):
         }
 
 
-def recommend(drive: Any, rows: Iterable[Row]) -> Recommendation:
+def recommend(drive: Machine, rows: Iterable[Row]) -> Recommendation:
     """The recommendation among the strategies started on a drive."""
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
@@ -341,7 +341,7 @@ def _pareto_set(able: Sequence[Row]) -> tuple[Row, ...]:
     return tuple(found)
 
 
-def checked_limits(drive: Any) -> Limits:
+def checked_limits(drive: Machine) -> Limits:
     """The limits of a drive, or chain, without a life that cannot be computed."""
     limits: Limits = drive.limits
     return replace(limits, life=None) if unchecked_life(drive) else limits
@@ -358,7 +358,7 @@ def margins_of(run: Run) -> tuple[Margin, ...]:
     return Row(run, None, worst_case=()).margins(checked_limits(run.drive))
 
 
-def unchecked_life(drive: Any) -> str:
+def unchecked_life(drive: Machine) -> str:
     """Why the life that is asked for is not checked; "" if it is, or if none is."""
     limits = drive.limits
     if limits.life is None:

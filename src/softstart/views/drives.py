@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from softstart.chain.model import Chain
-from softstart.drive import INFORMATIVE_TABLES
+from softstart.drive import INFORMATIVE_TABLES, Machine
 from softstart.quantities import Units
 from softstart.views.numbers import RPM, plural, printable, short
 
@@ -64,7 +64,7 @@ def drive_lines(machine: Any) -> list[str]:
     ]
 
 
-def _there(machine: Any) -> Iterator[str]:
+def _there(machine: Machine) -> Iterator[str]:
     """The same at the output of a gear."""
     if (gear := machine.gear) is not None:
         two, places = (
@@ -105,7 +105,7 @@ def _also(machine: Any) -> Iterator[str]:
         yield f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s"
 
 
-def curves(machine: Any) -> Iterator[str]:
+def curves(machine: Machine) -> Iterator[str]:
     """The load curves of a chain, in words."""
     for mass in machine.masses if isinstance(machine, Chain) else ():
         if mass.curve is not None:
@@ -114,7 +114,7 @@ def curves(machine: Any) -> Iterator[str]:
             yield f"load curve of {name} over its {over}, {len(points)} points"
 
 
-def controllers_set_up(machine: Any, fitted_to: Any) -> str:
+def controllers_set_up(machine: Machine | None, fitted_to: Machine) -> str:
     """For which machine the controllers are set up, and by what that differs from one that is given.
 
     >>> from softstart import Drive

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from softstart.drive import Machine
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
@@ -18,8 +19,8 @@ from softstart.views.starts import machine_lines
 
 SPECTRUM = ("range N m", "mean N m", "count")
 EQUIVALENT = (
-    "Equivalent torque: one cycle of it from 0 and back in each start does the same damage "
-    "(rainflow cycles after ASTM E1049, Miner's rule, without an endurance limit)."
+    "Damage-equivalent torque: one 0-T-0 cycle per start causes the same damage (rainflow cycles after ASTM "
+    "E1049, Miner's rule, no endurance limit)."
 )
 
 
@@ -58,7 +59,7 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
         (worn, "life over\ndirect, worn", "Life over that under direct, worn",
          lambda row: factor(row.worn_relative)),
         (worn and worn_years and not several, "years,\nworn", "", lambda row: counted(row.worn_years)),
-        (limited and several, "", "Largest torque, % of the permissible one",
+        (limited and several, "", "Largest torque, % of the permissible torque",
          lambda row: number(100.0 * row.utilisation, 1)),
     ]  # fmt: skip
     figures = [one for one in figures if one[0]]
@@ -81,28 +82,27 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
         "equivalent\ntorque N m": column_of([row.equivalent_torque for row in rows]),
         **{heading: list(map(cell, rows)) for _, heading, _, cell in figures},
         "impacts": [str(row.impacts) for row in rows],
-        "their\nenergy J": column_of([row.impact_energy for row in rows], 3),
+        "impact\nenergy J": column_of([row.impact_energy for row in rows], 3),
     }
     return [TextTable.of(title, cells, ("strategy",))]
 
 
 def fatigue_conclusion(found: Fatigue) -> str:
-    """Under which strategy the shaft that gains least lasts longest."""
+    """The strategy with the longest life of the shaft that gains least."""
     worn = not math.isnan(found.worn_gap)
 
     def life(row: Life) -> float:
         return row.worn_relative if worn else row.relative
 
-    least = [min(rows, key=life) for rows in found.by_run]
-    best = max([row for row in least if not math.isnan(row.start.start_time)] or least, key=life)
-    name, wears = best.run.controller_name, " while the gap wears" if worn else ""
+    shortest = [min(rows, key=life) for rows in found.by_run]
+    best = max([row for row in shortest if not math.isnan(row.start.start_time)] or shortest, key=life)
+    name, wear = best.run.controller_name, ", with wear" if worn else ""
     if name == REFERENCE:
-        return f"Longest life: direct{wears}."
-    shafts = len(found.drive.shaft_names)
-    where = f" in the shaft that gains least, {best.shaft_name}" if shafts > 1 else ""
-    text = f"Longest life: {name}, {factor(life(best))} times that of direct{where}{wears}"
+        return f"Longest life: direct{wear}."
+    where = f", shaft {best.shaft_name}" if len(found.drive.shaft_names) > 1 else ""
     years = best.worn_years if worn else best.years
-    return f"{text}." if math.isnan(years) else f"{text}, {counted(years)} years."
+    after = "" if math.isnan(years) else f", {counted(years)} years"
+    return f"Longest life: {name}, {factor(life(best))} times that of direct{where}{wear}{after}."
 
 
 def fatigue_notes(found: Fatigue) -> list[str]:
@@ -122,17 +122,16 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     if found.estimate:
         parts = " and ".join(f"{count} {name}" for name, count in found.estimate.items())
         damping = (
-            f"The damping is ESTIMATED: a ratio of {ratio} from {parts} (1 % a pair of gears, 0.5 % a "
-            "coupling, at most 6 %). Shown beside: the life with half and with twice of it."
+            f"Damping is estimated (ratio {ratio} from {parts}); lives are also given for half and twice the "
+            "estimate."
         )
     text = [f"{EQUIVALENT} {slope}.", damping]
     if worn:
         over = f"{limits.life / 3600.0 / HOURS_PER_YEAR:.3g} years" if limits.life else "the life"
         error = float(f"{100.0 * max(row.wear_error for row in found.rows):.1g}")
         text.append(
-            f"Worn: the gap grows in proportion to time from {short(float(drive.gaps.sum()))} to "
-            f"{short(found.worn_gap)} rad over {over}, and Miner's rule adds the damage; error of the sum at "
-            f"most {error:g} %."
+            f"Worn: the backlash grows linearly from {short(float(drive.gaps.sum()))} to "
+            f"{short(found.worn_gap)} rad over {over}; integration error at most {error:g} %."
         )
     if limits.starts_per_hour is not None and curve.points:
         text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
@@ -142,15 +141,15 @@ def fatigue_notes(found: Fatigue) -> list[str]:
             for rows in found.by_run:
                 hours = min(row.worn_hours if worn else row.hours for row in rows)
                 names[hours >= asked].append(rows[0].run.controller_name)
-            kept = f"{limits.starts:.3g} starts, is reached by: {', '.join(names[True]) or 'none'}"
-            missed = f"; not by: {', '.join(names[False])}" if names[False] else ""
-            text.append(f"The life asked for, {kept}{missed}.")
+            kept = f"{limits.starts:.3g} starts: reached by {', '.join(names[True]) or 'none'}"
+            missed = f"; not by {', '.join(names[False])}" if names[False] else ""
+            text.append(f"Required life, {kept}{missed}.")
     if len(drive.positions) > 1:
         worst = (
             f"{rows[0].run.controller_name} {'/'.join(sorted({row.run.position for row in rows}))}"
             for rows in found.by_run
         )
-        text.append(f"The start position is unknown: most damage is done from {', '.join(worst)}.")
+        text.append(f"The start position is unknown; largest damage from {', '.join(worst)}.")
     return text
 
 
@@ -185,7 +184,7 @@ def fatigue_figure(found: Fatigue) -> Any:
     return figure
 
 
-def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Any = None) -> Sheet:
+def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Machine | None = None) -> Sheet:
     """What is shown of lives; `rows` are its rows in another order."""
     files: dict[str, str | Writer] = {}
     stems: list[str] = []

@@ -39,7 +39,7 @@ def _lines(found: Identification) -> list[str]:
         return [f"{found.drive.name}: {found.drive.source}"]
     logs = f"{len(found.logs)} logs" if len(found.logs) > 1 else found.logs[0].name
     kinds = " and ".join(sorted({one.kind for one in found.logs}))
-    known = f"{sum(one.known for one in found.shared)} of {len(found.shared)} parameters are told by the logs"
+    known = f"{sum(one.known for one in found.shared)} of {len(found.shared)} parameters are identifiable"
     return [
         f"{found.drive.name}: identified from {logs}",
         f"  {sum(one.time.size for one in found.logs)} samples of torque and {kinds}; "
@@ -67,8 +67,8 @@ def estimates_table(found: Identification) -> TextTable:
             _digits(one.upper, one),
         ]
 
-    title = "Found, with intervals of 95 %" if found.stated else "Best fit, no intervals"
-    numbers = ("guess", "found", "+- %", "from", "to")
+    title = "Estimates with 95 % intervals" if found.stated else "Best fit, no intervals"
+    numbers = ("guess", "estimate", "+- %", "from", "to")
     return TextTable.of_rows(title, ("parameter", "unit"), numbers, list(map(row, found.estimates)))
 
 
@@ -89,7 +89,7 @@ def identification_sheet(
     """What is shown of an identification; `k_dyns`: K_dyn of strategies on its drive, with its interval."""
     each = sorted((k_dyns or {}).items(), key=lambda one: one[1][0])
     rows = [[name, *(number(value, 3) for value in three)] for name, three in each]
-    title = "K_dyn of the drive found" + (", with intervals of 95 %" if found.stated else "")
+    title = "K_dyn of the identified drive" + (", 95 % intervals" if found.stated else "")
     files: dict[str, str | Writer] = {"identification.json": lambda path: found.save(path.parent)}
     for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True), 1):
         columns = {"time [s]": log.time[np.isfinite(log.values)].tolist(), "drive - log": left.tolist()}
@@ -110,11 +110,11 @@ def identification_sheet(
 
 
 def identification_figure(found: Identification) -> Any:
-    """Each log beside the start of the drive found, and below what is left."""
+    """Each log beside the start of the drive found, and the residuals."""
     count = len(found.logs)
     with drawing():
         made, axes = new_figure(3, count, (4.5 + 3.5 * count, 6.0), squeeze=False, sharex="col")
-        entitle(made, f"{found.drive.name}: what was logged, and the start of the drive found")
+        entitle(made, f"{found.drive.name}: logs and simulated starts")
         for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
             seen, unit = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
             time, steps = log.time - log.time[0], "steps-post" if log.torque_is == "demand" else "default"
@@ -123,7 +123,7 @@ def identification_figure(found: Identification) -> Any:
             torque.plot(time, log.torque, color=COLOURS[0], drawstyle=steps)
             head(motion, "", f"{log.kind}, {unit}")
             motion.plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
-            motion.plot(time[seen], log.values[seen] + left, color=COLOURS[1], lw=1.0, label="drive found")
+            motion.plot(time[seen], log.values[seen] + left, color=COLOURS[1], lw=1.0, label="model")
             motion.legend(loc="best")
             head(rest, "", f"drive - log, {unit}", "time, s")
             rest.plot(time[seen], left, color=COLOURS[2], lw=0.8)
@@ -163,7 +163,9 @@ def plan_sheet(plan: ExperimentPlan) -> Sheet:
             f"{plan.ripple:.3g} N m in each",
         ],
         tables=[table],
-        conclusions=[f'"{plan.best.name}" tells most{f", and leaves {lost} unknown" if lost else ""}.'],
+        conclusions=[
+            f'Smallest intervals: "{plan.best.name}"{f"; {lost} not identifiable" if lost else ""}.'
+        ],
         figures={"experiments": partial(plan_figure, plan)},
         files=files,
         machine=plan.drive,

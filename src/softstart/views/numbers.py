@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from softstart.drive import Machine
 from softstart.quantities import Units
 
 NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
@@ -229,7 +230,7 @@ def unit(written: str) -> str:
     return UNITS.get(written, written.replace("*", " "))
 
 
-def units_of(machine: Any, named: str | None = None) -> Units:
+def units_of(machine: Machine, named: str | None = None) -> Units:
     """The units in which angles and speeds of a machine are seen: those that it names, else as it has them.
 
     `named`: instead of those that it names.
@@ -245,7 +246,7 @@ def units_of(machine: Any, named: str | None = None) -> Units:
 _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame
 
 
-def at_output(machine: Any, value: float, unit: str = "N*m") -> str:
+def at_output(machine: Machine, value: float, unit: str = "N*m") -> str:
     """A value of the motor shaft at the output of the gear, see `Drive.gear`; "" where it has none there.
 
     The `unit` is that of the parameter; the value may be in another one of its kind.
@@ -256,11 +257,12 @@ def at_output(machine: Any, value: float, unit: str = "N*m") -> str:
     ('6126', '290.0')
     """
     gear = machine.gear
-    none = gear is None or gear.factor(unit) is None
-    return "" if none else digits(float(gear.to_output(value, unit)))
+    if gear is None or gear.factor(unit) is None:
+        return ""
+    return digits(float(gear.to_output(value, unit)))
 
 
-def gear_in_words(machine: Any) -> str:
+def gear_in_words(machine: Machine) -> str:
     """How values are brought to the output of the gear of a machine, in a sentence; "" without one.
 
     >>> from softstart import Drive

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart import __version__
+from softstart.drive import Machine
 from softstart.views.drawing import save_figure, svg_of
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
@@ -79,8 +80,8 @@ class Sheet:
     no_figure: str = ""
     records: Sequence[Mapping[str, object]] = ()
     files: Mapping[str, str | Writer] = field(default_factory=dict)
-    machine: Any = None
-    fitted_to: Any = None
+    machine: Machine | None = None
+    fitted_to: Machine | None = None
     varied: bool = False
     behind: Sequence[str] = ()
     commands: Sequence[tuple[str, str]] = ()
@@ -199,7 +200,7 @@ def _machine(sheet: Sheet, folder: Path) -> tuple[str, list[str]]:
     return about, [f"## The {what}", *table_parts(_parameters(machine))]
 
 
-def _parameters(machine: Any) -> TextTable:
+def _parameters(machine: Machine) -> TextTable:
     """All parameters of a machine that are set."""
     rows = []
     for path, (parameter, value) in machine.parameters_by_path().items():

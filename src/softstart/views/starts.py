@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from softstart.controller.parameters import declared_parameters
-from softstart.drive import Drive
+from softstart.drive import Drive, Machine
 from softstart.drive.data_sheet_mechanics import BAND
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import Sentence
@@ -18,7 +18,7 @@ from softstart.start.recommendation import Recommendation, Row, checked_limits, 
 from softstart.start.run import SETTLING_PERIODS, Run, Stage
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import TextTable, column_of, label, number, short, with_unit
+from softstart.views.numbers import DataColumn, TextTable, column_of, label, number, short, with_unit
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 from softstart.views.traces import comparison_figure, draw_trade_off, run_figure, torques, trade_off_figure
 
@@ -33,7 +33,7 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 # one start -----------------------------------------------------------------------------------------------
 
 
-def machine_lines(machine: Any, fitted_to: Drive | None = None) -> list[str]:
+def machine_lines(machine: Machine, fitted_to: Machine | None = None) -> list[str]:
     """The machine in a few lines, what is doubted of it, and for which drive the controllers are set up."""
     return [
         *drive_lines(machine),
@@ -151,17 +151,17 @@ def _start_tables(run: Run) -> list[TextTable]:
 def shaft_table(run: Run) -> TextTable:
     """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
     own = run.peak_torques / run.drive.at_motor_shaft().torque_ratio
-    cells = {
-        "shaft": list(run.drive.shaft_names),
-        "K": [number(k, 4) for k in run.k_dyns.tolist()],
-        "over its\nown mean": [number(k, 4) for k in run.shaft_factors.tolist()],
-        "torque at\nmotor shaft\nN m": column_of(run.peak_torques.tolist()),
-        "torque at\nown shaft\nN m": column_of(own.tolist()),
-        "at s": column_of(run.peak_times.tolist(), 5),
-    }
+    columns = [
+        DataColumn("shaft", lambda k: run.drive.shaft_names[k]),
+        DataColumn("K", lambda k: float(run.k_dyns[k]), 4),
+        DataColumn("over its\nown mean", lambda k: float(run.shaft_factors[k]), 4),
+        DataColumn("torque at\nmotor shaft\nN m", lambda k: float(run.peak_torques[k])),
+        DataColumn("torque at\nown shaft\nN m", lambda k: float(own[k])),
+        DataColumn("at s", lambda k: float(run.peak_times[k]), digits=5),
+    ]
     if run.drive.limits:
-        cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
-    return TextTable.of("Shafts", cells, ("shaft",))
+        columns.append(DataColumn("of the\npermissible\n%", lambda k: 100.0 * float(run.utilisation[k]), 1))
+    return TextTable.of_data("Shafts", columns, range(len(run.drive.shaft_names)))
 
 
 def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
@@ -219,15 +219,6 @@ def what_it_does(run: Run) -> str:
 # a comparison --------------------------------------------------------------------------------------------
 
 
-class Figure(NamedTuple):
-    """A figure of a strategy in the tables of a comparison: with `decimals`, or `digits` significant ones."""
-
-    heading: str
-    of: Callable[[Row], float]
-    decimals: int | None = None
-    digits: int = 4
-
-
 def share_lost(row: Row) -> float:
     """Time lost until the load has settled, in per cent of the settled time of `direct`."""
     direct = row.run.settled_time - row.settled_lost
@@ -235,50 +226,53 @@ def share_lost(row: Row) -> float:
 
 
 PEAK_COLUMNS = (
-    Figure("K_dyn", lambda row: row.run.k_dyn, 3),
-    Figure("K\nworn", lambda row: row.k_dyn_worn_gap, 3),
-    Figure("K\nlight", lambda row: row.k_dyn_light_load, 3),
-    Figure("peak\nN m", lambda row: row.run.peak_torque),
+    DataColumn("K_dyn", lambda row: row.run.k_dyn, 3),
+    DataColumn("K\nworn", lambda row: row.k_dyn_worn_gap, 3),
+    DataColumn("K\nlight", lambda row: row.k_dyn_light_load, 3),
+    DataColumn("peak\nN m", lambda row: row.run.peak_torque),
 )
 INTERVALS = (
-    Figure("K_dyn\nfrom", lambda row: row.intervals["k_dyn"][0], 3),
-    Figure("K_dyn\nto", lambda row: row.intervals["k_dyn"][1], 3),
-    Figure("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
-    Figure("start\ntime to s", lambda row: row.intervals["start_time"][1]),
+    DataColumn("K_dyn\nfrom", lambda row: row.intervals["k_dyn"][0], 3),
+    DataColumn("K_dyn\nto", lambda row: row.intervals["k_dyn"][1], 3),
+    DataColumn("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
+    DataColumn("start\ntime to s", lambda row: row.intervals["start_time"][1]),
 )
-TIME_COLUMNS = (Figure("settled\ns", lambda row: row.run.settled_time), Figure("later\n%", share_lost, 1))
+TIME_COLUMNS = (
+    DataColumn("settled\ns", lambda row: row.run.settled_time),
+    DataColumn("later\n%", share_lost, 1),
+)
 TIMES = (
-    Figure("start\ntime s", lambda row: row.run.start_time),
-    Figure("start\nlater s", lambda row: row.time_lost, digits=3),
-    Figure("settled\nlater s", lambda row: row.settled_lost, digits=3),
+    DataColumn("start\ntime s", lambda row: row.run.start_time),
+    DataColumn("start\nlater s", lambda row: row.time_lost, digits=3),
+    DataColumn("settled\nlater s", lambda row: row.settled_lost, digits=3),
 )
 AT_THE_GAP = (
-    Figure("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
-    Figure("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
-    Figure("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
-    Figure("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
-    Figure("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
-    Figure("contacts", lambda row: row.run.contacts, 0),
+    DataColumn("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
+    DataColumn("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
+    DataColumn("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
+    DataColumn("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
+    DataColumn("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
+    DataColumn("contacts", lambda row: row.run.contacts, 0),
 )
 
 
-def at_details(machine: Any) -> tuple[Figure, ...]:
+def at_details(machine: Machine) -> tuple[DataColumn, ...]:
     """The figures of what happens at the gap; of several shafts each over its own mean torque."""
 
     def of_shaft(k: int) -> Callable[[Row], float]:
         return lambda row: float(row.run.shaft_factors[k])
 
-    used = Figure("torque\nused %", lambda row: row.run.used_torque, 1)
+    used = DataColumn("torque\nused %", lambda row: row.run.used_torque, 1)
     of_limit = [] if machine.limits.used_torque is None else [used]
     if len(machine.shaft_names) == 1:
         return (*AT_THE_GAP, *of_limit)
     headings = ("over mean\n" + name.replace(" - ", " -\n") for name in machine.shaft_names)
-    shafts = (Figure(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
+    shafts = (DataColumn(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
     return (*shafts, *of_limit, AT_THE_GAP[-1])
 
 
 def comparison_table(
-    rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "", bold: Sequence[int] = ()
+    rows: Sequence[Row], figures: Sequence[DataColumn] = (), title: str = "", bold: Sequence[int] = ()
 ) -> TextTable:
     """The strategies and these figures, by default all; beside K_dyn also flags and limits, where needed."""
     figures = figures or (
@@ -289,25 +283,20 @@ def comparison_table(
         *at_details(rows[0].run.drive),
     )
     judged = PEAK_COLUMNS[0] in figures
-    cells = {"strategy": [row.marked if judged else row.name for row in rows]}
-    for heading, of, decimals, digits in figures:
-        values = list(map(of, rows))
-        cells[heading] = (
-            column_of(values, digits) if decimals is None else [number(value, decimals) for value in values]
-        )
+    columns = [DataColumn("strategy", lambda row: row.marked if judged else row.name), *figures]
     if judged and any(row.against_limits for row in rows):
-        cells["limits"] = [row.against_limits for row in rows]
-    return TextTable.of(title, cells, ("strategy", "limits"), bold=bold)
+        columns.append(DataColumn("limits", lambda row: row.against_limits))
+    return TextTable.of_data(title, columns, rows, bold=bold)
 
 
-def at_soft_end(rows: Sequence[Row]) -> tuple[Figure, ...]:
+def at_soft_end(rows: Sequence[Row]) -> tuple[DataColumn, ...]:
     """K_dyn at the soft end of an unknown stiffness, if it is unknown."""
     heading = f"K\n{BAND[0]:g} Hz"
-    figure = Figure(heading, lambda row: row.cases[SOFT_END].k_dyn, 3)
+    figure = DataColumn(heading, lambda row: row.cases[SOFT_END].k_dyn, 3)
     return (figure,) if SOFT_END in rows[0].cases else ()
 
 
-def of_the_unknown(rows: Sequence[Row]) -> tuple[Figure, ...]:
+def of_the_unknown(rows: Sequence[Row]) -> tuple[DataColumn, ...]:
     """What is shown besides of a drive that is known within intervals, or whose stiffness is unknown."""
     return INTERVALS if rows[0].intervals else at_soft_end(rows)
 
@@ -366,7 +355,7 @@ def definitions(comparison: Comparison) -> list[str]:
     ]
     if checked_limits(comparison.drive):
         cases = ", ".join(("the machine as it is", *comparison.worst_case))
-        found.append(f"limits: the least margin in the worst of {cases}.")
+        found.append(f"limits: the smallest margin in the worst of {cases}.")
         if comparison.drive.limits.output_torque is not None:
             found.append(
                 "output torque: that of the shaft times the gear ratio, without losses, the safe side."
@@ -400,7 +389,9 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     machine = comparison.drive
     rows = rows or sorted(comparison.rows, key=lambda row: row.run.k_dyn)
     bold = [rows.index(row) for row in comparison.recommendation.shown]
-    parts: list[tuple[str, tuple[Figure, ...]]] = [("", (*PEAK_COLUMNS, *at_soft_end(rows), *TIME_COLUMNS))]
+    parts: list[tuple[str, tuple[DataColumn, ...]]] = [
+        ("", (*PEAK_COLUMNS, *at_soft_end(rows), *TIME_COLUMNS))
+    ]
     if rows[0].intervals:
         parts.append(("Intervals of 95 %", INTERVALS))
     if details:

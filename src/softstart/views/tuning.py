@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.drive.data_sheet_mechanics import BAND
+from softstart.errors import Sentence
 from softstart.tuning.question import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
 from softstart.views.numbers import (
     Column,
+    DataColumn,
     TextTable,
     at_output,
     column_of,
@@ -28,7 +30,7 @@ from softstart.views.starts import machine_lines
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from softstart.tuning.outcome import Tuning
+    from softstart.tuning.outcome import RobustSet, Tuning
 
 PRICES = {
     "robust_over_schedule": "one set / each cell tuned",
@@ -128,22 +130,31 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     return TextTable.of("Gains for each cell", columns, most=SHOWN, keys=2)
 
 
+def _robust_table(tuning: Tuning, robust: RobustSet) -> TextTable:
+    """The robust set beside the defaults."""
+    units = {one.name: one.unit for one in tuning.question.ranges}
+    columns = [
+        DataColumn("parameter", str),
+        DataColumn("default", lambda name: short(robust.defaults[name])),
+        DataColumn("robust", lambda name: short(robust.gains[name])),
+        DataColumn("unit", lambda name: label("", units[name], "")),
+        DataColumn(
+            "robust, at\nthe output", lambda name: at_output(tuning.drive, robust.gains[name], units[name])
+        ),
+    ]
+    names = list(robust.gains)
+    shown = columns if any(columns[-1].cells(names)) else columns[:-1]
+    texts = ("parameter", "unit")
+    return TextTable.of("One set for all", {one.heading: one.cells(names) for one in shown}, texts)
+
+
 def _tables(tuning: Tuning) -> Iterator[TextTable]:
     """The schedule, the robust set and its metric over the grid, and what it costs."""
     if tuning.schedule is not None:
         yield schedule_cells(tuning, tuning.schedule)
     if tuning.robust is not None:
-        found, units = tuning.robust, {one.name: one.unit for one in tuning.question.ranges}
-        there = [at_output(tuning.drive, value, units[name]) for name, value in found.gains.items()]
-        columns = {
-            "parameter": list(found.gains),
-            "default": [short(found.defaults[name]) for name in found.gains],
-            "robust": [short(value) for value in found.gains.values()],
-            "unit": [label("", units[name], "") for name in found.gains],
-        }
-        columns |= {"robust, at\nthe output": there} if any(there) else {}
-        yield TextTable.of("One set for all", columns, ("parameter", "unit"))
-        yield _grid(tuning, f"{_metric(tuning)} with this set", found.cells[tuning.metric])
+        yield _robust_table(tuning, tuning.robust)
+        yield _grid(tuning, f"{_metric(tuning)} with this set", tuning.robust.cells[tuning.metric])
     if tuning.price is not None and "robust_over_schedule" in tuning.price:
         title = "Price of robustness: one set over gains for each cell"
         yield _grid(tuning, title, tuning.price["robust_over_schedule"])
@@ -168,97 +179,97 @@ def _between(values: Any) -> str:
 def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
     name, metric, table, price = tuning.metric, _metric(tuning), tuning.schedule, tuning.price
-    one, found = tuning.robust, list[str]()
-    found += [f"Doubt: {one}" for one in tuning.plausibility_warnings]
+    one, quantile = tuning.robust, tuning.question.quantile
+    sentences = [f"Warning: {warning}" for warning in tuning.plausibility_warnings]
     shares = list[tuple[str, Any, Any]]()
     if table is not None:
-        late, before = int((~table["in_time"]).sum()), _between(table[f"{name}_default"])
-        end = f"{late} of {table['in_time'].size} cells start later than allowed" if late else "all in time"
-        found.append(
-            f"Gains for each cell: {metric} {_between(table[name])}, with the defaults {before}; {end}."
-        )
+        late = int((~table["in_time"]).sum())
+        timing = f"{late} of {table['in_time'].size} cells late" if late else "all in time"
         shares.append(("gains for each cell", table[name], table[f"{name}_default"]))
-    if one is not None:
-        kind = "at most" if tuning.question.quantile == 1.0 else f"quantile {tuning.question.quantile:g}"
-        end = "all in time" if one.feasible else f"{100 * one.excess:.1f} % later than allowed"
-        found.append(
-            f"One set for all: {metric} {kind} {one.worst:.3f}, with the defaults of the nominal drive "
-            f"{one.worst_default:.3f}; {end}; {one.agreement} of {one.restarts} searches agree."
+        sentences.append(
+            f"Gains for each cell: {metric} {_between(table[name])} (defaults "
+            f"{_between(table[f'{name}_default'])}); {timing}."
         )
+    if one is not None:
+        kind = "at most" if quantile == 1.0 else f"quantile {quantile:g}"
+        timing = "all in time" if one.feasible else f"{100 * one.excess:.1f} % late"
         shares.append(("one set for all", one.worst, one.worst_default))
+        sentences.append(
+            f"One set for all: {metric} {kind} {one.worst:.3f} (defaults of the nominal drive "
+            f"{one.worst_default:.3f}); {timing}; {one.agreement} of {one.restarts} "
+            "searches agree."
+        )
         if one.ends is not None:
-            at_ends = " and ".join(
+            end = "stiff" if one.ends[0] >= one.ends[1] else "soft"
+            ends = " and ".join(
                 f"{worst:.3f} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
             )
-            end = "stiff" if one.ends[0] >= one.ends[1] else "soft"
-            found.append(f"With this set {metric} is {kind} {at_ends}: the {end} end decides.")
+            sentences.append(f"One set at both ends of the stiffness: {ends}. The {end} end is critical.")
     if tuning.question.metric == MARGIN:
-        margins = []
-        for what, *both in shares:
-            left, by_default = (100.0 * (1.0 - float(np.max(share))) for share in both)
-            kept = "kept" if left >= 0.0 else "not kept"
-            margins.append(f"{what} {left:.3g} %, {kept} (with the defaults {by_default:.3g} %)")
-        found.append(f"Least margin to the limits: {'; '.join(margins)}.")
-    ratios = []
-    for ratio, title in PRICES.items():
-        if price is not None and ratio in price:
-            missing = int(price[ratio].isnull().sum())
-            without = (
-                f" ({missing} of {price[ratio].size} cells not in time, or without an optimum)"
-                if missing
-                else ""
-            )
-            ratios.append(f"{title} {_between(price[ratio])}{without}")
-    return [*found, f"Ratios of {metric}: {'; '.join(ratios)}."] if ratios else found
+        margins = (
+            f"{what} {100.0 * (1.0 - float(np.max(tuned))):.3g} % (defaults "
+            f"{100.0 * (1.0 - float(np.max(default))):.3g} %)"
+            for what, tuned, default in shares
+        )
+        sentences.append(f"Smallest margin to the limits: {'; '.join(margins)}.")
+    ratios = [
+        f"{title} {_between(price[ratio])}"
+        for ratio, title in PRICES.items()
+        if price is not None and ratio in price
+    ]
+    return [*sentences, f"Ratios of {metric}: {'; '.join(ratios)}."] if ratios else sentences
 
 
 def tuning_notes(tuning: Tuning) -> list[str]:
-    """What the columns mean, and how sure the search is."""
-    found, drive, q = [], tuning.drive, tuning.question
+    """What the columns mean, and how reliable the search is."""
+    drive, q, price, notes = tuning.drive, tuning.question, tuning.price, list[str]()
     if len(drive.mass_names) > 2:
         load = drive.mass_names[drive.load_index]
-        found.append(f"gap: all gaps together, at the motor shaft; J2: inertia of {load} at its own shaft.")
+        notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")
     if q.soft is not None:
-        found.append(
-            f"No stiffness is known. Gains are set up for the stiff end of what is usual, elastic frequency "
-            f"{BAND[1]:g} Hz, and judged there and at {BAND[0]:g} Hz. Once it is known, give "
-            "shaft.elastic_frequency or a stiffness, and tune again."
+        notes.append(
+            Sentence(
+                f"No stiffness is known. Gains are set up for an elastic frequency of {BAND[1]:g} Hz, the "
+                f"stiff end of the usual range, and evaluated there and at {BAND[0]:g} Hz.",
+                "When it is known, give shaft.elastic_frequency or a stiffness, and tune again.",
+            )
         )
     if tuning.schedule is not None:
         sure = int((tuning.schedule["agreement"] == q.restarts).sum())
-        found.append(
+        notes.append(
             f"Searches agree: within 1 % of the best; all {q.restarts} do in {sure} of {len(q.cells)} cells."
         )
         if not bool(tuning.schedule["in_time"].all()):
-            found.append("Cells that are not in time have the least delay that was found.")
+            notes.append("Late cells have the smallest delay found.")
     if tuning.between is not None:
         beyond = 100 * float(tuning.between["excess"].max())
-        found.append(
+        notes.append(
             f"Half way between the cells, with interpolated gains: {_metric(tuning)} "
-            f"{_between(tuning.between[tuning.metric])}, up to {beyond:.1f} % beyond the bound on the start "
-            "time."
+            f"{_between(tuning.between[tuning.metric])}, at most {beyond:.1f} % late."
         )
-    if tuning.price is not None and "robust_over_schedule" in tuning.price:
-        robust, each = (np.asarray(tuning.price[f"{side}_bound"]) for side in ("robust", "schedule"))
+    if price is not None and "robust_over_schedule" in price:
+        robust, each = (np.asarray(price[f"{side}_bound"]) for side in ("robust", "schedule"))
         known = np.isfinite(robust) & np.isfinite(each)
-        apart = float(np.max(np.abs(robust[known] / each[known] - 1.0), initial=0.0))
-        if apart > SAME_TIME:
-            found.append(
-                "One set and each cell tuned are held to different start times: those of the defaults of the "
-                f"nominal drive, and of each cell. They are up to {100.0 * apart:.1f} % apart."
+        difference = float(np.max(np.abs(robust[known] / each[known] - 1.0), initial=0.0))
+        if difference > SAME_TIME:
+            notes.append(
+                "Permitted start times: one set, that of the defaults of the nominal drive; each cell tuned, "
+                f"that of the defaults there. They differ by up to {100.0 * difference:.1f} %."
             )
-    if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
-        optimum = "the cell's drive, its motor without lag, dead time and noise; terminal reached"
-        found.append(f"Optimum: {optimum}.")
+    for ratio, title in PRICES.items():
+        if price is not None and ratio in price and (missing := int(price[ratio].isnull().sum())):
+            notes.append(f"{title}: {missing} of {price[ratio].size} cells late or without an optimum.")
+    if price is not None and any("optimum" in str(name) for name in price):
+        notes.append("Optimum: drive of the cell, motor without lag, dead time and noise; terminal reached.")
     if drive.gear is not None:
         gaps, inertias = (
-            " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
+            " to ".join(dict.fromkeys(at_output(drive, value, unit) for value in (axis[0], axis[-1])))
             for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
         )
-        found.append(
+        notes.append(
             f"Gaps at the output: {gaps} rad, load inertias there: {inertias} kg m2. {gear_in_words(drive)}"
         )
-    return [*found, *([f"{plural(tuning.starts, 'start')}."] if tuning.starts else [])]
+    return [*notes, *([f"{plural(tuning.starts, 'start')}."] if tuning.starts else [])]
 
 
 def tuning_sheet(tuning: Tuning) -> Sheet:

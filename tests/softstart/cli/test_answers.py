@@ -182,7 +182,7 @@ SHOWN = {
     "compare --controllers direct,ramp --until 0.05": ["direct (does not reach the target speed)"],
     LIVES + " --worn-gap 2rad": ["Longest life: s-curve", "Damping ratio of the shaft: 15 %"],
     "fatigue crane-4-mass --estimate-damping gears=3,couplings=2 --controllers direct,s-curve": [
-        "The damping is ESTIMATED: a ratio of 4 % from 3 gears and 2 couplings",
+        "Damping is estimated (ratio 4 % from 3 gears and 2 couplings)",
         "Life over that under direct",
     ],
     ANCHOR: ["method closed-form", "0.909247", "optimality gap"],
@@ -307,7 +307,7 @@ def test_a_log_becomes_a_drive_file(run, tmp_path):
     result = run("identify", "a.csv", "--drive", "guess.toml", "--torque-is", "demand", "--restarts", "3",
                  "--out", "found")  # fmt: skip
     assert result.code == 0, result.err
-    assert "7 of 7 parameters are told" in result.out
+    assert "7 of 7 parameters are identifiable" in result.out
     drive = Drive.load(tmp_path / "found" / "drive.toml")
     assert drive.gap == pytest.approx(0.08, rel=0.03)
     assert drive.source.startswith("identified from a.csv")

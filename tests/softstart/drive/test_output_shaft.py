@@ -294,7 +294,7 @@ def test_a_tuning_that_leaves_the_drive_out_is_doubted() -> None:
         "the gap of the drive, 0.099746 rad, lies outside those tuned over, 0.001309 to 0.002618 rad:"
     )
     assert inertia.startswith("the load inertia of the drive, ")
-    assert [one[:14] for one in conclusions(beside)][:2] == ["Doubt: the gap", "Doubt: the loa"]
+    assert [one[:16] for one in conclusions(beside)][:2] == ["Warning: the gap", "Warning: the loa"]
     assert beside.summary()["plausibility_warnings"] == beside.plausibility_warnings
     within = tune(drive, name, ["4.5 arcmin at output", "9 arcmin at output"], ["1x"], **quick)
     assert within.plausibility_warnings == []

@@ -58,7 +58,7 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     assert said.text.advice == "For a recommendation, give [limits] in the drive file."
     assert "[limits]" not in hostile.answer
     page = Page(hostile.to_html()).text
-    assert "no limits, so nothing says which peak is low enough" in page
+    assert "no limits, so the permissible peak is unknown" in page
     assert hostile.answer in page
 
 
@@ -130,7 +130,7 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
         for harm in ({"worst_k_dyn": share * k}, {"slowest": share * time}):
             assert said("With values half a step off", **calm | harm) == told
     for share, told in ((0.9951, False), (0.9949, True)):
-        assert said("the gentlest start known has", known=share, **calm) == told
+        assert said("the lowest K_dyn known is", known=share, **calm) == told
     for step, coarse in ((0.099, False), (0.101, True)):
         assert Setting("time", "", "s", 1.0, 1.0, step).coarse == coarse
 
@@ -177,8 +177,8 @@ def test_an_optimum_that_is_found_stands_between_bound_and_strategy(monkeypatch)
     row = Page(made.to_html()).rows("times the bound")[best.name]
     assert row["lowest known in that time"] == f"{known:.3f} (optimum)"
     assert float(row["times the bound"]) == pytest.approx(own / bound, abs=5e-3)
-    assert "; the gentlest start known has" in made.answer
-    assert made.summary()["k_dyn_gentlest_known"] == known
+    assert "; the lowest K_dyn known is" in made.answer
+    assert made.summary()["k_dyn_lowest_known"] == known
 
 
 def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostile):
