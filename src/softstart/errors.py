@@ -57,10 +57,10 @@ class InputError(ValueError):
     """
 
     def __init__(self, sentences: Iterable[str] | str) -> None:
-        found = [sentences] if isinstance(sentences, str) else list(sentences)
-        if len(found) > MOST + 1:
-            found[MOST:] = [f"{len(found) - MOST} more errors."]
-        self.sentences: tuple[str, ...] = tuple(map(_readable, found))
+        texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        if len(texts) > MOST + 1:
+            texts[MOST:] = [f"{len(texts) - MOST} more errors."]
+        self.sentences: tuple[str, ...] = tuple(map(_readable, texts))
         super().__init__("\n".join(self.sentences))
 
 

@@ -296,8 +296,8 @@ class DirectStarts:
         J = self._J1 + self._J2
         w2 = (self._excess * t - self._J1 * v) / J  # J1 w1 + J2 w2 = (Ms - Mc) t
         phi2 = (self._excess * t**2 / 2 - self._J1 * (theta - self._theta0)) / J
-        found = _alike(phi2 + theta, phi2, w2 + v, w2, np.where(closed, T, 0))
-        return dict(zip(("phi1", "phi2", "w1", "w2", "T"), found, strict=True))
+        values = _alike(phi2 + theta, phi2, w2 + v, w2, np.where(closed, T, 0))
+        return dict(zip(("phi1", "phi2", "w1", "w2", "T"), values, strict=True))
 
     def gap_events(self, until: ArrayLike) -> Value:
         """How often the gap has closed or opened by the time `until` in s; a graze of a flank is no event.

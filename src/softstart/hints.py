@@ -86,10 +86,10 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
         return None
     plain, folded = name.casefold(), {one.casefold(): one for one in reversed(list(valid))}
     most = min(max(1, len(plain) // LETTERS_A_SLIP), len(plain) - 1)
-    found = {one: slips(plain, one, most) for one in folded}
-    least = min(found.values(), default=most + 1)
+    distances = {one: slips(plain, one, most) for one in folded}
+    least = min(distances.values(), default=most + 1)
     if least <= most:  # of those that are as near the one that begins alike, the last in the alphabet
-        near = [one for one in folded if found[one] == least]
+        near = [one for one in folded if distances[one] == least]
         return folded[max(near, key=lambda one: (one[:1] == plain[:1], one))]
     parts = wholes(name, folded.values())
     return parts[0] if len(parts) == 1 else None

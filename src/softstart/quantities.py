@@ -236,11 +236,11 @@ def without_powers(text: str) -> str:
     >>> without_powers("350x10^-4 kg*m^2"), without_powers("3.5·10⁻² kg m²"), without_powers("5 N*m")
     ('350e-4 kg*m^2', '3.5e-2 kg m²', '5 N*m')
     """
-    found = _POWER_OF_TEN.match(text.replace("\N{MINUS SIGN}", "-"))
-    if found is None:
+    match = _POWER_OF_TEN.match(text.replace("\N{MINUS SIGN}", "-"))
+    if match is None:
         return text
-    exponent = next(filter(None, found.groups()[1:])).translate(_SUPERSCRIPTS)
-    return f"{found[1]}e{exponent}{text[found.end() :]}"
+    exponent = next(filter(None, match.groups()[1:])).translate(_SUPERSCRIPTS)
+    return f"{match[1]}e{exponent}{text[match.end() :]}"
 
 
 class RefusedError(ValueError):
@@ -287,9 +287,9 @@ def number_in(unit: str, value: object, name: str) -> float:
     Traceback (most recent call last):
     softstart.errors.InputError: until = [0.1, 0.2]: this is a list; give a single value.
     """
-    found = to_si(value, unit, name=name)
-    if isinstance(found, float):
-        return found
+    number = to_si(value, unit, name=name)
+    if isinstance(number, float):
+        return number
     raise InputError(f"{name} = {show(value)}: this is a list; give a single value.")
 
 
@@ -317,8 +317,10 @@ def multiplied(value: Any, name: str, units: Mapping[str, float]) -> Any:
     >>> multiplied("5 J1", "inertia", {"x": 0.175, "J1": 0.035}), multiplied("2 ms", "time", {"x": 0.5})
     (0.175, '2 ms')
     """
-    found = read_multiple(value, name, units)
-    return value if found is None else float(f"{found[0] * units[found[1]]:.12g}")  # 5 x 0.035 is 0.175
+    multiple = read_multiple(value, name, units)
+    return (
+        value if multiple is None else float(f"{multiple[0] * units[multiple[1]]:.12g}")
+    )  # 5 x 0.035 is 0.175
 
 
 def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
@@ -402,15 +404,15 @@ class Units(NamedTuple):
         >>> Units.read("", [0.06981317007977318], [92.1533845053006])
         Units(angle='deg', speed='rpm', diameter=0.0)
         """
-        found: dict[str, Any] = {}
+        fields: dict[str, Any] = {}
         for part in filter(None, (one.strip() for one in text.split(","))):
             arc = re.fullmatch(r"mm\s+on\s+(.+)", part)
             if arc:
-                found |= {"angle": "mm", "diameter": parse(arc[1], "m")}
-                if not found["diameter"] > 0.0:
+                fields |= {"angle": "mm", "diameter": parse(arc[1], "m")}
+                if not fields["diameter"] > 0.0:
                     raise RefusedError("the diameter of the pitch circle must be above 0")
             elif same := _same_unit(part):
-                found |= same
+                fields |= same
             else:
                 raise RefusedError(
                     f'{show(part)} is no unit of an angle or a speed; write for example "deg, rpm", or '
@@ -418,8 +420,8 @@ class Units(NamedTuple):
                 )
         for key, si, values in (("angle", "rad", angles), ("speed", "rad/s", speeds)):
             written = {shortest(value, si).partition(" ")[2] for value in values if value}
-            found.setdefault(key, written.pop() or si if len(written) == 1 else si)
-        return cls(**found)
+            fields.setdefault(key, written.pop() or si if len(written) == 1 else si)
+        return cls(**fields)
 
     @property
     def text(self) -> str:
@@ -555,26 +557,26 @@ def _factor(written: str, number: str, unit: str) -> float:
     if ordinary := ORDINARY.get((written, unit)):
         return ordinary
     quantity = _quantity(unit)
-    found = read_unit(written)
-    if isinstance(found, str):
-        raise RefusedError(f"{found}; {_remedy(unit)}")
+    source = read_unit(written)
+    if isinstance(source, str):
+        raise RefusedError(f"{source}; {_remedy(unit)}")
     pounds = _AS_FORCE.sub(r"\1f", written)  # of torque, as in lb-ft, in-lb and oz-in
     moment = _known("N*m^2")
     if (
         unit == "kg*m^2"
-        and found.dimensions == moment.dimensions
+        and source.dimensions == moment.dimensions
         and not re.search("lb|oz|pound|ounce", written)
     ):
-        return found.size / moment.size / (4.0 * GRAVITY)  # GD^2: a weight on the square of a diameter
-    if unit == "rad/s" and "min" in written and found.dimensions == _known("Hz").dimensions:
-        found = Unit(found.size * 2.0 * math.pi, _known(unit).dimensions)  # 1/min: revolutions, ISO 80000-3
+        return source.size / moment.size / (4.0 * GRAVITY)  # GD^2: a weight on the square of a diameter
+    if unit == "rad/s" and "min" in written and source.dimensions == _known("Hz").dimensions:
+        source = Unit(source.size * 2.0 * math.pi, _known(unit).dimensions)  # 1/min: revolutions, ISO 80000-3
     forms = [_known(form) for form in (unit, *quantity.others)]
-    for read, wanted in itertools.product((found, read_unit(pounds)), forms):
+    for read, wanted in itertools.product((source, read_unit(pounds)), forms):
         if isinstance(read, Unit) and wanted.dimensions == read.dimensions:
             factor = read.size / wanted.size
             decimal = float(f"{factor:.12g}")  # 9.80665 stays 9.80665 whatever order pint multiplied in
             return decimal if abs(factor - decimal) <= 1e-15 * factor else factor
-    raise RefusedError(_wrong_kind(written, number, found, quantity))
+    raise RefusedError(_wrong_kind(written, number, source, quantity))
 
 
 def _wrong_kind(written: str, number: str, found: Unit, quantity: Quantity) -> str:
@@ -604,10 +606,10 @@ def _quantity(unit: str) -> Quantity:
 
 
 def _known(unit: str) -> Unit:
-    found = read_unit(unit)
-    if isinstance(found, str):
-        raise InputError(f'unit = "{unit}": {found}.')
-    return found
+    known = read_unit(unit)
+    if isinstance(known, str):
+        raise InputError(f'unit = "{unit}": {known}.')
+    return known
 
 
 def _remedy(unit: str) -> str:

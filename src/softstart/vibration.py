@@ -237,9 +237,9 @@ def shapes(J: Vector, c: Vector, Omega: Vector) -> Matrix:
     >>> shapes(J, c, elastic_frequencies(J, c)).round(12)
     array([[ 1.        , -0.33333333]])
     """
-    found = np.ones((Omega.size, J.size))
+    amplitudes = np.ones((Omega.size, J.size))
     forth, back = (J.tolist(), c.tolist()), (J[::-1].tolist(), c[::-1].tolist())
-    for x, square in zip(found, (Omega * Omega).tolist(), strict=True):  # x: a view of the row
+    for x, square in zip(amplitudes, (Omega * Omega).tolist(), strict=True):  # x: a view of the row
         before, rise = _holzer(*forth, square)
         behind, fall = _holzer(*back, square)
         meet = int(np.nanargmin(np.abs(square * J + np.array(before) + np.array(behind[::-1])) / J))
@@ -247,8 +247,8 @@ def shapes(J: Vector, c: Vector, Omega: Vector) -> Matrix:
             x[k - 1] = x[k] / rise[k]
         for k in range(meet + 1, J.size):
             x[k] = x[k - 1] / fall[-k]
-    largest = np.argmax(np.abs(found), axis=1)[:, None]
-    scaled: Matrix = found / np.take_along_axis(found, largest, axis=1)
+    largest = np.argmax(np.abs(amplitudes), axis=1)[:, None]
+    scaled: Matrix = amplitudes / np.take_along_axis(amplitudes, largest, axis=1)
     return scaled
 
 

@@ -67,8 +67,8 @@ class ChainArrays:
     @property
     def held(self) -> int | None:
         """The mass that stays at rest, of infinite inertia."""
-        found = np.flatnonzero(np.isinf(self.J))
-        return int(found[0]) if found.size else None
+        infinite = np.flatnonzero(np.isinf(self.J))
+        return int(infinite[0]) if infinite.size else None
 
     @property
     def moving_J(self) -> Vector:
@@ -169,7 +169,7 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
     swings on this shaft when all others are cut.
     """
     welded = [shaft.rigid and shaft.gap == 0.0 for shaft in shafts]
-    found = np.zeros(len(shafts))
+    dampings = np.zeros(len(shafts))
     for k, shaft in enumerate(shafts):
         if shaft.damping_ratio:
             first, last = k, k + 1
@@ -179,8 +179,8 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
                 last += 1
             before, after = float(J[first : k + 1].sum()), float(J[k + 1 : last + 1].sum())
             both = before * after / (before + after) if math.isfinite(before + after) else min(before, after)
-            found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * both)
-    return found
+            dampings[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * both)
+    return dampings
 
 
 def _twists(chain: Chain, gap: Vector, c: Vector, pulls: Vector) -> Vector:

@@ -184,10 +184,10 @@ def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Colu
     whole = machine.machine
     if isinstance(whole, Chain):
         return _chains(machine, values)
-    found = Records.of(whole, change(Columns.of(machine.parts[0]), **values))
-    if not found.fields:
+    table = Records.of(whole, change(Columns.of(machine.parts[0]), **values))
+    if not table.fields:
         raise InputError(SINGLE)
-    return found
+    return table
 
 
 def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
@@ -195,15 +195,15 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     chain: Chain = chains.machine
     wrong, read = list[str](), dict[str, Any]()
     for key, value in values.items():
-        found = chain.parameter_value(key)
-        if found is None:
+        parameter = chain.parameter_value(key)
+        if parameter is None:
             wrong.append(chain.no_such(key, value))
             continue
         try:
-            read[found.name] = read_value(found.parameter, value, batch=True, gear=chain.gear_with())
+            read[parameter.name] = read_value(parameter.parameter, value, batch=True, gear=chain.gear_with())
         except RefusedError as refusal:
-            wording = Wording(written={found.parameter.name: key})
-            wrong.append(wording.refused(found.parameter, value, refusal))
+            wording = Wording(written={parameter.parameter.name: key})
+            wrong.append(wording.refused(parameter.parameter, value, refusal))
     arrays = {name: value for name, value in read.items() if isinstance(value, np.ndarray)}
     arrays = {**chains.fields, **arrays}
     shapes = ", ".join(f"{name} has shape {value.shape}" for name, value in arrays.items())

@@ -160,8 +160,8 @@ class Chain(Machine):
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
-        own = {"masses": masses, "shafts": shafts, "motor": motor, "load_mass": load_mass}
-        vars(self).update(own, name=name, source=source, assumed=assumed, units=units)
+        parts = {"masses": masses, "shafts": shafts, "motor": motor, "load_mass": load_mass}
+        vars(self).update(parts, name=name, source=source, assumed=assumed, units=units)
         vars(self).update(target_speed=start["target_speed"], position=start["position"])
 
     # ---- where chains come from --------------------------------------------------------------------------
@@ -185,24 +185,24 @@ class Chain(Machine):
         True
         """
         try:
-            found = read_document(text, TABLES, "a chain", where=where, also=also)
+            tables = read_document(text, TABLES, "a chain", where=where, also=also)
         except InputError as error:
             branched = [BRANCHES] if any(map(BRANCHING.search, error.sentences)) else []
-            told = [one + OWN_LIMITS * bool(OF_A_DRIVE.search(one)) for one in error.sentences]
-            raise InputError([*told, *branched]) from None
+            sentences = [one + OWN_LIMITS * bool(OF_A_DRIVE.search(one)) for one in error.sentences]
+            raise InputError([*sentences, *branched]) from None
         before = f"{where}: " if where else ""
         wrong: list[str] = []
-        start: dict[str, Any] = found["start"] or {}
+        start: dict[str, Any] = tables["start"] or {}
         parts: dict[str, Any] = {
             name: [
                 construct(part, row, f"{before}[{table}] {i}, ", wrong)
-                for i, row in enumerate(found[table], 1)
+                for i, row in enumerate(tables[table], 1)
             ]
             for name, table, part in (("masses", "mass", Mass), ("shafts", "shaft", Shaft))
         }
-        parts["motor"] = found["motor"] and construct(Motor, found["motor"], f"{before}[motor], ", wrong)
+        parts["motor"] = tables["motor"] and construct(Motor, tables["motor"], f"{before}[motor], ", wrong)
         parts |= {"load_mass" if key == "load" else key: value for key, value in start.items()}
-        chain = None if wrong else construct(cls, parts | found[""], before, wrong)
+        chain = None if wrong else construct(cls, parts | tables[""], before, wrong)
         if chain is None:
             raise InputError(wrong)
         return chain
@@ -705,13 +705,13 @@ class Chain(Machine):
             )
             for s, c, d, gap, most, theta0 in rows
         ]
-        here = at.speed_ratio[self.motor_index] == 1.0
+        motor_stays = at.speed_ratio[self.motor_index] == 1.0
         return replace(
             self,
             masses=tuple(masses),
             shafts=tuple(shafts),
-            motor=self.motor if here else None,
-            target_speed=self.target_speed if here else None,
+            motor=self.motor if motor_stays else None,
+            target_speed=self.target_speed if motor_stays else None,
             position=self.position if placed else "mid-gap",
         )
 

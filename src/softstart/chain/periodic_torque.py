@@ -74,8 +74,8 @@ class PeriodicTorque:
     def at_angle(self, phi: ArrayLike) -> Vector:
         """The torque in N m at crank angles in rad."""
         phase = np.multiply.outer(np.asarray(phi, dtype=np.float64), self.orders)
-        found: Vector = self.mean + np.cos(phase) @ self.cosine + np.sin(phase) @ self.sine
-        return found
+        torque: Vector = self.mean + np.cos(phase) @ self.cosine + np.sin(phase) @ self.sine
+        return torque
 
     @property
     def frequencies(self) -> Vector:

@@ -222,21 +222,21 @@ def two_mass_error(
     drive = chain.design_drive if drive is None else drive
     verified, failed = [], {}
     for one in ready_controller_names() if controllers is None else controllers:
-        made = make_controller(one)
+        controller = make_controller(one)
         try:
-            made.set_up(drive)
+            controller.set_up(drive)
         except InputError:
             if controllers is not None:
                 raise
             continue
         try:
-            done = verify_on_chain(chain, drive, made)
+            done = verify_on_chain(chain, drive, controller)
         except SimulationError as error:
-            failed[made.name] = str(error)
+            failed[controller.name] = str(error)
             continue
         verified.append(done)
         if math.isnan(done.chain.start_time) and not math.isnan(done.drive.start_time):
-            failed[made.name] = done.chain.status.value
+            failed[controller.name] = done.chain.status.value
     return TwoMassError(drive, tuple(verified), _error_of_torques(chain, drive), failed)
 
 

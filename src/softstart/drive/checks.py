@@ -62,11 +62,11 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
         if isinstance(value, str):
             return f"{label} = {show(value)}"
         array = np.asarray(value)
-        own = tuple(
+        position = tuple(
             0 if n == 1 else i for n, i in zip(array.shape, index[len(index) - array.ndim :], strict=True)
         )
-        place = f"[{', '.join(map(str, own))}]" if own else ""
-        return f"{label}{place} = {float(array[own]):.6g} {parameters[name].unit}"
+        place = f"[{', '.join(map(str, position))}]" if position else ""
+        return f"{label}{place} = {float(array[position]):.6g} {parameters[name].unit}"
 
     for name, other, rule, reason in RULES:
         wrong = rule(given)

@@ -210,10 +210,10 @@ class DataSheet(ParameterSet):
         >>> DataSheet.describes({"load": {"machine": "hoist"}}), DataSheet.describes({"load": {"torque": 7}})
         (True, False)
         """
-        own = {p.path for p in cls.PARAMETERS.values()} - {p.path for p in Drive.PARAMETERS.values()}
+        sheet_paths = {p.path for p in cls.PARAMETERS.values()} - {p.path for p in Drive.PARAMETERS.values()}
         tables = {name: keys for name, keys in document.items() if isinstance(keys, dict)}
         of_drive = {"stiffness", "gap"} & tables.get("shaft", {}).keys()
-        keys_of_a_sheet = any(f"{name}.{key}" in own for name, keys in tables.items() for key in keys)
+        keys_of_a_sheet = any(f"{name}.{key}" in sheet_paths for name, keys in tables.items() for key in keys)
         return not of_drive and (keys_of_a_sheet or bool({"coupling", "output", "rope"} & document.keys()))
 
     def to_toml(self) -> str:
@@ -262,27 +262,27 @@ class DataSheet(ParameterSet):
     @cached_property
     def assumed(self) -> dict[str, str]:
         """What nobody gave and is filled in, by parameter, as it is said; and what was read as per cent."""
-        given, found = self.given(), dict[str, str]()
+        given, assumptions = self.given(), dict[str, str]()
         if not {"starting_torque", "starting_ratio"} & given.keys():
-            found["starting_ratio"] = f"starting torque {self.starting_ratio:g} times the rated torque"
+            assumptions["starting_ratio"] = f"starting torque {self.starting_ratio:g} times the rated torque"
         if "efficiency" not in given and "ratio" in given:
-            found["efficiency"] = f"efficiency {self.efficiency:g}"
+            assumptions["efficiency"] = f"efficiency {self.efficiency:g}"
         if not {"coupling_play", "backlash", "output_play"} & given.keys():
-            found["backlash"] = "no backlash"
+            assumptions["backlash"] = "no backlash"
         if not STIFFNESSES & given.keys():
             usual = f"{BAND[0]:g} to {BAND[1]:g} Hz of most drives with gears"
-            found["stiffness"] = f"elastic frequency {BAND[1]:g} Hz, the stiff end of the {usual}"
+            assumptions["stiffness"] = f"elastic frequency {BAND[1]:g} Hz, the stiff end of the {usual}"
         elif self.machine == "hoist" and not ROPE & given.keys():
-            found["rope"] = "rigid rope"
+            assumptions["rope"] = "rigid rope"
         if "rope_diameter" in given:
             more = "" if "rope_modulus" in given else f"modulus {self.rope_modulus / 1e9:g} GPa on a "
-            found["rope_modulus"] = f"rope {more}metallic cross-section of {METAL:g} d^2"
+            assumptions["rope_modulus"] = f"rope {more}metallic cross-section of {METAL:g} d^2"
         if self.machine in RESISTANCE and "resistance" not in given:
-            found["resistance"] = f"resistance {RESISTANCE[self.machine]:g} of the weight"
+            assumptions["resistance"] = f"resistance {RESISTANCE[self.machine]:g} of the weight"
         if "damping_ratio" not in given:
-            found["damping_ratio"] = f"damping ratio {self.damping_ratio:g}"
+            assumptions["damping_ratio"] = f"damping ratio {self.damping_ratio:g}"
         read: dict[str, str] = vars(self)["_read"]
-        return found | read
+        return assumptions | read
 
     def assumed_still(self, settled: Iterable[str]) -> str:
         """What is assumed, less what no longer counts where these parameters of the drive are set."""

@@ -144,13 +144,13 @@ class Limits:
         if output is not None and ratio is not None and np.all(self.shaft_torque == output / ratio):
             # where the output decides, it is told there
             torque = Limit("output torque", "N m", "peak_torque", output, ratio)
-        found = (
+        limits = (
             torque,
             Limit("permissible torque", "%", "used_torque", self.used_torque),
             Limit("start time", "s", "start_time", self.start_time),
             Limit("used life", "%", "used_life", None if self.life is None else 100.0),
         )
-        return tuple(one for one in found if one.most is not None)
+        return tuple(one for one in limits if one.most is not None)
 
     def margin(self, figures: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """The least share left of those limits whose figure is given, one number a start.

@@ -224,10 +224,10 @@ class Drive(ParameterSet, Machine):
 
         An array of initial speeds counts as motion, so that no start of a batch depends on those beside it.
         """
-        given, found = vars(self)["_given"], dict[str, Any]()
+        given, derived = vars(self)["_given"], dict[str, Any]()
         reversal = isinstance(values.get("initial_speed"), str)
         if reversal and values.get("target_speed") is not None:
-            found = {name: -values["target_speed"] for name in SPEEDS if name not in given}
+            derived = {name: -values["target_speed"] for name in SPEEDS if name not in given}
         if "start_position" not in given:
             rests = np.all(_rests(values))
             hangs = values.get("brake") == "motor" and not rests
@@ -235,24 +235,24 @@ class Drive(ParameterSet, Machine):
             anywhere = rests and np.any(gap > 0.0)
             moves = any(np.ndim(values.get(name, 0.0)) or values.get(name, 0.0) != 0.0 for name in SPEEDS)
             at_rest = "unknown" if anywhere and not moves else "mid-gap"
-            found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else at_rest
-        return found
+            derived["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else at_rest
+        return derived
 
     @classmethod
     def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
         ratio, efficiency = (given.get(f"gear_{key}") for key in ("ratio", "efficiency"))
         if ratio is None:
             return NO_GEAR
-        found = []
+        numbers = []
         for name, value in (
             ("gear_ratio", ratio),
             ("gear_efficiency", 1.0 if efficiency is None else efficiency),
         ):
             try:
-                found.append(read_value(cls.PARAMETERS[name], value, batch=cls.BATCH))
+                numbers.append(read_value(cls.PARAMETERS[name], value, batch=cls.BATCH))
             except RefusedError:
-                found.append(1.0)  # it is refused under its own name
-        gear, load = Gear(*found), 0.0
+                numbers.append(1.0)  # it is refused under its own name
+        gear, load = Gear(*numbers), 0.0
         for name in LOAD:  # at the output, as far as they can be read
             p, value = cls.PARAMETERS[name], given.get(name, 0.0)
             with suppress(RefusedError, ValueError):  # refused under its own name
@@ -487,19 +487,19 @@ class Drive(ParameterSet, Machine):
         """
         if self.gear is None:
             return {}
-        found = dict[str, Any]()
+        values = dict[str, Any]()
         for name, p in PARAMETERS.items():
             value, through = getattr(self, name), self.gear_of(p)
             if p.at_output == "here":
-                found[name] = value
+                values[name] = value
             elif p.at_output and not isinstance(value, str) and value is not None:
                 several = isinstance(value, tuple)
-                found[name] = (
+                values[name] = (
                     tuple(through.to_output(np.array(value), p.unit).tolist())
                     if several
                     else through.to_output(value, p.unit)
                 )
-        return {name: value for name, value in found.items() if value is not None}
+        return {name: value for name, value in values.items() if value is not None}
 
     @property
     def Omega(self) -> float:
@@ -621,8 +621,8 @@ class Drive(ParameterSet, Machine):
         """What a summary of a start says of the machine."""
         both = self.load_kind == "active" and np.any(self.load_friction > 0.0)
         kind = "active and reactive" if both else self.load_kind
-        there = {} if self.gear is None else {"at_output": self.at_output}
-        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": kind, **there}
+        output = {} if self.gear is None else {"at_output": self.at_output}
+        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": kind, **output}
 
     def columns_of(self, states: Mapping[str, Vector]) -> dict[str, Vector]:
         """The states of a start under the headings of a table."""

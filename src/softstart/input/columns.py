@@ -190,18 +190,18 @@ def _places(
     names: Sequence[str], units: Sequence[str], wanted: Sequence[Wanted], headed: Heading
 ) -> list[int]:
     """Which columns are wanted; their units are checked."""
-    found: dict[int, int] = {}  # the column of each one wanted
+    column_of: dict[int, int] = {}  # the column of each one wanted
     for k, one in enumerate(wanted):
-        here = [i for i, name in enumerate(names) if name in one.names] or [
+        matches = [i for i, name in enumerate(names) if name in one.names] or [
             i for i, name in enumerate(names) if name.lower() in map(str.lower, one.names)
         ]
-        if len(here) > 1:
+        if len(matches) > 1:
             raise RefusedError(f"it names {one.names[0]} twice; keep one of the two columns")
-        found.update((k, i) for i in here)
+        column_of.update((k, i) for i in matches)
     if headed == "any" and len(names) == len(wanted):  # other names, in the order wanted
-        free = iter(sorted(set(range(len(wanted))) - set(found.values())))
-        found |= {k: next(free) for k in range(len(wanted)) if k not in found}
-    places = [found[k] for k in sorted(found)]
+        free = iter(sorted(set(range(len(wanted))) - set(column_of.values())))
+        column_of |= {k: next(free) for k in range(len(wanted)) if k not in column_of}
+    places = [column_of[k] for k in sorted(column_of)]
     if len(places) < len(wanted):
         raise RefusedError(f"it must name the columns, as {','.join(one.names[0] for one in wanted)}")
     for one, place in zip(wanted, places, strict=True):

@@ -50,8 +50,8 @@ class DocumentTable:
     required: bool = True
 
     def __post_init__(self) -> None:
-        own = (p if p.table == self.name else replace(p, table=self.name) for p in self.parameters)
-        object.__setattr__(self, "parameters", tuple(own))
+        parameters = (p if p.table == self.name else replace(p, table=self.name) for p in self.parameters)
+        object.__setattr__(self, "parameters", tuple(parameters))
 
     @property
     def by_key(self) -> dict[str, Parameter]:
@@ -167,8 +167,8 @@ def parsed(text: str, wording: Wording, what: str, tables: Sequence[DocumentTabl
 
 def _invalid(message: str, text: str) -> tuple[str, str]:
     """Where text is no TOML, and why, from the message of tomllib."""
-    found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
-    what, line, column = found.groups() if found else (message, None, None)
+    match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
+    what, line, column = match.groups() if match else (message, None, None)
     lines = text.splitlines() or [""]
     number = min(int(line or len(lines)), len(lines))
     shown = lines[number - 1].strip()
@@ -235,13 +235,13 @@ def placed(
             reason = f"{name} is {form}; write [{name}] on a line of its own and its keys below"
             note(f"{name} = {wording.show(content)}", reason, table.parameters)
             return
-        own = given.setdefault(name, {})
+        values = given.setdefault(name, {})
         for key, value in content.items():
             path = f"{name}.{key}" if name else key
             if path in named:
                 take(named[path], value)
             elif key in table.by_key:
-                own[key] = value
+                values[key] = value
             elif len(mistakes) > MOST:
                 note(key, "there is no such key")  # in short: it is counted, not shown
             elif not name and isinstance(value, dict) and not any(p.key == key for p in everywhere):

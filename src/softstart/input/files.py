@@ -111,19 +111,19 @@ def refusal_of(path: str | os.PathLike[str]) -> str | None:
     'there is no such file'
     """
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         return ABSENT
     except OSError as error:
         return f"the file cannot be read ({error.strerror or error})"
     except ValueError as error:  # a NUL in the path
         return f"this cannot be the path of a file ({error})"
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         return FOLDER
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return "this is no ordinary file but a pipe, a socket or a device; give a file"
-    if found.st_size > MOST_BYTES:
-        size = f"the file has {found.st_size / 1e6:.3g} MB, and at most {MOST_BYTES / 1e6:g} MB are read"
+    if status.st_size > MOST_BYTES:
+        size = f"the file has {status.st_size / 1e6:.3g} MB, and at most {MOST_BYTES / 1e6:g} MB are read"
         return f"{size}; give one with fewer lines"
     return None
 

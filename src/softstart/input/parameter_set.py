@@ -89,13 +89,13 @@ class ParameterSet:
     TABLES: ClassVar[tuple[DocumentTable, ...]] = ()
 
     def __init_subclass__(cls, kw_only: bool = True) -> None:
-        own = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
-        for name, one in own.items():
+        declared = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
+        for name, one in declared.items():
             setattr(cls, name, field() if one.required else field(default=one.default))
         dataclass(init=False, eq=False, repr=False)(cls)
         cls.PARAMETERS = dict(cls.PARAMETERS) | {
             name: replace(one, name=name, positional=one.positional or not kw_only)
-            for name, one in own.items()
+            for name, one in declared.items()
         }
         everyone = cls.PARAMETERS.values()
         tables = sorted({p.table: None for p in everyone}, key=bool)  # "" first
@@ -142,14 +142,14 @@ class ParameterSet:
             wrong.append(
                 Mistake(wording.sentence(f"{name} = {wording.show(given[name])}", reason), (), alone)
             )
-        own = vars(self)
-        own.update(values)
-        own["_given"] = frozenset(
+        fields = vars(self)
+        fields.update(values)
+        fields["_given"] = frozenset(
             name
             for name in given.keys() & parameters.keys()
             if not (given[name] is None and parameters[name].default is None)
         )
-        right = {name: values[name] for name in own["_given"] if name in values} if wrong else values
+        right = {name: values[name] for name in fields["_given"] if name in values} if wrong else values
         sentences = [*sentences_of(wrong), *self._check(right, wording)]
         if not sentences:
             before = f"{wording.where}: " if wording.where else ""
@@ -193,19 +193,21 @@ class ParameterSet:
 
     def _derive(self, **values: Any) -> None:
         """Set values that follow from others, as if they had been given; None takes one back."""
-        own = vars(self)
-        own.update(values)
-        own["_given"] = frozenset(one for one in own["_given"] | values.keys() if own[one] is not None)
+        fields = vars(self)
+        fields.update(values)
+        fields["_given"] = frozenset(
+            one for one in fields["_given"] | values.keys() if fields[one] is not None
+        )
 
     def given(self) -> dict[str, Any]:
         """The parameters that were given, in the order of the fields; the others have their defaults."""
-        own, given = vars(self), vars(self)["_given"]
-        return {name: own[name] for name in self.PARAMETERS if name in given}
+        fields, given = vars(self), vars(self)["_given"]
+        return {name: fields[name] for name in self.PARAMETERS if name in given}
 
     def values(self) -> dict[str, Any]:
         """All parameters by name."""
-        own = vars(self)
-        return {name: own[name] for name in self.PARAMETERS}
+        fields = vars(self)
+        return {name: fields[name] for name in self.PARAMETERS}
 
     def replace(self, **changes: Any) -> Self:
         """The same with some parameters changed; those that follow another one follow it still."""
@@ -280,21 +282,21 @@ def read_settings(
     mistakes = []
     for setting in [settings] if isinstance(settings, str) else settings:
         key, equals, value = (part.strip() for part in str(setting).partition("="))
-        found = parameters_by_path.get(key) or parameters.get(key)
+        parameter = parameters_by_path.get(key) or parameters.get(key)
         subject = show(setting)
         if not equals or not key or not isinstance(setting, str):
             reason = "a setting is text: a key, an equals sign and a value, such as load.inertia=0.07"
-        elif found is None:
+        elif parameter is None:
             subject, reason = (
                 setting,
                 f"there is no parameter {show(key)}; {_remedy(key, parameters_by_path, parameters)}",
             )
-        elif found.name in first:
-            subject, reason = setting, f"it was set before ({first[found.name]}); keep one of the two"
+        elif parameter.name in first:
+            subject, reason = setting, f"it was set before ({first[parameter.name]}); keep one of the two"
         else:
             quoted = len(value) >= 2 and value[0] == value[-1] and value[0] in "\"'"
-            given[found.name] = value[1:-1] if quoted else value
-            written[found.name], first[found.name] = key, setting
+            given[parameter.name] = value[1:-1] if quoted else value
+            written[parameter.name], first[parameter.name] = key, setting
             continue
         mistakes.append(Mistake(Wording(style="path").sentence(subject, reason)))
     return given, Wording(style="path", written=written), mistakes

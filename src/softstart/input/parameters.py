@@ -249,15 +249,15 @@ def without_unit(
     wording: Wording,
 ) -> list[Mistake]:
     """A mistake for each number without a unit, but 0, that may be in SI or in its `usual` unit, by name."""
-    found = []
+    mistakes = []
     for name in (one for one in usual if one in parameters and one in given):
         p, value = parameters[name], given[name]
         numbers = [bare(one) for one in (value if isinstance(value, list) else [value])]
         if number := next((one for one in numbers if float(one or 0.0) != 0.0), ""):
             also = f'or, if {p.unit} is meant, "{number} {p.unit}"'
             reason = f'no unit; write "{number} {usual[name]}" {also}'
-            found.append(Mistake(wording.refused(p, value, RefusedError(reason))))
-    return found
+            mistakes.append(Mistake(wording.refused(p, value, RefusedError(reason))))
+    return mistakes
 
 
 def read_value(
@@ -322,11 +322,11 @@ def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
     """
     several = isinstance(value, list | tuple)
     each: list[Any] = list(value) if isinstance(value, list | tuple) else [value]
-    found = [BEHIND.fullmatch(one) if isinstance(one, str) else None for one in each]
-    if not any(found):
+    matches = [BEHIND.fullmatch(one) if isinstance(one, str) else None for one in each]
+    if not any(matches):
         return value
     alike(each)
-    each = [one if match is None else match[1] for one, match in zip(each, found, strict=True)]
+    each = [one if match is None else match[1] for one, match in zip(each, matches, strict=True)]
     if p.at_output == "here":
         return each if several else each[0]
     if not p.at_output:
