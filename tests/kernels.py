@@ -26,27 +26,27 @@ def steps() -> None:
 
 def controllers() -> None:
     """Every controller in a single start and in a batch."""
-    from softstart import Drive, TorqueProfile, records, simulate
+    from softstart import Drive, TorqueProfile, machine_table, simulate
     from softstart.controller import make_controller, ready_controller_names
 
     crane = Drive.load("crane-4amtkf")
     profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
     for controller in (profile, *map(make_controller, ready_controller_names())):
         simulate(crane, controller)
-        simulate(records(crane, gap=[0.5, 2.0]), controller)
+        simulate(machine_table(crane, gap=[0.5, 2.0]), controller)
 
 
 def plain() -> None:
     """A controller that is called from Python."""
     from tests.twin import plain as twin_of
 
-    from softstart import Drive, records, simulate
+    from softstart import Drive, machine_table, simulate
     from softstart.controller import make_controller
 
     crane = Drive.load("crane-4amtkf")
     twin = twin_of(make_controller("direct"), crane)
     simulate(crane, twin)
-    simulate(records(crane, gap=[0.5, 2.0]), twin)
+    simulate(machine_table(crane, gap=[0.5, 2.0]), twin)
 
 
 # what must be compiled before, and what compiles it; the longest are taken first

@@ -19,7 +19,7 @@ PAGES = {
     "softstart.controller": ("howto/add-a-controller", "controllers", "theory/feedback"),
     "softstart.drive": ("theory/stages", "theory/contact-laws"),
     "softstart.drive.data_sheet": ("howto/own-drive",),
-    "softstart.drive.records": ("howto/python-in-a-notebook",),
+    "softstart.drive.machine_table": ("howto/python-in-a-notebook",),
     "softstart.identification": ("identification",),
     "softstart.linear": ("linear-view",),
     "softstart.optimal": ("optimal-starts", "theory/optimum"),

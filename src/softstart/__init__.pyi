@@ -10,7 +10,7 @@ from softstart.chain import natural_vibration as natural_vibration
 from softstart.chain import reduce_chain as reduce_chain
 from softstart.chain import two_mass_error as two_mass_error
 from softstart.chain import verify_on_chain as verify_on_chain
-from softstart.chain.machines import records as records
+from softstart.chain.machines import machine_table as machine_table
 from softstart.chain.periodic_torque import PeriodicTorque as PeriodicTorque
 from softstart.clutch import Clutch as Clutch
 from softstart.clutch import Engagement as Engagement
@@ -28,7 +28,7 @@ from softstart.controller import parameter as parameter
 from softstart.drive import Drive as Drive
 from softstart.drive import Machine as Machine
 from softstart.drive.data_sheet import DataSheet as DataSheet
-from softstart.drive.records import Records as Records
+from softstart.drive.machine_table import MachineTable as MachineTable
 from softstart.errors import InputError as InputError
 from softstart.errors import SimulationError as SimulationError
 from softstart.identification.logs import Log as Log

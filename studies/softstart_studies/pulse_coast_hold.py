@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import Drive, Records, records, simulate
+from softstart import Drive, MachineTable, machine_table, simulate
 from softstart.controller import Controller
 from softstart.drive import LoadKind
 from softstart.optimal.optimize import optimize
@@ -63,13 +63,13 @@ class Extent:
 
 def starts(
     kind: LoadKind, gaps: Sequence[float], ratios: Sequence[float], phases: int, **really: Any
-) -> Records:
+) -> MachineTable:
     """Drives over (gap, J2, encoder phase); J2 in J1 of the drive that the controllers are told.
 
     >>> starts("active", (0.5, 2.0), (2.0, 5.0), 4).shape
     (2, 2, 4)
     """
-    return records(
+    return machine_table(
         WITH_INVERTER,
         load_kind=kind,
         gap=np.asarray(gaps)[:, None, None],

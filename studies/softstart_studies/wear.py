@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from softstart import Controller, Drive, Records, records, simulate
+from softstart import Controller, Drive, MachineTable, machine_table, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
@@ -76,7 +76,7 @@ def live(extent: Extent, progress: Progress) -> Life:
     names = extent.controllers or tuned_controllers()
     tunings = tuned(drive, names, extent.scheduled, [float(drive.J2)], *effort, progress)
     gaps = np.array(extent.life)
-    worn = records(drive, gap=gaps)
+    worn = machine_table(drive, gap=gaps)
     starts = {}
     for name, tuning in tunings.items():
         progress(f"{name}: starts over the life")
@@ -106,7 +106,7 @@ def _fixed(tuning: Tuning) -> Controller:
     return published(tuning.controller, **gains)
 
 
-def _starts(worn: Records, controller: Controller, fitted_to: Drive | None) -> tuple[Vector, Vector]:
+def _starts(worn: MachineTable, controller: Controller, fitted_to: Drive | None) -> tuple[Vector, Vector]:
     found: Any = simulate(worn, controller, fitted_to=fitted_to)
     return np.asarray(found.k_dyn), np.asarray(found.start_time)
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.controllers.pulse_reference import FreeMotor, Shaft, way_lost
 from tests.controllers.starts import CRANE, CRANES, index, random_drive, traced
 
-from softstart import Drive, TorqueProfile, records, simulate
+from softstart import Drive, TorqueProfile, machine_table, simulate
 from softstart.controller import CompiledController
 from softstart.kernel.records import size
 from softstart_controllers import contact, current_limit_feedback, shaped, state_feedback
@@ -148,7 +148,7 @@ def test_the_computing_delay_is_counted(controller: type[CompiledController], na
     """K_dyn over that without delay: at most 0.035, 0.069 for steps that are planned once (shaped)."""
     drive = Drive.load(name).replace(start_position="mid-gap", torque_lag=lag)
     delays = [0.0, 0.0005, 0.001, 0.002, 0.0035, 0.006]
-    k_dyn = simulate(records(drive, computing_delay=delays), controller()).k_dyn.values
+    k_dyn = simulate(machine_table(drive, computing_delay=delays), controller()).k_dyn.values
     assert k_dyn.max() < k_dyn[0] + (0.08 if controller is Shaped else 0.05)
 
 

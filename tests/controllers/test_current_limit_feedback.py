@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.controllers.starts import CRANE
 
-from softstart import records, simulate
+from softstart import machine_table, simulate
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
 
 # the start -----------------------------------------------------------------------------------------------
@@ -51,7 +51,7 @@ def test_invariant_to_gap_and_inertia(kind: Any, most: float, spread: tuple[floa
     """
     nominal = CRANE.replace(load_kind=kind)
     gaps, inertias = np.meshgrid([0.5, 1.0, 2.0, 4.0], [0.07, 0.175, 0.35], indexing="ij")
-    drives = records(nominal, gap=gaps, load_inertia=inertias)
+    drives = machine_table(nominal, gap=gaps, load_inertia=inertias)
     soft, direct = (
         simulate(drives, name, fitted_to=nominal, base=nominal).k_dyn.values
         for name in ("current-limit-feedback", "direct")

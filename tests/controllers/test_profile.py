@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from tests import twin
 
-from softstart import Drive, InputError, TorqueProfile, records, simulate
+from softstart import Drive, InputError, TorqueProfile, machine_table, simulate
 from softstart.controller import make_controller
 from softstart_controllers.profile import Profile
 
@@ -47,7 +47,7 @@ def test_twin_and_batch_agree(profile: TorqueProfile, period: float, late: float
     controller = Profile(profile=profile, period=period)
     run = simulate(drive, controller, until=0.3)
     plain = simulate(drive, twin.plain(controller, drive), until=0.3)
-    many = simulate(records(drive, maximum_torque=[62.0, 70.0]), controller, until=0.3)
+    many = simulate(machine_table(drive, maximum_torque=[62.0, 70.0]), controller, until=0.3)
     assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
     assert plain.trajectory.states.tobytes() == run.trajectory.states.tobytes()
 

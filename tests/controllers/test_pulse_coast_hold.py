@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.starts import CRANE, index, random_drive, traced
 
-from softstart import Drive, Records, records, simulate
+from softstart import Drive, MachineTable, machine_table, simulate
 from softstart.optimal.optimize import optimize
 from softstart_controllers import pulse_coast_hold as stepping
 from softstart_controllers.pulse_coast_hold import PulseCoastHold
@@ -32,7 +32,7 @@ def told(kind: Any, **changed: Any) -> Drive:
     return LAGGING.replace(load_kind=kind, **changed)
 
 
-def started(batch: Records, nominal: Drive) -> dict[str, Any]:
+def started(batch: MachineTable, nominal: Drive) -> dict[str, Any]:
     """Figures of many starts, in their shape."""
     found = simulate(batch, PulseCoastHold(), fitted_to=nominal)
     return {name: found[name].values for name in ("k_dyn", "contacts", "start_time")}
@@ -116,7 +116,7 @@ def test_near_the_optimum(
 
     The optimum has the longest of the start times. With tolerances besides: measured 1.08 at most.
     """
-    batch = records(cell(kind, gap, ratio, **really), encoder_phase=np.arange(phases) / phases)
+    batch = machine_table(cell(kind, gap, ratio, **really), encoder_phase=np.arange(phases) / phases)
     found = started(batch, told(kind))
     assert np.all(found["contacts"] == 1)
     ideal = cell(kind, gap, ratio, **really).replace(torque_lag=0.0, computing_delay=0.0)
@@ -127,7 +127,7 @@ def test_near_the_optimum(
 def test_reactive_load_the_same_at_every_gap() -> None:
     """Gaps 0.5 to 2 rad, J2 = 2 to 5 J1, 8 encoder phases: K_dyn 0.980 to 1.004, spread 2.3 %."""
     gap, J2, phase = np.ix_(np.linspace(0.5, 2.0, 7), J1 * np.linspace(2.0, 5.0, 4), np.arange(8) / 8)
-    batch = records(LAGGING, load_kind="reactive", gap=gap, load_inertia=J2, encoder_phase=phase)
+    batch = machine_table(LAGGING, load_kind="reactive", gap=gap, load_inertia=J2, encoder_phase=phase)
     k = started(batch, told("reactive"))["k_dyn"]
     assert k.max() < 1.03
     assert np.all(np.ptp(k, axis=(0, 2)) / k.mean(axis=(0, 2)) < 0.03)
@@ -138,11 +138,11 @@ def test_a_lag_or_dead_time_not_as_told_hardly_matters(kind: Any) -> None:
     """The delay is measured in the pulse: K_dyn within 1 % under a wrong lag, 4 % under a dead time."""
     gap, J2, phase = np.ix_([0.5, 1.0, 2.0], [2.0 * J1, 5.0 * J1], [0.0, 0.3, 0.7])
     grid: dict[str, Any] = {"load_kind": kind, "gap": gap, "load_inertia": J2, "encoder_phase": phase}
-    as_told = started(records(LAGGING, **grid), told(kind))["k_dyn"]
+    as_told = started(machine_table(LAGGING, **grid), told(kind))["k_dyn"]
     for lag in (0.001, 0.003):
-        k = started(records(LAGGING, **grid), told(kind, torque_lag=lag))["k_dyn"]
+        k = started(machine_table(LAGGING, **grid), told(kind, torque_lag=lag))["k_dyn"]
         assert np.abs(k / as_told - 1.0).max() < 0.01
-    dead = started(records(LAGGING, computing_delay=0.001, **grid), told(kind))["k_dyn"]
+    dead = started(machine_table(LAGGING, computing_delay=0.001, **grid), told(kind))["k_dyn"]
     assert (dead / as_told).max() < 1.04
 
 
@@ -154,7 +154,7 @@ def test_a_slew_limit_does_not_look_like_a_contact() -> None:
     rate, lag, gap = np.ix_(np.geomspace(4e3, 3e6, 20), [0.0, 0.0005, 0.001, 0.002], [0.5, 2.0])
     grid: dict[str, Any] = {"torque_rate": rate, "torque_lag": lag, "gap": gap}
     for kind in ("active", "reactive"):
-        starts = simulate(records(CRANE, load_kind=kind, **grid), PulseCoastHold())
+        starts = simulate(machine_table(CRANE, load_kind=kind, **grid), PulseCoastHold())
         assert np.all(starts.contacts == 1)
         assert float(starts.k_dyn.max()) < 1.25
         assert float(starts.k_dyn.median()) < 1.0

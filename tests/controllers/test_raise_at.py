@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from softstart import Drive, records, simulate
+from softstart import Drive, machine_table, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.kernel.records import S_REF, S_START
@@ -25,7 +25,7 @@ def cell(name: str, where: str, damping: float, kind: str) -> Vector:
     J2 = inertia * CRANE.J1
     drive = CRANE.replace(torque_lag=0.004, load_kind=kind, start_position=where)
     d = [2.0 * damping * CRANE.c / CRANE.replace(load_inertia=one).Omega for one in J2.tolist()]
-    drives = records(drive, gap=gap, load_inertia=J2, damping=d)
+    drives = machine_table(drive, gap=gap, load_inertia=J2, damping=d)
     peak, end = (simulate(drives, make_controller(name, {"raise_at": at})) for at in ("peak", "end"))
     return (peak.k_dyn - end.k_dyn).values
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 from tests.controllers.starts import CRANE, CRANES
 
-from softstart import Drive, records, simulate
+from softstart import Drive, machine_table, simulate
 from softstart_controllers.regulator import PER_DECADE, RATIO_STEPS, WEIGHTS_PER_DECADE, feedback_gains
 from softstart_controllers.state_feedback import StateFeedback
 
@@ -93,7 +93,7 @@ def test_invariant_to_gap_inertia_and_stiffness() -> None:
     gaps, inertias, factors = np.meshgrid(
         [0.25, 1.0, 4.0], [0.07, 0.175, 0.35], [0.8, 1.0, 1.25], indexing="ij"
     )
-    drives = records(nominal, gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
+    drives = machine_table(nominal, gap=gaps, load_inertia=inertias, stiffness=factors * CRANE.c)
     peaks = simulate(drives, StateFeedback(), fitted_to=nominal, base=nominal).k_dyn.values
     assert peaks.max() < 1.35
     assert np.ptp(peaks, axis=0).max() < 0.12

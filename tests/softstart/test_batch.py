@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, compare, records, simulate
+from softstart import Drive, InputError, compare, machine_table, simulate
 from softstart.chain import Chain
 from softstart.chain.machines import varied
 from softstart.controller import make_controller
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.start.batch import prepared
 
 CRANE = Drive.load("crane-4amtkf")
 
 
 def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    many, ramp = records(CRANE, gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
+    many, ramp = machine_table(CRANE, gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
     whole = prepared(many).results(ramp.set_ups(many))
     monkeypatch.setattr(
         "softstart.start.results._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
@@ -31,9 +31,9 @@ def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("role", ["fitted_to", "base"])
 def test_a_drive_of_another_shape_is_refused(role: str) -> None:
-    other = records(CRANE, load_inertia=np.linspace(0.1, 0.2, 3))
+    other = machine_table(CRANE, load_inertia=np.linspace(0.1, 0.2, 3))
     with pytest.raises(InputError, match=role):
-        simulate(records(CRANE, gap=[0.5, 2.0]), "ramp", **{role: other})
+        simulate(machine_table(CRANE, gap=[0.5, 2.0]), "ramp", **{role: other})
 
 
 def test_a_start_exactly_at_its_limits_keeps_them() -> None:
@@ -74,7 +74,7 @@ CHAIN = Chain.load("crane-4-mass")
 FIGURES = ("k_dyn", "start_time", "contacts", "impact_speed", "peak_time", "end_time")
 
 
-def assert_bits_of_single_starts(many: Records, controller: str) -> list[float]:
+def assert_bits_of_single_starts(many: MachineTable, controller: str) -> list[float]:
     found: Any = simulate(many, controller)
     runs = [simulate(one, controller).summary() for one in many.elements()]
     for name in FIGURES:
@@ -83,20 +83,24 @@ def assert_bits_of_single_starts(many: Records, controller: str) -> list[float]:
 
 
 def test_fields_in_si_of_one_shape() -> None:
-    many = records(CRANE, gap=["30 deg", 2], load_inertia=[["700 kg*cm^2"], [0.175], [0.2]], damping=0.5)
+    many = machine_table(
+        CRANE, gap=["30 deg", 2], load_inertia=[["700 kg*cm^2"], [0.175], [0.2]], damping=0.5
+    )
     assert many.machine == CRANE
     assert (many.shape, len(many), list(many.fields)) == ((3, 2), 6, ["gap", "load_inertia"])
     assert many.fields["gap"].tolist() == [[math.radians(30), 2.0]] * 3
     each = list(many.elements())
     assert each[5] == CRANE.replace(gap=2.0, load_inertia=0.2, damping=0.5)
     assert all(type(one) is Drive and isinstance(one.gap, float) for one in each)
-    _, other = records(CRANE.replace(maximum_torque=None), starting_torque=[62, 80]).elements()
+    _, other = machine_table(CRANE.replace(maximum_torque=None), starting_torque=[62, 80]).elements()
     assert other.maximum_torque == 80.0  # derived for each
     assert other.replace(starting_torque=100).maximum_torque == 100
 
 
 def test_records_differ_in_further_fields_and_an_angle_may_move_with_its_gap() -> None:
-    chains = records(records(CHAIN, gap=[0.5, 1.0], load_torque=99.0), shaft_2_stiffness=[[4e5], [5e5]])
+    chains = machine_table(
+        machine_table(CHAIN, gap=[0.5, 1.0], load_torque=99.0), shaft_2_stiffness=[[4e5], [5e5]]
+    )
     assert list(chains.elements()) == [
         CHAIN.with_values({"gap": gap, "load_torque": 99.0, "shaft_2_stiffness": c})
         for c in (4e5, 5e5)
@@ -104,28 +108,28 @@ def test_records_differ_in_further_fields_and_an_angle_may_move_with_its_gap() -
     ]
     assert chains.fields["gap"].tolist() == [[0.5, 1.0], [0.5, 1.0]]
     flank = CRANE.replace(start_position=0.25)
-    assert [one.theta0 for one in records(flank, gap=[0.5, 1.0]).elements()] == [0.25, 0.25]
+    assert [one.theta0 for one in machine_table(flank, gap=[0.5, 1.0]).elements()] == [0.25, 0.25]
     assert list(varied(flank, {"gap": [0.5, 3.0]}).elements()) == [flank.with_gap(0.5), flank.with_gap(3.0)]
 
 
 def test_noise_friction_positions_and_brakes_have_the_bits_of_single_starts() -> None:
-    noisy = records(CRANE, torque_noise=1.0, noise_seed=[0.0, 1.0, 2.0], torque_lag=0.002)
+    noisy = machine_table(CRANE, torque_noise=1.0, noise_seed=[0.0, 1.0, 2.0], torque_lag=0.002)
     assert len(set(assert_bits_of_single_starts(noisy, "current-limit-feedback"))) == 3
-    rubbed = records(CRANE, motor_friction=[0.0, 2.0], motor_viscous_friction=[[0.0], [0.01]])
+    rubbed = machine_table(CRANE, motor_friction=[0.0, 2.0], motor_viscous_friction=[[0.0], [0.01]])
     assert_bits_of_single_starts(rubbed, "ramp")
     hoist = CRANE.replace(load_torque=40.0, brake="motor", start_position="hanging", damping=0.3)
     for release in ("torque", 0.05):
-        hanging = records(hoist, load_torque=[30.0, 40.0], gap=[0.05, 0.2], release=release)
+        hanging = machine_table(hoist, load_torque=[30.0, 40.0], gap=[0.05, 0.2], release=release)
         assert_bits_of_single_starts(hanging, "state-feedback")
-    unknown = records(CRANE, load_kind="reactive", start_position="unknown", gap=[0.2, 0.5, 2.0])
+    unknown = machine_table(CRANE, load_kind="reactive", start_position="unknown", gap=[0.2, 0.5, 2.0])
     assert_bits_of_single_starts(unknown, "ramp")
     found: Any = simulate(unknown, "ramp")
     assert found.position.values.tolist() == [simulate(one, "ramp").position for one in unknown.elements()]
 
 
 def test_controllers_bases_parameters_and_limits_of_each() -> None:
-    many = records(CRANE, gap=[0.5, 2.0], permissible_torque=[100.0, 200.0], permissible_start_time=1.0)
-    fitted, base = records(CRANE, gap=[0.4, 1.0]), records(CRANE, load_inertia=[0.1, 0.3])
+    many = machine_table(CRANE, gap=[0.5, 2.0], permissible_torque=[100.0, 200.0], permissible_start_time=1.0)
+    fitted, base = machine_table(CRANE, gap=[0.4, 1.0]), machine_table(CRANE, load_inertia=[0.1, 0.3])
     found: Any = simulate(many, "ramp", fitted_to=fitted, base=base, workers=2)
     times = np.array([0.05, 0.2])
     timed: Any = simulate(many, make_controller("ramp", {"time": times}))
@@ -144,22 +148,22 @@ def test_controllers_bases_parameters_and_limits_of_each() -> None:
     [
         (CRANE, {"gapp": [0.5]}, 'gapp = [0.5]: a drive has no parameter "gapp"; did you mean gap?'),
         (CHAIN, {"shaft_7_gap": [0.5]}, 'a chain has no parameter "shaft_7_gap"'),
-        (CRANE, {"gap": [1, 2, 3], "damping": [1, 2]}, "damping has shape (2,), gap has shape (3,): arrays"),
+        (CRANE, {"gap": [1, 2, 3], "damping": [1, 2]}, "damping has shape (2,), gap has shape (3,): the"),
         (CRANE, {"gap": [[0.5, -1.0]]}, "gap[0, 1] = -1.0: the total angular gap must be 0 or more"),
         (CHAIN, {"shaft_2_gap": [0.5, "1 m"]}, "shaft_2_gap[1] = "),
         (CRANE.replace(maximum_torque=None), {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]},
          "starting_torque[1] = 5 N*m: the starting torque cannot move the load against load_torque[0, 0]"),
-        (CHAIN, {}, "records: all fields are single values"),
+        (CHAIN, {}, "machine_table: all values are single"),
     ],
 )  # fmt: skip
 def test_what_no_machine_can_have(machine: Any, fields: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError) as caught:
-        records(machine, **fields)
+        machine_table(machine, **fields)
     assert said in str(caught.value)
     assert len(caught.value.sentences) == 1
     if "gapp" in fields:  # all mistakes at once
         with pytest.raises(InputError) as caught:
-            records(machine, **fields, load_inertia=[-1.0], stiffness=["soft"])
+            machine_table(machine, **fields, load_inertia=[-1.0], stiffness=["soft"])
         assert len(caught.value.sentences) == 3
 
 
@@ -169,7 +173,7 @@ def test_strides_over_repeated_contacts_keep_every_bit(strategy: str, kind: str)
     """A batch takes repeated contacts in one stride, a recorded start goes through each: the same bits."""
     rng = np.random.default_rng(11)
     count = 40
-    drives = records(
+    drives = machine_table(
         CRANE,
         load_kind=kind,
         gap=rng.uniform(0.01, 4.0, count),

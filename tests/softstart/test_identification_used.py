@@ -19,8 +19,8 @@ from softstart import (
     InputError,
     compare,
     identify,
+    machine_table,
     plan_experiments,
-    records,
     simulate,
     tune,
 )
@@ -68,7 +68,7 @@ def test_an_interval_holds_the_value_itself_and_is_known_for_nine_of_ten_drives(
     crane = Drive.load("crane-4amtkf")
     inertias = np.append(np.linspace(0.16, 0.2, 20 - late), np.ones(late))
     drawn, run = (
-        records(crane, load_inertia=inertias, gap=np.linspace(0.6, 0.8, 20)),
+        machine_table(crane, load_inertia=inertias, gap=np.linspace(0.6, 0.8, 20)),
         simulate(crane, "direct"),
     )
     found = intervals(run, drawn, "direct", until=0.5)

@@ -13,7 +13,7 @@ from tests.softstart.kernel.pieces import Pieces
 from tests.softstart.kernel.test_brake import HOIST
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, TorqueProfile, compare, fatigue, formulas, records, simulate
+from softstart import Drive, InputError, TorqueProfile, compare, fatigue, formulas, machine_table, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
@@ -43,7 +43,7 @@ def test_defaults() -> None:
     held = plain.replace(load_kind="reactive")  # by friction, wherever it came to rest
     assert held.start_position == held.replace(brake="motor").start_position == "unknown"
     for fields, where in (({"gap": [0.0, 0.1]}, "unknown"), ({"initial_motor_speed": [0.0, 1.0]}, "mid-gap")):
-        assert {one.start_position for one in records(held, **fields).elements()} == {where}
+        assert {one.start_position for one in machine_table(held, **fields).elements()} == {where}
     for no_doubt in ({"gap": 0.0}, {"initial_load_speed": -1.0}, {"initial_motor_speed": 1.0}):
         assert held.replace(**no_doubt).start_position == "mid-gap"
     assert held.replace(initial_speed="reversal").start_position == "opposite-flank"

@@ -26,7 +26,7 @@ from softstart import (
     TorqueProfile,
     compare,
     formulas,
-    records,
+    machine_table,
     simulate,
 )  # fmt: skip
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
@@ -172,7 +172,7 @@ def test_the_figure_shows_the_run(run: Run) -> None:
         (CRANE, {"until": "1 rad"}, 'until = "1 rad"'),
         (CRANE, {"time_limit": -1.0}, "time_limit = -1"),
         (CRANE, {"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
-        (CRANE, {"fitted_to": records(CRANE, gap=[0.5, 2.0])}, "fitted_to: records of shape (2,)"),
+        (CRANE, {"fitted_to": machine_table(CRANE, gap=[0.5, 2.0])}, "fitted_to: records of shape (2,)"),
         (CRANE, {"max_events": 0}, "max_events = 0"),
         ([], {}, "drive"),
         ([CRANE, 1], {}, "drive"),

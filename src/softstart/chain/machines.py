@@ -1,4 +1,4 @@
-"""Records of drives and chains alike, and one machine from a name or a file."""
+"""MachineTable of drives and chains alike, and one machine from a name or a file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from softstart.chain.elements import LIBRARY
 from softstart.chain.model import Chain
 from softstart.drive import Drive, Machine, library
 from softstart.drive.checks import BROADCAST
-from softstart.drive.records import Columns, Records
+from softstart.drive.machine_table import DriveColumns, MachineTable
 from softstart.errors import InputError
 from softstart.hints import nearest
 from softstart.input.files import ABSENT, object_of, read_text, refusal_of
@@ -25,7 +25,7 @@ from softstart.input.parameters import Parameter, Wording, at_motor, read_value
 from softstart.quantities import RefusedError, parse, show
 
 MachineLike = Machine | str | os.PathLike[str]  # one, or its name or file
-SINGLE = "records: all fields are single values; give a list for one, as gap=[0.5, 2.0]."
+SINGLE = "machine_table: all values are single; give a list for one, as gap=[0.5, 2.0]."
 Values = dict[str, tuple[Parameter, Any]]  # by path
 
 
@@ -96,12 +96,12 @@ def is_chain_text(text: str) -> bool:
     return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))
 
 
-def records(machine: Machine | Records | str, **fields: Any) -> Records:
+def machine_table(machine: Machine | MachineTable | str, **fields: Any) -> MachineTable:
     """Many machines that differ in some values, for one call of `simulate`.
 
     Parameters
     ----------
-    machine : Drive, Chain, Records or str
+    machine : Drive, Chain, MachineTable or str
         The machine that they are variants of, or its name or file; or records that are to differ in further
         values.
     **fields : numbers, texts with a unit, or lists and arrays of such
@@ -112,7 +112,7 @@ def records(machine: Machine | Records | str, **fields: Any) -> Records:
 
     Returns
     -------
-    Records
+    MachineTable
         Of the shape to which the fields broadcast.
 
     Raises
@@ -122,24 +122,24 @@ def records(machine: Machine | Records | str, **fields: Any) -> Records:
 
     Examples
     --------
-    >>> from softstart import Drive, records, simulate
+    >>> from softstart import Drive, machine_table, simulate
     >>> crane = Drive.load("crane-4amtkf")
-    >>> simulate(records(crane, gap=[0.5, 2.0]), "direct").k_dyn.round(3).values.tolist()
+    >>> simulate(machine_table(crane, gap=[0.5, 2.0]), "direct").k_dyn.round(3).values.tolist()
     [3.118, 4.865]
-    >>> records(crane, gap=[[0.5], [2.0]], load_inertia=["0.1 kg*m^2", 0.175]).shape
+    >>> machine_table(crane, gap=[[0.5], [2.0]], load_inertia=["0.1 kg*m^2", 0.175]).shape
     (2, 2)
     """
-    return _records(machine, fields, Columns.replace)
+    return _records(machine, fields, DriveColumns.replace)
 
 
-def varied(machine: Machine | Records, values: Mapping[str, Any]) -> Records:
-    """As `records`, but the start of a drive stays where it was in its gap, see `Drive.with_gap`.
+def varied(machine: Machine | MachineTable, values: Mapping[str, Any]) -> MachineTable:
+    """As `machine_table`, but the start of a drive stays where it was in its gap, see `Drive.with_gap`.
 
     >>> flank = Drive.load("crane-4amtkf").replace(start_position=0.25)
     >>> varied(flank, {"gap": [1.0]}).fields["start_position"]
     array([0.5])
     """
-    return _records(machine, values, Columns.with_gap if "gap" in values else Columns.replace)
+    return _records(machine, values, DriveColumns.with_gap if "gap" in values else DriveColumns.replace)
 
 
 def quantity_of(machine: Machine, key: str, given: object, name: str) -> float:
@@ -177,20 +177,20 @@ def listed_of(given: Any, name: str) -> list[Any]:
     return listed
 
 
-def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Columns]) -> Records:
-    if not isinstance(machine, Records):
+def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., DriveColumns]) -> MachineTable:
+    if not isinstance(machine, MachineTable):
         machine = as_machine(machine)
-        machine = Records(machine, {}, (machine,))
+        machine = MachineTable(machine, {}, (machine,))
     whole = machine.machine
     if isinstance(whole, Chain):
         return _chains(machine, values)
-    table = Records.of(whole, change(Columns.of(machine.parts[0]), **values))
+    table = MachineTable.of(whole, change(DriveColumns.of(machine.parts[0]), **values))
     if not table.fields:
         raise InputError(SINGLE)
     return table
 
 
-def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
+def _chains(chains: MachineTable, values: Mapping[str, Any]) -> MachineTable:
     """Chains that differ in these values, by the words of their parameters."""
     chain: Chain = chains.machine
     wrong, read = list[str](), dict[str, Any]()
@@ -220,4 +220,4 @@ def _chains(chains: Records, values: Mapping[str, Any]) -> Records:
     changed = {name: np.broadcast_to(value, shape).ravel().tolist() for name, value in read.items()}
     rows = [dict(zip(changed, row, strict=True)) for row in zip(*changed.values(), strict=True)]
     parts = (chains.parts[i].with_values(row) for i, row in zip(each, rows, strict=True))
-    return Records(chain, fields, tuple(parts))
+    return MachineTable(chain, fields, tuple(parts))

@@ -20,7 +20,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.controller.parameters import ParameterValues, declared_parameters
 from softstart.drive import Drive
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 from softstart.kernel.records import Measured
@@ -209,7 +209,7 @@ class Controller:
             name, values = next(iter(arrays.items()))
             raise InputError(
                 f"{name} = {show(values)}: this is a list, and one start has a single value; give that, or "
-                "`records` with as many machines, or vary it in a sweep."
+                "`machine_table` with as many machines, or vary it in a sweep."
             )
         drive = drive.design_drive
         return self.fitted(drive), drive
@@ -236,7 +236,7 @@ class Controller:
         """
         arrays = self._arrays()
         given: Iterable[Any]
-        if isinstance(drives, Records):
+        if isinstance(drives, MachineTable):
             given, shape = drives.elements(), drives.shape
         elif isinstance(drives, Sequence):
             given, shape = drives, (len(drives),)

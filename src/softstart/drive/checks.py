@@ -12,7 +12,7 @@ import numpy as np
 from softstart.input.parameters import Parameter, Wording
 from softstart.quantities import RefusedError, Units, show
 
-BROADCAST: Final = "arrays of records must broadcast together; give them one length, or a single number"
+BROADCAST: Final = "the arrays of a table must broadcast together; give them one length, or a single number"
 FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
 
 GRAVITY: Final = 9.80665  # m/s^2

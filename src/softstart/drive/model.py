@@ -56,8 +56,8 @@ def _rests(values: Mapping[str, Any]) -> Any:
 class Drive(ParameterSet, Machine):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
-    Each quantity is a number in SI or a string with a unit; many drives are `softstart.records`. Angles are
-    in rad at the motor shaft. A drive is frozen; equal drives hash alike.
+    Each quantity is a number in SI or a string with a unit; many drives are a `softstart.machine_table`.
+    Angles are in rad at the motor shaft. A drive is frozen; equal drives hash alike.
 
     The load torque has an active part, which acts always, and a reactive one, Coulomb friction: `load_torque`
     is of the `load_kind`, `load_friction` is friction besides it. Forward motion takes the sum, Mc.
@@ -104,7 +104,7 @@ class Drive(ParameterSet, Machine):
     shaft_names: ClassVar[tuple[str, ...]] = ("motor - load",)
     warnings: ClassVar[tuple[str, ...]] = ()  # what it leaves out that decides its shaft torques
     SEVERAL: ClassVar[str] = (
-        "a drive has one value; for several use sweep, in Python records(drive, {name}=...)"
+        "a drive has one value; for several use sweep, in Python machine_table(drive, {name}=...)"
     )
 
     # fmt: off

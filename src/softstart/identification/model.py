@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
-from softstart.drive.records import Columns
+from softstart.drive.machine_table import DriveColumns
 from softstart.errors import SimulationError
 from softstart.identification.logs import Log
 from softstart.kernel.records import ENDED, MACHINE
@@ -163,7 +163,7 @@ class LogModel:
         elif not changes:
             changes = {"gap": np.full(len(values), float(self.drive.gap))}
         # numbers already, and within their ranges: to read and check them takes longer than the motion
-        drive = Columns.of(self.drive)
+        drive = DriveColumns.of(self.drive)
         vars(drive).update(changes)
         rows = kernel_input(drive)
         named = rows.machines.view(MACHINE)[:, 0]

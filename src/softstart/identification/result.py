@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Matrix, Vector, plain_fields
-from softstart.chain.machines import records
+from softstart.chain.machines import machine_table
 from softstart.drive import FRICTIONS as OF_TWO
 from softstart.drive import PARAMETERS, Drive
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
@@ -130,7 +130,7 @@ class Identification(Result, view="identification.identification_sheet"):
         """Whether intervals are stated: not where the drive does not explain the logs."""
         return all(math.isfinite(estimate.upper - estimate.lower) for estimate in self.estimates)
 
-    def draws(self, count: int = 200, seed: int = 0) -> Records:
+    def draws(self, count: int = 200, seed: int = 0) -> MachineTable:
         """Drives that the logs leave possible, drawn from the joint distribution of the estimates."""
         if not self.stated:
             raise InputError(
@@ -142,7 +142,7 @@ class Identification(Result, view="identification.identification_sheet"):
         normal = np.random.default_rng(seed).standard_normal((count, len(rows)))
         moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
         moved = {one.name: one.moved(move) for one, move in zip(self.shared, moves.T, strict=True)}
-        return records(self.drive, **moved)
+        return machine_table(self.drive, **moved)
 
     def with_settings(self, settings: Iterable[str]) -> Self:
         """The identification with other parameters of its drive, as typed at a command line.

@@ -14,7 +14,7 @@ from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.results import OneLine
@@ -227,7 +227,7 @@ def make_sheet(
     exact: Run,
     resolution: Resolution,
     row: Row | None = None,
-    drawn: Records | None = None,
+    drawn: MachineTable | None = None,
     soft: Drive | None = None,
 ) -> ParameterSheet:
     """The sheet of a strategy on a drive or chain; `exact` is its start there.
@@ -290,7 +290,7 @@ def _alone(count: int) -> list[tuple[int, ...]]:
 
 def _within_the_rule(
     machine: Machine, ready: Controller, own: Drive, varied: Sequence[Setting], row: Row | None,
-    drawn: Records | None, soft: Drive | None,
+    drawn: MachineTable | None, soft: Drive | None,
 ) -> dict[str, float]:  # fmt: skip
     """The values at the steps nearest to the exact ones that keep what the row keeps.
 
@@ -317,7 +317,12 @@ def _within_the_rule(
 
 
 def _broken(
-    machine: Machine, controller: Controller, own: Drive, row: Row, drawn: Records | None, soft: Drive | None
+    machine: Machine,
+    controller: Controller,
+    own: Drive,
+    row: Row,
+    drawn: MachineTable | None,
+    soft: Drive | None,
 ) -> str:
     """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
     cases = tuple(case for case in row.worst_case if case in CASES)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Matrix
 from softstart.controller.base import Controller, SetUp, numbers_of
 from softstart.drive import PARAMETERS, Drive, Limits
-from softstart.drive.records import Records, each_of
+from softstart.drive.machine_table import MachineTable, each_of
 from softstart.kernel import records as rec
 from softstart.parallel import checked_workers
 from softstart.start.kernel_input import MAX_EVENTS, KernelInput, concatenate, kernel_input, zeros
@@ -122,7 +122,7 @@ def figure_columns(shaft_names: tuple[str, ...]) -> Figures:
 
 
 def prepared(
-    machines: Records | Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
+    machines: MachineTable | Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
 ) -> Batch:
     """Machines that go through one call of the kernel; InputError for machines that do not match.
 
@@ -132,7 +132,7 @@ def prepared(
     >>> batch.results([direct.set_up(crane)]).peaks.round(2).tolist()
     [[164.81], [257.18]]
     """
-    parts = machines.parts if isinstance(machines, Records) else tuple(machines)
+    parts = machines.parts if isinstance(machines, MachineTable) else tuple(machines)
     inputs = [
         [kernel_input(placed, time_limit, max_events) for placed in part.positions.values()] for part in parts
     ]
@@ -163,7 +163,7 @@ def _limits_of(parts: Sequence[Any]) -> Limits:
 
 
 def simulate_many(
-    machines: Records | Sequence[Any],
+    machines: MachineTable | Sequence[Any],
     controller: Controller,
     until: float | None,
     fitted_to: Any,
@@ -179,7 +179,7 @@ def simulate_many(
     too, with the dimension `shaft`.
     """
     batch = prepared(machines, time_limit, max_events)
-    if isinstance(machines, Records):
+    if isinstance(machines, MachineTable):
         shape, means = machines.shape, machines.mean_torque
         dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
         coordinates: dict[str, Any] = {

@@ -19,8 +19,8 @@ from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.data_sheet_mechanics import BAND
 from softstart.drive.machine import Machine
+from softstart.drive.machine_table import MachineTable
 from softstart.drive.plausibility import plausibility_warnings
-from softstart.drive.records import Records
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.profile import TorqueProfile
 from softstart.results import Result
@@ -55,13 +55,13 @@ class Uncertain(Protocol):
 
     @property
     def drive(self) -> Drive: ...
-    def draws(self, count: int = ..., seed: int = ...) -> Records:
+    def draws(self, count: int = ..., seed: int = ...) -> MachineTable:
         """Drives that are left possible."""
 
 
 def intervals(
     run: Run,
-    drawn: Records,
+    drawn: MachineTable,
     controller: str | Controller,
     until: float | str | None = None,
     fitted_to: Drive | None = None,
@@ -241,7 +241,7 @@ def compare(
     return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end)
 
 
-def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, Records | None, Drive | None]:
+def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, MachineTable | None, Drive | None]:
     """The machine itself, `count` drives where it is known within intervals, and that of the soft end."""
     if isinstance(drive, DataSheet):
         drive = drive.possible
@@ -281,7 +281,7 @@ def compared(
     until: float | str | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
-    drawn: Records | None = None,
+    drawn: MachineTable | None = None,
     soft: Drive | None = None,
 ) -> Row:
     """The row of one controller; `direct` is the start that its times are compared with.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive, Machine
-from softstart.drive.records import Columns, each_of
+from softstart.drive.machine_table import DriveColumns, each_of
 from softstart.errors import InputError
 from softstart.kernel import records as rec
 from softstart.kernel.motor import encoder_count
@@ -161,7 +161,7 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     """The rows of a drive or of columns of drives, and how long stiff ones take."""
     shape: tuple[int, ...] = ()
     column: Any = np.float64
-    if isinstance(drive, Columns):
+    if isinstance(drive, DriveColumns):
         shape, column = drive.shape, partial(each_of, drive)
     made = zeros(shape, 2)
     named = made.machines.view(rec.MACHINE)[:, 0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 from softstart.chain.machines import MachineLike, load_machine
 from softstart.controller.base import label_of
 from softstart.drive.machine import Machine
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
 from softstart.start.batch import simulate_many
 from softstart.start.demand import ControllerLike, as_controller
@@ -48,7 +48,7 @@ def simulate(
 ) -> Run: ...
 @overload
 def simulate(
-    drive: Records | Sequence[Machine],
+    drive: MachineTable | Sequence[Machine],
     controller: ControllerLike | None = ...,
     until: float | str | None = ...,
     **options: Unpack[Options],
@@ -77,10 +77,10 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, Chain, Records, sequence of machines, str or path, optional
-        A drive, a chain, `records` of one, a list of drives or of chains (with the same number of masses,
-        their motors and loads on the same ones), or the name or file of a drive or chain. By default the
-        crane travel drive of [G].
+    drive : Drive, Chain, MachineTable, sequence of machines, str or path, optional
+        A drive, a chain, a table of one (`machine_table`), a list of drives or of chains (with the same
+        number of masses, their motors and loads on the same ones), or the name or file of a drive or chain.
+        By default the crane travel drive of [G].
     controller : str, Controller, TorqueProfile, pair of arrays, function or None
         A name, `path/to/file.py:ClassName`, a file of tuned gains, or a Controller object; a torque over time
         as a TorqueProfile, as two arrays (t in s, u in N m), or as a function t -> u, which is sampled every
@@ -143,7 +143,7 @@ def simulate(
         _check_other(name, other, drive)
     if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
-    if isinstance(drive, list | tuple | Records):
+    if isinstance(drive, list | tuple | MachineTable):
         if strategy is None:
             raise InputError("controller is missing: many starts need one.")
         return simulate_many(drive, strategy, until, fitted_to, base, time_limit, max_events, workers)
@@ -167,8 +167,8 @@ def simulate(
 
 def _check_other(name: str, other: object, drive: object) -> None:
     """A machine given beside the simulated one: a single one, or one for each of several starts."""
-    if isinstance(other, Records):
-        shape = drive.shape if isinstance(drive, Records) else ()
+    if isinstance(other, MachineTable):
+        shape = drive.shape if isinstance(drive, MachineTable) else ()
         if other.shape != shape:
             raise InputError(
                 f"{name}: records of shape {other.shape} do not match starts of shape {shape}; give a single "

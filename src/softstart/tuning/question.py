@@ -17,7 +17,7 @@ from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.machine import Machine
-from softstart.drive.records import Records
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
 from softstart.input.parameters import ParameterValue
@@ -235,15 +235,15 @@ def tuning_scenarios(
 
 
 def scenarios_drawn(
-    drive: Drive, drawn: Records | Drive, scenarios: Sequence[Scenario]
+    drive: Drive, drawn: MachineTable | Drive, scenarios: Sequence[Scenario]
 ) -> tuple[Scenario, ...]:
     """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
 
     A single one, that of the soft end of an unknown stiffness, is under each of them, as the drive itself is.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> from softstart import records
-    >>> scenarios_drawn(crane, records(crane, gap=[0.4, 0.6]), ({},))
+    >>> from softstart import machine_table
+    >>> scenarios_drawn(crane, machine_table(crane, gap=[0.4, 0.6]), ({},))
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """
     own = drive.values()

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from softstart import Drive, Records, Run, TorqueProfile, formulas, simulate
+from softstart import Drive, MachineTable, Run, TorqueProfile, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
 from softstart_studies.crane import CRANE, published
@@ -75,11 +75,11 @@ def simulated(drive: Drive, r: float, method: Method) -> Run:
     return simulate(drive, published(CONTROLLERS[method], torque=r * float(drive.Ms)), base=CRANE)
 
 
-def many(drives: Records, controller: Controller) -> tuple[Vector, Vector]:
+def many(drives: MachineTable, controller: Controller) -> tuple[Vector, Vector]:
     """K_dyn of first contact and of the whole start of a batch; controller and base of the new drive.
 
-    >>> from softstart import records
-    >>> [k.round(4).tolist() for k in many(records(CRANE, gap=[0.5, 2.0]), published("direct"))]
+    >>> from softstart import machine_table
+    >>> [k.round(4).tolist() for k in many(machine_table(CRANE, gap=[0.5, 2.0]), published("direct"))]
     [[3.1179, 4.8654], [3.1179, 4.8654]]
     """
     results: Any = simulate(drives, controller, fitted_to=CRANE, base=CRANE)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from softstart import Records, records
+from softstart import MachineTable, machine_table
 from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
 from softstart.views.drawing import drawing, new_figure
@@ -54,7 +54,7 @@ class Sweep:
         return np.abs(self.x) <= band + 1e-9
 
 
-def swept(x: Vector, drives: Records, **changed: Vector) -> Sweep:
+def swept(x: Vector, drives: MachineTable, **changed: Vector) -> Sweep:
     """All starts."""
     found = {way: many(drives, controller) for way, controller in ways().items()}
     first, whole = ({way: pair[i] for way, pair in found.items()} for i in (0, 1))
@@ -70,7 +70,7 @@ def worn() -> Sweep:
     >>> bool(found.first["instant"][-1] > 1.3 * found.promised[-1])
     True
     """
-    return swept(GAPS, records(CRANE, gap=GAPS), gap=GAPS)
+    return swept(GAPS, machine_table(CRANE, gap=GAPS), gap=GAPS)
 
 
 def detuned(cause: Cause) -> Sweep:
@@ -83,11 +83,11 @@ def detuned(cause: Cause) -> Sweep:
     """
     if cause == "stiffness":
         c = CRANE.c * (1.0 + DEVIATIONS) ** 2
-        return swept(DEVIATIONS, records(CRANE, stiffness=c), c=c)
+        return swept(DEVIATIONS, machine_table(CRANE, stiffness=c), c=c)
     over = (CRANE.Omega * (1.0 + DEVIATIONS)) ** 2 * CRANE.J1 / CRANE.c - 1.0
     possible = over > 0.01
     J2 = CRANE.J1 / over[possible]
-    return swept(DEVIATIONS[possible], records(CRANE, load_inertia=J2), J2=J2)
+    return swept(DEVIATIONS[possible], machine_table(CRANE, load_inertia=J2), J2=J2)
 
 
 # wear ----------------------------------------------------------------------------------------------------
@@ -227,8 +227,8 @@ def spreads() -> Spreads:
     }
     names = ("gap", "load_inertia", "stiffness")
     coarse = np.meshgrid(GAPS[::20], INERTIAS[::4], STIFFNESSES[::2], indexing="ij")
-    batches = [records(CRANE, **{name: values}) for name, values in zip(names, EVERY, strict=True)]
-    batches.append(records(CRANE, **{n: grid.ravel() for n, grid in zip(names, coarse, strict=True)}))
+    batches = [machine_table(CRANE, **{name: values}) for name, values in zip(names, EVERY, strict=True)]
+    batches.append(machine_table(CRANE, **{n: grid.ravel() for n, grid in zip(names, coarse, strict=True)}))
     return {name: tuple(many(batch, one)[1] for batch in batches) for name, one in strategies.items()}
 
 

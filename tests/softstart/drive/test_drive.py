@@ -40,7 +40,7 @@ def test_changes_follow_and_are_checked():
         crane.replace(gap=-1)
     with pytest.raises(AttributeError, match=r"replace\(gap=...\)"):
         crane.gap = 2.0
-    several = "for several use sweep, in Python records(drive, gap=...)"
+    several = "for several use sweep, in Python machine_table(drive, gap=...)"
     with pytest.raises(InputError, match=re.escape(f"[0.5, 2.0]: a drive has one value; {several}.")):
         crane.replace(gap=np.array([0.5, 2.0]))
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Chain, DataSheet, Drive, InputError, compare, optimize, records, simulate, tune
+from softstart import Chain, DataSheet, Drive, InputError, compare, machine_table, optimize, simulate, tune
 from softstart.chain import Mass, Motor, Shaft
 from softstart.controller.recipe import Recipe
 from softstart.drive import PARAMETERS
@@ -135,7 +135,7 @@ def test_a_torque_that_drives_the_motor_loses_on_its_way_there() -> None:
     """Of the power M w at the output eta M w comes to the motor, which turns i times as fast: eta M/i."""
     drive = geared(40.0, 0.8).replace(load_torque="-160 N*m at output")
     assert (drive.load_torque, drive.at_output["load_torque"]) == (-3.2, -160.0)
-    many = records(geared(40.0, 0.8), load_torque=["-160 N*m at output", "160 N*m at output"])
+    many = machine_table(geared(40.0, 0.8), load_torque=["-160 N*m at output", "160 N*m at output"])
     assert many.fields["load_torque"].tolist() == [-3.2, 5.0]
 
 
@@ -165,7 +165,7 @@ def test_friction_beside_a_load_that_drives_the_motor_comes_back_as_typed(i, eta
         # a torque below 0 there that friction outweighs may have come either way: it counts by its sign
         if name == "load_torque" or whole < 0.0 or torque >= 0.0:
             assert drive.replace(**{name: text}) == drive
-    many = records(plain, **{name: [text, "0"] for name, text in texts.items()})
+    many = machine_table(plain, **{name: [text, "0"] for name, text in texts.items()})
     assert [float(many.fields[name][0]) for name in there] == [getattr(drive, name) for name in there]
 
 
@@ -221,7 +221,7 @@ def test_everything_that_takes_a_gap_takes_it_at_the_output() -> None:
     assert (low["gap"].offset, high["gap"].offset) == pytest.approx((gap / 2, 2 * gap), rel=1e-14)
     (_, low, high) = tuning_scenarios(drive, {"gap": "1 arcmin at output"})
     assert high["gap"].offset == pytest.approx(gap / 9, rel=1e-14) == -low["gap"].offset
-    both = records(drive, gap=["9 arcmin at output", "18 arcmin at output"])
+    both = machine_table(drive, gap=["9 arcmin at output", "18 arcmin at output"])
     assert both.fields["gap"] == pytest.approx([gap, 2 * gap])
     axis = Subject(drive, Recipe("direct")).coordinate("shaft.gap", ["9 arcmin at output", "2x"])
     assert axis.values == pytest.approx([gap, 2 * gap], rel=1e-14)
@@ -247,7 +247,7 @@ AXIS = Subject(GEARED, Recipe("direct")).coordinate
         (lambda: gaps_of(CRANE, ["9 arcmin at output"]), 'gaps = "9 arcmin at output": without gear.ratio'),
         (lambda: gaps_of(GEARED, ["4 arcmin", "9 arcmin at output"]), "behind some of the values only"),
         (lambda: gaps_of(CHAIN, ["9 arcmin at output"]), "the gears of a chain are in its shafts"),
-        (lambda: records(CHAIN, gap=["9 arcmin at output"]), "the gears of a chain are in its shafts"),
+        (lambda: machine_table(CHAIN, gap=["9 arcmin at output"]), "the gears of a chain are in its shafts"),
         (lambda: Shaft(100.0, gap="9 arcmin at output"), 'write side = "before" or "after"'),
         (lambda: Mass("3 kg*m^2 at output"), 'inertia on its own shaft does not take "at output"'),
         (lambda: simulate(GEARED, "ramp", parameters={"time": "1 s at output"}), 'does not take "at output"'),

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from tests.softstart.kernel.pieces import Pieces
 from tests.twin import chain_of
 
-from softstart import Drive, InputError, records, simulate
+from softstart import Drive, InputError, machine_table, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 
 CRANE = Drive.load("crane-4amtkf")
@@ -58,7 +58,7 @@ def test_a_load_at_rest_moves_beyond_active_plus_or_minus_friction(torque: float
 def test_a_batch_a_chain_and_a_single_start_are_one(friction: float) -> None:
     drive = BELT.replace(load_friction=friction, start_position="mid-gap")
     one = simulate(drive, "direct")
-    assert simulate(records(drive, gap=[0.5, 0.2]), "direct").k_dyn[0] == one.k_dyn
+    assert simulate(machine_table(drive, gap=[0.5, 0.2]), "direct").k_dyn[0] == one.k_dyn
     assert simulate(chain_of(drive), "direct", fitted_to=drive).peak_torque == one.peak_torque
     assert abs(one.energy.residual) < 1e-12 * one.energy.motor
 
@@ -100,8 +100,8 @@ def test_where_the_start_begins() -> None:
     assert BELT.replace(load_friction=5.0, gap=0.0).start_position == "mid-gap"
     assert BELT.replace(load_torque=-LIFT, load_friction=5.0).start_position == "unknown"
     with pytest.raises(InputError, match="start_position is missing: friction holds some of these loads"):
-        records(BELT, load_friction=[0.0, 9.0])
-    assert len(records(BELT.replace(start_position="mid-gap"), load_friction=[0.0, 9.0])) == 2
+        machine_table(BELT, load_friction=[0.0, 9.0])
+    assert len(machine_table(BELT.replace(start_position="mid-gap"), load_friction=[0.0, 9.0])) == 2
 
 
 def test_more_friction_never_speeds_up_a_start() -> None:
@@ -109,7 +109,7 @@ def test_more_friction_never_speeds_up_a_start() -> None:
     for torque in (-6.0, 0.0, 5.0):
         drive = BELT.replace(load_torque=torque, start_position="driving-flank", damping=3.0)
         frictions = np.linspace(0.0, 30.0, 13)
-        times = simulate(records(drive, load_friction=frictions), "direct").start_time.values
+        times = simulate(machine_table(drive, load_friction=frictions), "direct").start_time.values
         assert all(before < after for before, after in pairwise(times))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, records, sweep
+from softstart import Drive, InputError, machine_table, sweep
 from softstart.controller.recipe import Recipe
 from softstart.sweeping.grid import read_grid
 
@@ -71,7 +71,7 @@ def test_all_mistakes_at_once():
             {"gapp": [1], "load.inertia": [-1.0], "controller.tme": [1], "stiffness": ["soft"]},
             figures=["k_dym"],
             until=-1.0,
-            fitted_to=records(CRANE, gap=[1.0, 2.0]),
+            fitted_to=machine_table(CRANE, gap=[1.0, 2.0]),
         )
     told = "\n".join(caught.value.sentences)
     assert len(caught.value.sentences) == 7

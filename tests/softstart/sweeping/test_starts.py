@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, Status, records, simulate, sweep
+from softstart import Drive, InputError, Status, machine_table, simulate, sweep
 from softstart.controller import make_controller, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
 from softstart.start.batch import figure_columns
@@ -158,7 +158,7 @@ def test_starts_that_fail_are_nan_with_a_status():
 
 @pytest.mark.parametrize("wrong", [
     {"workers": 1.5}, {"chunk": 0}, {"figures": []}, {"figures": ["k_dyn", 3]}, {"until": float("nan")},
-    {"fitted_to": records(CRANE, gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
+    {"fitted_to": machine_table(CRANE, gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
 ])  # fmt: skip
 def test_options_that_cannot_be_are_refused_in_one_sentence(wrong):
     with pytest.raises(InputError) as caught:

@@ -14,10 +14,11 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive.model import PARAMETERS, Drive
 
 
-class Columns(Drive):
-    """A drive whose numbers may be arrays, which broadcast together: drives as columns of a table.
+class DriveColumns(Drive):
+    """A drive whose numbers may be arrays, which broadcast together: a table of drives, vectorised.
 
-    What follows from the numbers of a drive follows from columns element by element. People see `Records`.
+    What follows from the numbers of a drive follows from arrays element by element, so that a table of a
+    million drives is checked and handed to the kernel without a `Drive` for each. Users see `MachineTable`.
     """
 
     BATCH: ClassVar[bool] = True
@@ -56,13 +57,13 @@ class Columns(Drive):
 
 def each_of(machine: Any, values: object) -> Vector:
     """A value that follows from a machine as an array: one number, or one for each drive of columns."""
-    shape = machine.shape if isinstance(machine, Columns) else ()
+    shape = machine.shape if isinstance(machine, DriveColumns) else ()
     return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).ravel()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Records:
-    """Many machines that differ in some values: made by `records`, started by one `simulate`.
+class MachineTable:
+    """Many machines that differ in some values: made by `machine_table`, started by one `simulate`.
 
     Attributes
     ----------
@@ -75,8 +76,8 @@ class Records:
 
     Examples
     --------
-    >>> from softstart import Drive, records
-    >>> worn = records(Drive.load("crane-4amtkf"), gap=["30 deg", "60 deg"])
+    >>> from softstart import Drive, machine_table
+    >>> worn = machine_table(Drive.load("crane-4amtkf"), gap=["30 deg", "60 deg"])
     >>> worn.shape, worn.fields["gap"].round(3).tolist(), [drive.load_inertia for drive in worn.elements()]
     ((2,), [0.524, 1.047], [0.175, 0.175])
     """
@@ -86,7 +87,7 @@ class Records:
     parts: tuple[Any, ...]
 
     @classmethod
-    def of(cls, machine: Any, columns: Columns) -> Self:
+    def of(cls, machine: Any, columns: DriveColumns) -> Self:
         """The table of these drives."""
         values, shape = vars(columns), columns.shape
         arrays = {name: values[name] for name in PARAMETERS if isinstance(values[name], np.ndarray)}
@@ -101,12 +102,12 @@ class Records:
         return math.prod(self.shape)
 
     def __repr__(self) -> str:
-        return f"<Records of {self.machine.name}: {', '.join(self.fields)} of shape {self.shape}>"
+        return f"<MachineTable of {self.machine.name}: {', '.join(self.fields)} of shape {self.shape}>"
 
     def elements(self) -> Iterator[Any]:
         """The single machines, last index fastest."""
         for part in self.parts:
-            yield from part.elements() if isinstance(part, Columns) else (part,)
+            yield from part.elements() if isinstance(part, DriveColumns) else (part,)
 
     @property
     def mean_torque(self) -> Vector:
