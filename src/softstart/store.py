@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, Self
 from softstart.errors import DamagedWarning, InputError, listed
 from softstart.stopping import STOPPING, at_stop
 
-Record = dict[str, Any]
+PartRecord = dict[str, Any]
 SMALLEST = 512  # bytes of an SQLite file
 # the first two remove what a killed process left; a power failure may cost the file, but no number is wrong
 MODES = "journal_mode = PERSIST", "journal_mode = DELETE", "locking_mode = EXCLUSIVE", "synchronous = OFF"
@@ -133,7 +133,7 @@ class PartStore:
     def __init__(self, target: Target | None, inputs: Mapping[str, Any], keys: list[str]) -> None:
         self.target, self.keys = target, keys
         self._inputs = json.dumps(inputs, sort_keys=True)
-        self._parts: dict[str, Record] = {}
+        self._parts: dict[str, PartRecord] = {}
         self.damaged: list[str] = []  # parts that were not as they had been written
         self._base: sqlite3.Connection | None = None
         self._open, self._stays = ExitStack(), False
@@ -162,7 +162,7 @@ class PartStore:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
-    def find(self, *part: Any) -> Record | None:
+    def find(self, *part: Any) -> PartRecord | None:
         """The record of a part, or None if it is not finished."""
         return self._parts.get(json.dumps(part))
 
@@ -172,11 +172,11 @@ class PartStore:
         if STOPPING.is_set():  # `_close` may have read it already
             raise KeyboardInterrupt
 
-    def parts(self) -> list[Record]:
+    def parts(self) -> list[PartRecord]:
         """All records."""
         return list(self._parts.values())
 
-    def add(self, record: Record) -> None:
+    def add(self, record: PartRecord) -> None:
         """Keep a part, on disk too."""
         key = json.dumps([record[name] for name in self.keys])
         self._parts[key] = dict(record)

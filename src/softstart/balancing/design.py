@@ -63,13 +63,13 @@ def couple_shaft(engine: Engine, turn: int) -> tuple[BalancerShaft, ...]:
     )
 
 
-def arm(engine: Engine, speed: float, load: float | None = None, *, gas: bool = True) -> complex:
+def balancer_arm(engine: Engine, speed: float, load: float | None = None, *, gas: bool = True) -> complex:
     """Height + i offset in m with which the first order of the reaction torque vanishes at this speed.
 
     With A cos(phi) + B sin(phi) the first order of the torque (of inertia, and of the `gas` too), and throws
     together, h = B/F_b and e = A/F_b.
 
-    >>> place = arm(Engine.load("vaz-11113"), 4500 * math.pi / 30)
+    >>> place = balancer_arm(Engine.load("vaz-11113"), 4500 * math.pi / 30)
     >>> round(1000 * place.real, 2), round(1000 * place.imag, 2)  # mm
     (25.93, 10.27)
     """
@@ -326,7 +326,7 @@ def balance(
         if gas and engine.gas is None:
             continue
         speeds_of_arm = all_speeds if variable else np.full(all_speeds.size, tuning)
-        places = np.array([arm(engine, float(w), load_used, gas=gas) for w in speeds_of_arm])
+        places = np.array([balancer_arm(engine, float(w), load_used, gas=gas) for w in speeds_of_arm])
         places = places if sideways else places.real + 0j  # [B] uses h alone
         shafts = two_shafts(engine, complex(places[np.argmin(np.abs(all_speeds - tuning))]))
         layouts.append((name, about, shafts, places))

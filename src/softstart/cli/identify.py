@@ -11,7 +11,7 @@ import softstart
 from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import command, option
-from softstart.cli.running import Answer, answers, working
+from softstart.cli.running import Output, answers, working
 from softstart.drive import Drive
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ free_option = option("--free", options.read_list)
 @option("--max-travel")
 @options.of_drive(options.read_drive)
 @answers(out=True)
-def plan_command(*, drive: Drive, standard: bool, **arguments: Any) -> Answer:
+def plan_command(*, drive: Drive, standard: bool, **arguments: Any) -> Output:
     """Plan an experiment that identifies a drive accurately.
 
     DRIVE is your estimate, as a TOML file or the name of a shipped drive (see: softstart drives); by default
@@ -86,7 +86,7 @@ def _columns(text: str, option: str) -> dict[str, str]:
 def identify_command(
     *, logs: tuple[str, ...], drive: Machine, controllers: list[str], columns: dict[str, str],
     torque_is: TorqueIs, **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
     LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with names and units
@@ -132,7 +132,7 @@ def identify_command(
 @option("--dates", options.read_list, required=True)
 @option("--worn-gap limit")
 @answers(out=True)
-def wear_command(*, folders: tuple[str, ...], **arguments: Any) -> Answer:
+def wear_command(*, folders: tuple[str, ...], **arguments: Any) -> Output:
     """Compute the growth of the gap from several identifications, and when it is worn.
 
     Each FOLDER is what softstart identify --out has written of the same drive, in another year.

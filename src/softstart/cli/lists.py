@@ -9,7 +9,7 @@ import click
 
 from softstart.cli.completion import one_of
 from softstart.cli.options import check_name, command, drive_names
-from softstart.cli.running import Answer, answers, attributed, option_value, working
+from softstart.cli.running import Output, answers, attributed, option_value, working
 from softstart.drive import Drive, library
 from softstart.errors import InputError, Mistakes
 from softstart.hints import did_you_mean
@@ -33,7 +33,7 @@ OWN = (
 @command("drives")
 @click.argument("name", required=False, shell_complete=one_of(drive_names))
 @answers()
-def drives_command(*, name: str | None) -> Answer:
+def drives_command(*, name: str | None) -> Output:
     """List the shipped drives, or print one as TOML.
 
     To begin a file of your own: softstart drives crane-4amtkf > mine.toml
@@ -54,7 +54,7 @@ def drives_command(*, name: str | None) -> Answer:
 @command("controllers")
 @click.argument("name", required=False, shell_complete=one_of(controller_names))
 @answers()
-def controllers_command(*, name: str | None) -> Answer:
+def controllers_command(*, name: str | None) -> Output:
     """List the controllers, or show the parameters of one.
 
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
@@ -124,7 +124,7 @@ def _one(about: dict[str, Any]) -> Sheet:
 @command("study")
 @click.argument("name", required=False, shell_complete=one_of(lambda: registered(STUDIES)))
 @answers(out=True)
-def study_command(*, name: str | None) -> Answer:
+def study_command(*, name: str | None) -> Output:
     """List the studies, or run one.
 
     Options
@@ -144,7 +144,7 @@ def study_command(*, name: str | None) -> Answer:
     return lambda: {"study": study.name, "title": study.title} | result.summary(), _study_sheet(study, result)
 
 
-def _studies() -> Answer:
+def _studies() -> Output:
     """All studies as data, and as a table with those that cannot be loaded."""
     studies: list[Study] = []
     broken = Mistakes()

@@ -12,7 +12,7 @@ from softstart.balancing.engine import TABLES
 from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import command, count, option
-from softstart.cli.running import Answer, answers, working
+from softstart.cli.running import Output, answers, working
 from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.laws import read_law
 from softstart.clutch.model import LIBRARY as CLUTCHES
@@ -45,7 +45,7 @@ def _read_law(text: str, option: str) -> dict[str, Any]:
 def clutch_command(
     *, clutch: Clutch, law: dict[str, Any] | None, until: float | None, optimal: bool, points: int | None,
     nondecreasing: bool,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Simulate a clutch engagement: peak shaft torque, friction work, slip time.
 
     CLUTCH is a TOML file or the name of a shipped clutch; by default that of the literature. The driving side
@@ -105,7 +105,7 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
 @option("--speed speeds", _read_speeds, multiple=True)
 @options.of_file(Engine, "vaz-11113", ENGINES, TABLES)
 @answers(out=True)
-def balance_command(*, engine: Engine, speeds: list[float] | None) -> Answer:
+def balance_command(*, engine: Engine, speeds: list[float] | None) -> Output:
     """Compute forces and moments of a piston engine by order, and design a balancer.
 
     ENGINE is a TOML file or the name of a shipped engine; by default the two-cylinder engine VAZ-11113 of the

@@ -11,7 +11,7 @@ import click
 import softstart
 from softstart.cli import options
 from softstart.cli.options import command, option, quantity
-from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError, SimulationError
 from softstart.input.gear import BEHIND
 from softstart.optimal.problem import OBJECTIVES, TERMINALS, StartTime
@@ -105,7 +105,7 @@ def _no_solution() -> Iterator[None]:
 def optimize_command(
     *, drive: Machine, gaps: Sequence[float | str] | None, inertias: Sequence[float | str] | None,
     load_torques: Sequence[float | str] | None, **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
@@ -177,7 +177,7 @@ def _runs_beside(best: Optimum) -> list[Run]:
 @answers(out=True)
 def pareto_command(
     *, drive: Machine, start_times: list[StartTime] | None, controllers: list[str] | None, **arguments: Any
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Compute the lowest K_dyn over the start time, and compare the controllers with it.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by

@@ -77,7 +77,7 @@ def code_allowed() -> bool:
     return context is not None and bool(context.meta.get(CODE))
 
 
-def command_line() -> str:
+def typed_command() -> str:
     """The command that runs now, as one would type it."""
     return shlex.join(["softstart", *(click.get_current_context().obj or ())])
 
@@ -312,17 +312,17 @@ def read_changes(settings: Sequence[str]) -> dict[str, Any]:
 DESCRIBED = re.compile(r"^(--\S+)(?: (\S.*))?\n((?:    .*\n?)+)", re.MULTILINE)
 
 
-def described(text: str) -> dict[str, tuple[str | None, str]]:
+def described_options(text: str) -> dict[str, tuple[str | None, str]]:
     """Metavar and meaning of each option that a docstring describes.
 
-    >>> described("--until TIME\\n    End of the simulation,\\n    in s.\\n--json\\n    Print JSON.")
+    >>> described_options("--until TIME\\n    End of the simulation,\\n    in s.\\n--json\\n    Print JSON.")
     {'--until': ('TIME', 'End of the simulation, in s.'), '--json': (None, 'Print JSON.')}
     """
     rows = DESCRIBED.findall(text)
     return {flag: (metavar or None, " ".join(lines.split())) for flag, metavar, lines in rows}
 
 
-SHARED = described(__doc__ or "")
+SHARED = described_options(__doc__ or "")
 
 
 class DocumentedCommand(click.Command):
@@ -332,7 +332,7 @@ class DocumentedCommand(click.Command):
         super().__init__(*args, **settings)
         # what stands behind the heading belongs to the options, not to the text of the command
         self.help, _, options = inspect.cleandoc(self.help or "").partition("\n\nOptions\n-------\n")
-        meanings = SHARED | described(options)
+        meanings = SHARED | described_options(options)
         for parameter in self.params:
             if isinstance(parameter, click.Option):
                 parameter.metavar, parameter.help = meanings.get(parameter.opts[0], (None, None))

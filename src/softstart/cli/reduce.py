@@ -8,7 +8,7 @@ from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
 from softstart.cli import options
 from softstart.cli.options import command, option
-from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.terminal import print_json
@@ -24,7 +24,7 @@ from softstart.views.terminal import print_json
 @answers(out=True)
 def reduce_command(
     *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **arguments: Any
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Compute the natural frequencies of a chain, and reduce it to two masses.
 
     CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); by default the crane

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.cli import options
 from softstart.cli.options import command, option
-from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 
@@ -43,7 +43,7 @@ PRINTING = 120.0  # s for a browser to print a report
 def report_command(
     *, drive: Machine | Identification, to: str | None, pdf: str | None, controllers: list[str] | None,
     params: dict[str, str], **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Write a report on the start of a drive or a chain as one HTML file.
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
@@ -83,7 +83,7 @@ def report_command(
         from softstart.reporting import report as compute
 
         report = compute(
-            drive, controllers=controllers_from_options(controllers, params), command=options.command_line(),
+            drive, controllers=controllers_from_options(controllers, params), command=options.typed_command(),
             progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **arguments,
         )  # fmt: skip
         show("drawing the figures")

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.completion import folders
-from softstart.cli.options import Decorator, code_allowed, command_line, json_option, named_as_options, option
+from softstart.cli.options import (
+    Decorator,
+    code_allowed,
+    json_option,
+    named_as_options,
+    option,
+    typed_command,
+)
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.parallel import LOADED_FROM_FILE
@@ -32,12 +39,11 @@ COMPILING = "compiling, once: half a minute at the first command after installat
 WRITTEN = "## Where this comes from\n\nsoftstart "  # in every report.md of softstart
 _SAID: list[str] = []  # what this process has said of it
 
-Progress = Callable[[str], None]
-Answer = Result | tuple[Any, ...]  # of `answers`
+Output = Result | tuple[Any, ...]  # of `answers`
 
 
 @contextmanager
-def working(doing: str) -> Iterator[Progress]:
+def working(doing: str) -> Iterator[Callable[[str], None]]:
     """A status line on a terminal while something is done; what anyone prints goes to standard error.
 
     Gives what changes the line. In a pipe, where there is none, what is being done is a line of its own, at
@@ -128,7 +134,7 @@ def answers(out: bool = False) -> Decorator:
                 data, shown, *failures = answer
                 if folder is not None:
                     with working("drawing the figures ..."):
-                        sheet.export(shown, folder, command_line())
+                        sheet.export(shown, folder, typed_command())
             if as_json:
                 print_json(data())
             elif isinstance(shown, str):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import softstart
 from softstart.cli import options
 from softstart.cli.options import command, controller_option, option
-from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.plugins import controller_names
 from softstart.quantities import whole_number
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 def compare_command(
     *, drive: Machine | Identification, controllers: list[str] | None, params: dict[str, str], details: bool,
     **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Compare strategies on a drive or a chain.
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
@@ -92,7 +92,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
 @answers(out=True)
 def simulate_command(
     *, drive: Machine, controller: str, params: dict[str, str], fitted_to: Drive | None, until: float | None
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Simulate one start of a drive or a chain.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
@@ -143,7 +143,7 @@ def _numbers(text: str, option: str) -> dict[str, int]:
 def fatigue_command(
     *, drive: Machine, controllers: list[str] | None, fitted_to: Drive | None, params: dict[str, str],
     **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Estimate the fatigue life of the shaft line under each strategy.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
@@ -186,7 +186,7 @@ def fatigue_command(
 @options.param_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
-def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Answer:
+def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Output:
     """Linearise the control loop: stability margins, modes, limit cycles.
 
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane

@@ -15,7 +15,7 @@ import softstart
 from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import command, option
-from softstart.cli.running import Answer, answers, attributed, option_value, working
+from softstart.cli.running import Output, answers, attributed, option_value, working
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.gear import BEHIND
@@ -54,7 +54,7 @@ PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 def sweep_command(
     *, drive: Machine, controller: str | None, grid: tuple[str, ...], params: dict[str, str],
     fitted_to: Drive | None, netcdf: Path | None, **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Simulate a grid of drives and controllers of any size.
 
     DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane

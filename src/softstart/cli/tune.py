@@ -12,7 +12,7 @@ import click
 import softstart
 from softstart.cli import options
 from softstart.cli.options import command, controller_option, option
-from softstart.cli.running import Answer, answers, attributed, controllers_from_options, option_value, working
+from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.drive import PARAMETERS
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
@@ -107,7 +107,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 def tune_command(
     *, drive: Machine | Identification | UnknownStiffness, controller: str, params: dict[str, str],
     only: str | None, **arguments: Any,
-) -> Answer:  # fmt: skip
+) -> Output:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
     DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an

@@ -23,7 +23,7 @@ from softstart.clutch.model import Clutch
 from softstart.clutch.motion import (
     ClutchMode,
     ClutchState,
-    Step,
+    TaylorStep,
     event_functions,
     first_crossing,
     next_mode,
@@ -141,7 +141,7 @@ class Engagement(Result, view="clutches.engagement_sheet"):
     energy: EnergyBalance
     phases: tuple[Phase, ...]
     events: tuple[EngagementEvent, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[TaylorStep, ...]
 
     @property
     def peak_ratio(self) -> float:
@@ -254,14 +254,14 @@ def _time_limit(clutch: Clutch, law: Law) -> float:
 
 def _steps(
     clutch: Clutch, law: Law, until: float | None, events: list[EngagementEvent]
-) -> tuple[list[Step], ClutchMode, float]:
+) -> tuple[list[TaylorStep], ClutchMode, float]:
     """The steps up to `until` or the end, the last mode, and the energy in J lost as damped flanks separate.
 
     The end is one period 2 pi sqrt(Ic/cp) after the first lock-up, with a gap not before the twist has
     reversed twice, and never while the clutch slips again. An engagement that does not get there ends at the
     time limit.
     """
-    steps: list[Step] = []
+    steps: list[TaylorStep] = []
     state, mode = ClutchState(), start_mode(clutch)
     last = _time_limit(clutch, law) if until is None else until
     earliest_end = math.inf  # until then at least, once it has locked
@@ -303,7 +303,7 @@ def _steps(
     return steps, mode, lost
 
 
-def _first_event(clutch: Clutch, step: Step) -> tuple[Step, str]:
+def _first_event(clutch: Clutch, step: TaylorStep) -> tuple[TaylorStep, str]:
     """The step up to the first event within it, and the event function; the whole step without one."""
     name, share = "", math.inf
     jitter = ROUNDING * step.start / step.length
@@ -315,7 +315,12 @@ def _first_event(clutch: Clutch, step: Step) -> tuple[Step, str]:
 
 
 def _figures(
-    clutch: Clutch, law: Law, steps: list[Step], events: list[EngagementEvent], mode: ClutchMode, lost: float
+    clutch: Clutch,
+    law: Law,
+    steps: list[TaylorStep],
+    events: list[EngagementEvent],
+    mode: ClutchMode,
+    lost: float,
 ) -> Engagement:
     """Peaks, work and energy of the steps."""
     drive, load, damping = 0.0, 0.0, lost
@@ -352,18 +357,18 @@ def _figures(
     )  # fmt: skip
 
 
-def _slip(clutch: Clutch, step: Step) -> Vector:
+def _slip(clutch: Clutch, step: TaylorStep) -> Vector:
     """w0 - wM."""
     return np.append(clutch.drive_speed - step.wM[0], -step.wM[1:])
 
 
-def _integral(step: Step, a: Vector, b: Vector | None = None) -> float:
+def _integral(step: TaylorStep, a: Vector, b: Vector | None = None) -> float:
     """Integral over the step of one series, or of the product of two, every term of it."""
     product = a if b is None else np.convolve(a, b)
     return step.length * float((product / np.arange(1, product.size + 1)).sum())
 
 
-def _peak(steps: Iterable[Step]) -> tuple[float, float]:
+def _peak(steps: Iterable[TaylorStep]) -> tuple[float, float]:
     """Largest |T| of the steps and its instant; of equal peaks the first."""
     top, when = 0.0, 0.0
     for step in steps:

@@ -78,7 +78,7 @@ class ClutchMode:
 
 
 @dataclass(frozen=True)
-class Step:
+class TaylorStep:
     """Taylor coefficients over the share u from 0 to 1 of a step from `start` to `end` (s), in SI.
 
     M is the friction torque that the clutch can transmit, F the torque through the clutch, T that of the
@@ -106,7 +106,7 @@ class Step:
         """Speed of the twist, wM - wc."""
         return self.wM - self.wc
 
-    def cut(self, share: float) -> Step:
+    def cut(self, share: float) -> TaylorStep:
         """The first part of it."""
         powers = share**POWERS
         series = {name: getattr(self, name) * powers for name in ("M", "F", "T", "theta", "wM", "wc")}
@@ -123,7 +123,7 @@ def start_mode(clutch: Clutch) -> ClutchMode:
     return ClutchMode(1, 0 if clutch.gap > 0.0 else 1, clutch.gap == 0.0, None if free else 0)
 
 
-def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, last: float) -> Step:
+def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, last: float) -> TaylorStep:
     """The series of the mode from the state on: at most to `last` (s) and to the end of the law's piece."""
     IM, Ic, c, d = clutch.clutch_inertia, clutch.load_inertia, clutch.stiffness, clutch.damping
     piece, end = law.piece_at(state.t)
@@ -152,13 +152,13 @@ def step_from(clutch: Clutch, law: Law, state: ClutchState, mode: ClutchMode, la
             wc[n + 1] = h * per_c * (T[n] - constant[n]) / (n + 1)  # Ic wc' = T - R
     z[0] = state.theta  # from the overlap of the flank back to the twist
     shaft = np.array(T)
-    return Step(
+    return TaylorStep(
         state.t, end, mode, M, shaft if mode.locked else mode.slip * M, shaft,
         np.array(z), np.array(wM), np.array(wc), R,
     )  # fmt: skip
 
 
-def event_functions(clutch: Clutch, step: Step) -> Iterator[tuple[str, Vector]]:
+def event_functions(clutch: Clutch, step: TaylorStep) -> Iterator[tuple[str, Vector]]:
     """(name, Taylor coefficients) of all that may end this mode; each is negative while the mode lasts."""
     mode, half = step.mode, 0.5 * clutch.gap
     if mode.locked:

@@ -34,7 +34,7 @@ class SweepSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class ChunkTask:
     """A chunk: its place among the chunks, its number of starts, and what varies, see `grid_values`."""
 
     index: tuple[int, ...]
@@ -43,7 +43,7 @@ class Task:
     values: dict[str, Any]
 
 
-def compute(task: Task) -> Block:
+def compute(task: ChunkTask) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
     settings = task.settings
     drive, parameters, name = _by_owner(task.values)
@@ -97,7 +97,7 @@ def first_start(settings: SweepSettings, grid: Grid) -> bool:
     # one value of each axis; the figures are thrown away
     first = {name: one[:1] for name, one in grid.items()}
     for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:
-        compute(Task((), settings, 1, grid_values(first) | ({PREFIX: name} if name else {})))
+        compute(ChunkTask((), settings, 1, grid_values(first) | ({PREFIX: name} if name else {})))
         design = (settings.fitted_to or settings.drive).design_drive
         compiled &= isinstance(settings.recipe.make(name=name).set_up(design)[0], CompiledController)
     return compiled

@@ -26,7 +26,7 @@ from softstart.quantities import check_whole, show
 from softstart.start.batch import figure_columns
 from softstart.start.engine import check_limits
 from softstart.start.results import has_margin
-from softstart.sweeping.compute import SweepSettings, Task, check_corners, compute, first_start
+from softstart.sweeping.compute import ChunkTask, SweepSettings, check_corners, compute, first_start
 from softstart.sweeping.grid import ChunkGrid, Grid, axis_lengths, grid_values, read_grid
 from softstart.sweeping.store import STATUS, FolderStore, MemoryStore
 
@@ -116,30 +116,18 @@ def sweep(
     >>> found.k_dyn.sel(gap=2, load_inertia=0.175).item().__round__(4)
     4.8654
     """
-    drive, recipe, axes, kept, wrong = as_machine(drive), Recipe(), Grid(), tuple[str, ...](), Mistakes()
-    if fitted_to is not None and not isinstance(fitted_to, Machine):
-        wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
-    with wrong.collect():
-        check_limits(until, None, 1, drive.KIND)
-    with wrong.collect():
-        if isinstance(controller, str | None):
-            recipe = Recipe(with_whole_path(controller or ""), dict(parameters or {}), allow_code)
-        else:
-            recipe = Recipe(make_controller(controller, parameters))
-        axes = read_grid(grid, recipe, drive)
-    with wrong.collect():
-        kept = _figures(drive, figures)
-    wrong.raise_if_any()
+    settings, axes = _settings(
+        drive, controller, grid, parameters, until, fitted_to, figures, allow_code=allow_code
+    )
     if chunk is not None:
         check_whole(chunk, "chunk")
     checked_workers(workers, scheduler)
-    settings = SweepSettings(drive, recipe, kept, until, fitted_to)
     check_corners(settings, axes)
     shape = tuple(axis_lengths(axes).values())
     texts = [dim in axes and axes[dim].dtype.kind == "U" for dim in axis_lengths(axes)]
     plan = ChunkGrid.of(shape, texts, chunk)
     threads = first_start(settings, axes)  # compiled steps release the GIL
-    count = usable_workers(recipe.given, "the controller", workers, scheduler, threads)
+    count = usable_workers(settings.recipe.given, "the controller", workers, scheduler, threads)
     chunks = MemoryStore(plan, axes, settings) if to is None else FolderStore(Path(to), plan, axes, settings)
     with chunks as store:
         begin, before = time.monotonic(), sum(map(plan.size, store.finished))
@@ -149,10 +137,10 @@ def sweep(
             if progress is not None:
                 progress(SweepProgress(done, plan.starts, before, time.monotonic() - begin))
 
-        def task(index: tuple[int, ...]) -> Task:
+        def task(index: tuple[int, ...]) -> ChunkTask:
             place = dict(zip(axis_lengths(axes), plan.place(index), strict=True))
             part = {name: one.isel({one.dims[0]: place[str(one.dims[0])]}) for name, one in axes.items()}
-            return Task(index, settings, plan.size(index), grid_values(part))
+            return ChunkTask(index, settings, plan.size(index), grid_values(part))
 
         tell()
         left = plan.indices() if done < plan.starts else iter(())
@@ -168,7 +156,30 @@ def sweep(
         return store.results()
 
 
-def _described(task: Task) -> str:
+def _settings(
+    given: MachineLike, controller: str | Controller | None, grid: Mapping[str, Any],
+    parameters: Mapping[str, object] | None, until: float | None, fitted_to: Machine | None, figures: Any,
+    *, allow_code: bool,
+) -> tuple[SweepSettings, Grid]:  # fmt: skip
+    """What is the same for all starts, and the axes; or one InputError for all that is wrong with them."""
+    drive, recipe, axes, kept, wrong = as_machine(given), Recipe(), Grid(), tuple[str, ...](), Mistakes()
+    if fitted_to is not None and not isinstance(fitted_to, Machine):
+        wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
+    with wrong.collect():
+        check_limits(until, None, 1, drive.KIND)
+    with wrong.collect():
+        if isinstance(controller, str | None):
+            recipe = Recipe(with_whole_path(controller or ""), dict(parameters or {}), allow_code)
+        else:
+            recipe = Recipe(make_controller(controller, parameters))
+        axes = read_grid(grid, recipe, drive)
+    with wrong.collect():
+        kept = _figures(drive, figures)
+    wrong.raise_if_any()
+    return SweepSettings(drive, recipe, kept, until, fitted_to), axes
+
+
+def _described(task: ChunkTask) -> str:
     return f"chunk {', '.join(map(str, task.index))} of the sweep"
 
 

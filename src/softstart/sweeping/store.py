@@ -68,7 +68,7 @@ def empty_results(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> xarra
     return xarray.Dataset(data, {**numbers, **grid}, attributes)
 
 
-def inputs_of(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> dict[str, Any]:
+def sweep_inputs(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> dict[str, Any]:
     """Everything that the results follow from, as plain data; long rows of values as a fingerprint."""
     inputs: dict[str, Any] = {
         "drive": settings.drive.to_toml(),
@@ -129,7 +129,7 @@ class FolderStore(MemoryStore):
     def __init__(self, path: Path, plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> None:
         super().__init__(plan, grid, settings)
         self.path, self._target = path, Target("to", path, "sweep", LIST)
-        self._list = PartStore(self._target, inputs_of(plan, grid, settings), ["part"])
+        self._list = PartStore(self._target, sweep_inputs(plan, grid, settings), ["part"])
         self._exit = ExitStack()
 
     def __enter__(self) -> Self:

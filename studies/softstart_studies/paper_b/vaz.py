@@ -7,7 +7,7 @@ import math
 from functools import cache
 
 from softstart.balancing import Balance, Engine, SimpleCycle, balance
-from softstart.balancing.design import arm, two_shafts
+from softstart.balancing.design import balancer_arm, two_shafts
 from softstart.balancing.engine import shaking_of_shafts
 
 RPM = math.pi / 30.0  # rad/s
@@ -98,7 +98,7 @@ def left_at_load(load: float, rpm: float, *, sideways: bool = False) -> tuple[fl
     0.0
     """
     w = rpm * RPM
-    place = arm(VAZ, w, 1.0)
+    place = balancer_arm(VAZ, w, 1.0)
     place = place if sideways else complex(place.real)
     torque = VAZ.torque_harmonics(w, load)[2]
     balancing = w**2 * shaking_of_shafts(two_shafts(VAZ, place))[2][2]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.softstart.balancing.engines import RPM, engine
 
 from softstart.balancing import BalancerShaft, Counterweights, Engine, balance
-from softstart.balancing.design import arm, free_force, two_shafts
+from softstart.balancing.design import balancer_arm, free_force, two_shafts
 from softstart.balancing.engine import ORDERS, TURNS, force_at, largest_of_orders, shaking_of_shafts
 from softstart.balancing.slider_crank import inertia_torque_harmonics
 from softstart.errors import InputError
@@ -58,7 +58,7 @@ def test_the_complete_design_leaves_nothing_of_first_order(count, rod, stroke, l
     angles = [(turn + 2.0 * math.pi * i) % (4.0 * math.pi) for i in range(count)]
     made = engine(firing_angles=angles, weights=HALF, rod_length=rod, stroke=stroke)
     w = 3000.0 * RPM
-    pair = two_shafts(made, arm(made, w, load))
+    pair = two_shafts(made, balancer_arm(made, w, load))
     of_shafts, _, moment = shaking_of_shafts(pair)
     unit = count * made.masses.reciprocating * made.cylinders.crank.r
     assert largest_of_orders(made.crank_shaking[0] + of_shafts)[1] < 1e-14 * unit * 10
