@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.linalg import orth
@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import PARAMETERS, Drive, Machine
 from softstart.errors import InputError, Sentence, listed
 from softstart.identification.fitting import (
     MOST_RIPPLE,
@@ -176,7 +176,7 @@ def _directed(log: Log, drive: Drive) -> Log:
     return log.changed(notes=(*log.notes, note.replace("angle", log.kind)))
 
 
-def reduced_drive(machine: Any) -> Drive:
+def reduced_drive(machine: Machine) -> Drive:
     """The drive of two masses that stands for a machine; refused where no gap is the larger part of all.
 
     >>> reduced_drive(Chain.load("crane-4-mass"))
@@ -199,9 +199,9 @@ def reduced_drive(machine: Any) -> Drive:
     return machine.two_masses
 
 
-def _neglected_modes(chain: Any) -> list[str]:
+def _neglected_modes(chain: Machine) -> list[str]:
     """What the reduction of more than two masses leaves out."""
-    if len(chain.mass_names) <= 2:
+    if not isinstance(chain, Chain) or len(chain.masses) <= 2:
         return []
     first, second = (reduce_chain(chain, force=True).vibration.Omega[1:3] / TURN).tolist()
     return [

@@ -183,7 +183,7 @@ def _described(task: ChunkTask) -> str:
     return f"chunk {', '.join(map(str, task.index))} of the sweep"
 
 
-def _figures(drive: Machine, figures: Any) -> tuple[str, ...]:
+def _figures(drive: Machine, figures: object) -> tuple[str, ...]:
     """The figures asked for, or the usual ones; InputError for those that starts of this machine lack."""
     limited, known = has_margin(drive.limits), list(figure_columns(drive.shaft_names))
     if figures is None:
