@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import importlib.util
 import inspect
 import re
 import runpy
@@ -48,6 +49,7 @@ def test_summary_and_example(name: str) -> None:
 
 
 def test_pages_about_modules_exist() -> None:
+    assert [module for module in FURTHER["PAGES"] if importlib.util.find_spec(module) is None] == []
     assert [
         page for pages in FURTHER["PAGES"].values() for page in pages if not (DOCS / f"{page}.md").exists()
     ] == []

@@ -108,7 +108,10 @@ def cli(context: click.Context) -> None:
 def first_sentences(module: str) -> dict[str, str]:
     """The first paragraph of the docstring of each command of a module, which is not imported for it."""
     # importing all commands for their first sentences would take longer than most answers
-    tree = ast.parse(get_data(__package__, f"{module}.py") or b"")
+    try:
+        tree = ast.parse(get_data(__package__, f"{module}.py") or b"")
+    except OSError:  # installed without sources
+        return {}
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     return {node.name: (ast.get_docstring(node) or "").split("\n\n")[0] for node in functions}
 
