@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
@@ -21,7 +21,6 @@ from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, limit
 from softstart.reporting.resolution import rated_torque
-from softstart.reporting.result import Report
 from softstart.start import fatigue
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
@@ -43,6 +42,9 @@ from softstart.views.numbers import (
     unit,
     units_of,
 )
+
+if TYPE_CHECKING:
+    from softstart.reporting.result import Report
 
 HERE = Path(__file__).parent
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
