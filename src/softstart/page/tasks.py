@@ -19,15 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
-from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.machine import Machine
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.page.downloads import file_name, profile_file, written_text
 from softstart.page.machines import Loaded, with_typed_changes
 from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
 from softstart.quantities import show
-from softstart.start.comparison import Comparison, compare
+from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue
 from softstart.start.simulation import simulate
 
@@ -255,6 +254,7 @@ def identified(
 def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     from softstart.optimal.optimize import optimize
+    from softstart.views.checks import margins_sheet, positions_sheet
     from softstart.views.optima import optimum_sheet
     from softstart.views.sheet import Sheet
 
@@ -262,7 +262,13 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     compared = compare(possible, list(controllers.values()))
     machine: Machine = compared.drive
     progress(0.3, "start positions")
-    sheets = [_positions(machine, controllers), _margins(compared)]
+    unknown, runs, mistakes = None, {}, Mistakes()
+    with mistakes.collect():
+        unknown = with_typed_changes(machine, {"start.position": "unknown"})
+    for label, controller in controllers.items() if unknown is not None else ():
+        with suppress(SimulationError):
+            runs[label] = simulate(unknown, controller)
+    sheets = [positions_sheet(runs, mistakes.sentences), margins_sheet(compared)]
     progress(0.6, "life of the shaft line")
     try:
         sheets.append(fatigue([row.run for row in compared.rows]).sheet)
@@ -276,52 +282,11 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
         with no_solution_as_sentence():
             best = optimize(machine, limits=True)
     except (InputError, SimulationError) as error:
-        return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=[str(error)])))
+        notes = error.sentences if isinstance(error, InputError) else [str(error)]
+        return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=notes)))
     label = f"quickest {best.end_time:.4g} s"
     quickest = optimum_sheet(best, [row.run for row in compared.rows])
     return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
-
-
-def _positions(machine: Machine, controllers: Mapping[str, Controller]) -> Sheet:
-    """K_dyn from each position at which a start may begin."""
-    from softstart.views.numbers import TextTable, number
-    from softstart.views.sheet import Sheet
-
-    title = "K_dyn by start position"
-    try:
-        unknown = with_typed_changes(machine, {"start.position": "unknown"})
-    except InputError as error:
-        return Sheet(title, notes=["There is only one start position.", *error.sentences])
-    rows = []
-    for label, controller in controllers.items():
-        with suppress(SimulationError):
-            run = simulate(unknown, controller)
-            rows.append([label, *(number(start.k_dyn, 3) for start in (*run.positions.values(), run))])
-    if not rows or len(rows[0]) < 3:
-        return Sheet(title, notes=["There is only one start position: no gap, or a preloaded one."])
-    names = (position.replace("-", " ") for position in UNKNOWN_POSITIONS)
-    rows.sort(key=lambda row: float(row[-1]))
-    return Sheet(title, tables=[TextTable.of_rows("", ("strategy",), (*names, "worst"), rows)])
-
-
-def _margins(compared: Comparison) -> Sheet:
-    """The worst figure of each strategy beside each limit, and the margin that decides; the largest first."""
-    from softstart.views.numbers import TextTable, short
-    from softstart.views.sheet import Sheet
-
-    title, limits = "Margins to the limits", compared.recommendation.limits
-    if not limits:
-        return Sheet(title, notes=["No limits are given: enter them under Limits, on the left."])
-    each = [(row, row.margins(limits), row.least_margin) for row in compared.rows]
-    each.sort(key=lambda row: math.inf if row[2] is None or math.isnan(row[2].share) else -row[2].share)
-    rows = [
-        [row.name, row.against_limits, (least.case if least else "") or "as it is",
-         *(short(float(f"{margin.value:.4g}")) for margin in margins)]
-        for row, margins, least in each
-    ]  # fmt: skip
-    heads = [f"{margin.name}\n{margin.unit}, at most {margin.limit:.4g}" for margin in each[0][1]]
-    table = TextTable.of_rows("", ("strategy", "least margin", "worst with"), heads, rows)
-    return Sheet(title, tables=[table])  # what is recommended stands on the page already
 
 
 def report_task(
