@@ -70,7 +70,7 @@ def test_tables_of_an_answer_stay_within_their_column(page: Any) -> None:
     answer.locator("table").first.wait_for()
     assert answer.evaluate("e => e.scrollWidth - e.clientWidth <= 1")
     titles = answer.locator("caption").all_inner_texts()
-    assert titles[:2] == ["Least K_dyn, terminal reached", "Least K_dyn, terminal reached, continued"]
+    assert titles[:2] == ["Minimum K_dyn, terminal reached", "Minimum K_dyn, terminal reached, continued"]
 
 
 def test_panels_stay_within_their_column(page: Any) -> None:

@@ -113,10 +113,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     if not slope:
         slope = f"The S-N curve has the {len(curve.points)} points of limits.fatigue"
     elif not found.slope_given:
-        slope += (
-            ", that of pitting of case-hardened gears (ISO 6336-2), as neither --slope nor limits.fatigue is "
-            "given"
-        )
+        slope += ", that of pitting of case-hardened gears (ISO 6336-2), as no slope is given"
     ratio = f"{100.0 * drive.damping_ratio:.2g} %"
     damping = f"Damping ratio of the {'first natural vibration' if several else 'shaft'}: {ratio}."
     if found.estimate:
