@@ -43,6 +43,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
+from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
 
 Value = Any  # a float where all arguments are, otherwise an array
@@ -139,7 +140,7 @@ def shaft_torque(
     119.01
     """
     t, M1, J1, J2, Mc, c, dw12 = _checked(t=t, M1=M1, J1=J1, J2=J2, Mc=Mc, c=c, dw12=dw12)
-    Omega = np.sqrt(c / J1 + c / J2)
+    Omega = elastic_frequency(J1, J2, c)
     sin, cos = np.sin(Omega * t / 2), np.cos(Omega * t / 2)  # half angles: 1 - cos would cancel after contact
     return _plain(2 * sin * (mean_shaft_torque(M1, J1, J2, Mc) * sin + c * dw12 / Omega * cos))
 
@@ -169,7 +170,7 @@ def contact_stage(
     [163.7848, 0.0184, 0.0368]
     """
     M1, J1, J2, Mc, c, dw12 = _checked(M1=M1, J1=J1, J2=J2, Mc=Mc, c=c, dw12=dw12)
-    Omega, share = np.sqrt(c / J1 + c / J2), J2 / (J1 + J2)
+    Omega, share = elastic_frequency(J1, J2, c), J2 / (J1 + J2)
     if not _reactive(kind, Mc):
         mean, B = (M1 * J2 + J1 * Mc) / (J1 + J2), c * dw12 / Omega
         to_peak = np.arctan2(B, -mean)  # pi/2 + psi, accurate also where psi is near -pi/2
@@ -256,7 +257,7 @@ class DirectStarts:
             raise InputError("Ms <= Mc: such a starting torque cannot move the load; raise it.")
         if np.any((way > gap) | (self._wound > mean)):
             raise InputError("theta0: a direct start begins between -gap/2 and gap/2 + mean/c.")
-        Omega, first = np.sqrt(c / J1 + c / J2), np.sqrt(2 * np.maximum(way, 0) / self._a)
+        Omega, first = elastic_frequency(J1, J2, c), np.sqrt(2 * np.maximum(way, 0) / self._a)
         self._Omega, self._lift, self._B = Omega, mean - self._wound, c * self._a * first / Omega
         amplitude, psi = np.hypot(self._lift, self._B), np.arctan2(self._lift, self._B)
         contact = (np.pi + 2 * psi) / Omega

@@ -26,6 +26,7 @@ import numpy as np
 
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
+from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
 from softstart.results import Result
 
@@ -463,7 +464,7 @@ def reduce_chain(chain: Chain, *, factor: float = FACTOR, force: bool = False) -
     c = Omega**2 * J1 * J2 / J
     d = float(arrays.d @ (x[:-1] - x[1:]) ** 2) / modal * (J1 * x1**2 + J2 * x2**2) / (x1 - x2) ** 2
     gap = float(arrays.gap.sum())
-    reduced = TwoMassFigures(math.sqrt(c / J1 + c / J2), J2 / (J1 + J2), J2 / J1, c, J1 + J2, gap)
+    reduced = TwoMassFigures(elastic_frequency(J1, J2, c), J2 / (J1 + J2), J2 / J1, c, J1 + J2, gap)
     least, notes = min(ratios, default=math.inf), tuple(_notes(chain))
     return Reduction(chain, vibration, J1, J2, c, d, gap, _figures(vibration), reduced, factor, least, notes)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import wraps
 from numbers import Real
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 import numpy as np
 
@@ -192,7 +192,7 @@ def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., Driv
 
 def _chains(chains: MachineTable, values: Mapping[str, Any]) -> MachineTable:
     """Chains that differ in these values, by the words of their parameters."""
-    chain: Chain = chains.machine
+    chain = cast("Chain", chains.machine)
     wrong, read = list[str](), dict[str, Any]()
     for key, value in values.items():
         parameter = chain.parameter_value(key)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
+from softstart.drive.machine import Machine
 from softstart.drive.model import PARAMETERS, Drive
 
 
@@ -55,7 +56,7 @@ class DriveColumns(Drive):
         return each_of(self, math.nan if most is None else most)[:, None]
 
 
-def each_of(machine: Any, values: object) -> Vector:
+def each_of(machine: Machine, values: object) -> Vector:
     """A value that follows from a machine as an array: one number, or one for each drive of columns."""
     shape = machine.shape if isinstance(machine, DriveColumns) else ()
     return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).ravel()
@@ -82,12 +83,12 @@ class MachineTable:
     ((2,), [0.524, 1.047], [0.175, 0.175])
     """
 
-    machine: Any
+    machine: Machine
     fields: Mapping[str, NDArray[np.float64]]
-    parts: tuple[Any, ...]
+    parts: tuple[Machine, ...]
 
     @classmethod
-    def of(cls, machine: Any, columns: DriveColumns) -> Self:
+    def of(cls, machine: Machine, columns: DriveColumns) -> Self:
         """The table of these drives."""
         values, shape = vars(columns), columns.shape
         arrays = {name: values[name] for name in PARAMETERS if isinstance(values[name], np.ndarray)}

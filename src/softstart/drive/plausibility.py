@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from softstart.drive.checks import GRAVITY, elastic_frequency
+
+if TYPE_CHECKING:
+    from softstart.chain.elements import Motor
+    from softstart.drive.machine import Machine
+    from softstart.drive.model import Drive
 
 # usual speeds of the load, m/min; lifts, which have a counterweight, are faster
 USUAL_SPEEDS = {"hoist": (0.5, 150.0), "travel": (1.0, 300.0), "belt": (1.0, 480.0)}
@@ -46,7 +51,7 @@ class TwoMasses(NamedTuple):
         return "active" if self.active else "reactive"
 
 
-def plausibility_warnings(machine: Any) -> list[str]:
+def plausibility_warnings(machine: Machine) -> list[str]:
     """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; its damping ratio at most 1; gap at most half a turn of the
@@ -170,10 +175,12 @@ def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
     return 1.0 + decay * math.sqrt(1.0 + of.c * J * 2.0 * a * of.travel / mean**2)
 
 
-def _not_the_rated_torque(motor: Any) -> Iterator[str]:
+def _not_the_rated_torque(motor: Drive | Motor | None) -> Iterator[str]:
     """Of a drive, or of the motor of a chain; None for a chain without one."""
-    rated = motor and motor.rated_torque
-    if motor and rated is None and motor.rated_power is not None and motor.rated_speed is not None:
+    if motor is None:
+        return
+    rated = motor.rated_torque
+    if rated is None and motor.rated_power is not None and motor.rated_speed is not None:
         rated = motor.rated_power / motor.rated_speed
     if rated is not None and not 0.5 <= (times := float(motor.starting_torque / rated)) <= 6.0:
         yield (
@@ -182,7 +189,7 @@ def _not_the_rated_torque(motor: Any) -> Iterator[str]:
         )
 
 
-def _permits_anything(machine: Any) -> Iterator[str]:
+def _permits_anything(machine: Machine) -> Iterator[str]:
     """A permissible torque that decides nothing: mostly that of the output of a gear, taken at the motor."""
     if machine.motor is None:
         return
@@ -197,7 +204,7 @@ def _permits_anything(machine: Any) -> Iterator[str]:
             )
 
 
-def _nothing_holds(machine: Any) -> Iterator[str]:
+def _nothing_holds(machine: Machine) -> Iterator[str]:
     """The start begins in a state that cannot last, and nobody said that it does."""
     two = machine.lever_rule_model
     falls = two.falling > 0.0 and machine.brake == "none"

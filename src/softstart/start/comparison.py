@@ -64,7 +64,7 @@ def intervals(
     drawn: MachineTable,
     controller: str | Controller,
     until: float | str | None = None,
-    fitted_to: Drive | None = None,
+    fitted_to: Machine | None = None,
 ) -> dict[str, tuple[float, float]]:
     """The interval of 95 % of K_dyn, peak torque and start time over drives that are left possible.
 
@@ -125,7 +125,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
 
     drive: Machine
     rows: tuple[Row, ...]
-    fitted_to: Drive | None = None
+    fitted_to: Machine | None = None
     worst_case: tuple[str, ...] = CASES
     soft_end: Comparison | None = None
 
@@ -168,7 +168,7 @@ def compare(
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     until: float | str | None = None,
-    fitted_to: Drive | None = None,
+    fitted_to: Machine | None = None,
     worst_case: Sequence[str] | None = None,
 ) -> Comparison:
     """Start the drive or chain under each controller and compare K_dyn, start time and robustness.
@@ -189,7 +189,7 @@ def compare(
         A controller's name -> its parameters (SI numbers or strings with a unit).
     until : float or str, optional
         End of each start, s or with a unit. By default one elastic period after the start time.
-    fitted_to : Drive, optional
+    fitted_to : Drive or Chain, name or path, optional
         The drive for which the controllers are set up, if not `drive`: how they fare on a drive that is not
         the one they assume.
     worst_case : sequence of str, optional
@@ -224,8 +224,7 @@ def compare(
     """
     known, drawn, soft = as_far_as_known(drive)
     drive = as_machine(known)
-    if fitted_to is not None and not isinstance(fitted_to, Machine):
-        raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
+    fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
     counted = (
         (worst_case,) if isinstance(worst_case, str) else CASES if worst_case is None else tuple(worst_case)
     )
@@ -279,7 +278,7 @@ def compared(
     controller: Controller,
     direct: Run | None,
     until: float | str | None = None,
-    fitted_to: Drive | None = None,
+    fitted_to: Machine | None = None,
     worst_case: tuple[str, ...] = CASES,
     drawn: MachineTable | None = None,
     soft: Drive | None = None,
@@ -309,7 +308,7 @@ def changed_case(
     controller: Controller,
     case: str,
     until: float | str | None = None,
-    fitted_to: Drive | None = None,
+    fitted_to: Machine | None = None,
     soft: Drive | None = None,
 ) -> Case:
     """A controller set up for `drive`, with 4 times its gap, 0.4 of its load inertia, or on `soft`."""

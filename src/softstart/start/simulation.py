@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
-from softstart.chain.machines import MachineLike, load_machine
+from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import label_of
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
@@ -136,21 +135,17 @@ def simulate(
     ----------
     K_dyn: [G] (16); everything at one shaft: [R].
     """
-    drive = load_machine(drive) if isinstance(drive, str | os.PathLike) else drive
+    several = isinstance(drive, list | tuple | MachineTable)
+    drive = drive if several else as_machine(drive)
     strategy = None if controller is None else as_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
-    for name, other in (("fitted_to", fitted_to), ("base", base)):
-        _check_other(name, other, drive)
+    fitted_to, base = _other("fitted_to", fitted_to, drive), _other("base", base, drive)
     if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
-    if isinstance(drive, list | tuple | MachineTable):
+    if several:
         if strategy is None:
             raise InputError("controller is missing: many starts need one.")
         return simulate_many(drive, strategy, until, fitted_to, base, time_limit, max_events, workers)
-    if not isinstance(drive, Machine):
-        raise InputError(
-            "drive: give one Drive or Chain, records or a list of them, the path of a file, or a name."
-        )
     positions = drive.positions
     inputs = {name: kernel_input(one, time_limit, max_events, excitation) for name, one in positions.items()}
     check_end(drive, strategy, until, next(iter(inputs.values())))
@@ -165,17 +160,19 @@ def simulate(
     return worst_run(runs, drive) if len(runs) > 1 else next(iter(runs.values()))
 
 
-def _check_other(name: str, other: object, drive: object) -> None:
+def _other(name: str, other: Any, drive: object) -> Any:
     """A machine given beside the simulated one: a single one, or one for each of several starts."""
+    if other is None:
+        return None
     if isinstance(other, MachineTable):
         shape = drive.shape if isinstance(drive, MachineTable) else ()
         if other.shape != shape:
             raise InputError(
-                f"{name}: records of shape {other.shape} do not match starts of shape {shape}; give a single "
-                "machine, or records of the same shape."
+                f"{name}: a table of shape {other.shape} does not match starts of shape {shape}; give a "
+                "single machine, or a table of the same shape."
             )
-    elif other is not None and not isinstance(other, Machine):
-        raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
+        return other
+    return as_machine(other, name)
 
 
 def check_end(machine: Any, controller: object, until: float | None, start: KernelInput) -> None:

@@ -163,8 +163,8 @@ def _settings(
 ) -> tuple[SweepSettings, Grid]:  # fmt: skip
     """What is the same for all starts, and the axes; or one InputError for all that is wrong with them."""
     drive, recipe, axes, kept, wrong = as_machine(given), Recipe(), Grid(), tuple[str, ...](), Mistakes()
-    if fitted_to is not None and not isinstance(fitted_to, Machine):
-        wrong.sentences.append(f"fitted_to = {show(fitted_to)}: give one Drive or Chain.")
+    with wrong.collect():
+        fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
     with wrong.collect():
         check_limits(until, None, 1, drive.KIND)
     with wrong.collect():
