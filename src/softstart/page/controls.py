@@ -9,7 +9,7 @@ from time import perf_counter
 from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, FrameBuilder
-from softstart.page.machines import DIGITS, NODE_DIGITS, Entry
+from softstart.page.machines import DIGITS, NODE_DIGITS, FormField
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 
@@ -91,7 +91,7 @@ class Controls:
         if self._session.version == version:
             self._poke()
 
-    def _entry(self, path: str) -> Entry:
+    def _entry(self, path: str) -> FormField:
         if path not in self._frames.entries:
             raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
         return self._frames.entries[path]

@@ -18,7 +18,7 @@ from softstart.drive import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.kernel import records as rec
 from softstart.page import links, machines
-from softstart.page.machines import STRATEGY, Axes, Entry
+from softstart.page.machines import STRATEGY, Axes, FormField
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
@@ -81,7 +81,7 @@ class FrameBuilder:
             self._strategy = {}
 
     @property
-    def entries(self) -> Mapping[str, Entry]:
+    def entries(self) -> Mapping[str, FormField]:
         """All fields by their paths: those of the machine, then those of the selected strategy."""
         return {**self._machine, **self._strategy}
 
@@ -152,7 +152,7 @@ class FrameBuilder:
         groups = {entry.group for path, entry in self._machine.items() if now.get(path) != before.get(path)}
         return sorted(groups)
 
-    def _grouped(self, entries: Mapping[str, Entry]) -> list[Frame]:
+    def _grouped(self, entries: Mapping[str, FormField]) -> list[Frame]:
         groups: dict[str, list[Frame]] = {}
         for entry in entries.values():
             groups.setdefault(entry.group, []).append(described(entry, self.session.inputs.units))
@@ -317,13 +317,13 @@ def numbers(values: Vector) -> list[float | None]:
 # fields -------------------------------------------------------------------------------------------------
 
 
-def described(entry: Entry, units: Units) -> Frame:
+def described(entry: FormField, units: Units) -> Frame:
     """A field as the browser builds it; `text` says that it takes words alone."""
     text = not (entry.unit or entry.choices or entry.path.startswith(STRATEGY))
     return vars(entry) | {"unit": unit(units.of(entry.unit)), "scale": entry.scale is not None, "text": text}
 
 
-def field_view(entry: Entry, text: str, value: Any, marks: Iterable[Mark], units: Units) -> Frame:
+def field_view(entry: FormField, text: str, value: Any, marks: Iterable[Mark], units: Units) -> Frame:
     """What a field shows: its text, where its slider is, and marks on that, each with what it means."""
     scale = entry.scale
     if scale is None:
@@ -339,7 +339,7 @@ def field_view(entry: Entry, text: str, value: Any, marks: Iterable[Mark], units
     }
 
 
-def written_value(value: Any, entry: Entry, units: Units) -> str:
+def written_value(value: Any, entry: FormField, units: Units) -> str:
     """The text of a field; empty for a value that is not given."""
     if value is None or isinstance(value, str):
         return value or ""
@@ -347,7 +347,7 @@ def written_value(value: Any, entry: Entry, units: Units) -> str:
     return "; ".join(written(float(part), entry.unit, units) for part in parts)
 
 
-def machine_fields(session: Session, entries: Mapping[str, Entry]) -> dict[str, Frame]:
+def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[str, Frame]:
     """By path what the fields of the machine show; a mark is where its value was when it was loaded."""
     inputs, units = session.inputs, session.inputs.units
     now, before = inputs.machine.parameters_by_path(), inputs.origin.parameters_by_path()

@@ -114,7 +114,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Entry:
+class FormField:
     """One field of the page: what `--set` calls it, its group, what stands before it, its unit in SI.
 
     `choices` are all that it takes, `words` what it offers beside numbers. `optional`: an empty field takes
@@ -134,7 +134,7 @@ class Entry:
     scale: Scale | None = None
 
 
-def parameter_fields(machine: Machine) -> Mapping[str, Entry]:
+def parameter_fields(machine: Machine) -> Mapping[str, FormField]:
     """The fields of a drive or chain by their paths, in their order on the page.
 
     >>> list(parameter_fields(Drive.load("crane-4amtkf")))[:3]
@@ -156,7 +156,7 @@ def parameter_fields(machine: Machine) -> Mapping[str, Entry]:
             symbol = SYMBOLS.get(word, "")
             choices, si, example = parameter.choices, parameter.unit, parameter.example
             words = UNITS if path == "units" else choices if si else ()
-            entries[path] = Entry(
+            entries[path] = FormField(
                 path, group, LABELS.get(word, key.replace("_", " ")),
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), si,
                 f"{parameter.meaning}; write for example {', '.join([*words, example])}", example,
@@ -231,7 +231,7 @@ def page_parameters(controller: Controller) -> list[ControllerParameter]:
     ]  # fmt: skip
 
 
-def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, Entry]:
+def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, FormField]:
     """The fields of a strategy, those without a slider or choice last; sliders go as far as tuning would.
 
     >>> from softstart.controller import make_controller
@@ -249,7 +249,7 @@ def strategy_entries(controller: Controller, origin: Machine, label: str) -> Map
             scales[search.name] = Scale(low, high, search.logarithmic and low > 0.0)
     main = {p.name for p in parameters if p.name in scales or p.choices} or {p.name for p in parameters}
     return {
-        STRATEGY + p.name: Entry(
+        STRATEGY + p.name: FormField(
             STRATEGY + p.name, f"parameters of {label}" if p.name in main else MORE,
             p.name.replace("_", " "), "", p.unit, f"{p.meaning}; default: {p.default_text or 'fixed'}",
             "a value, or nothing for the default", p.choices, (), True, scales.get(p.name),
