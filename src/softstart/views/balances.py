@@ -27,6 +27,7 @@ from softstart.views.sheet import Sheet, columns_file, records_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from softstart.balancing.design import Balance
 
@@ -197,7 +198,7 @@ def _entitle(figure: Any, found: Balance, what: str, more: str = "") -> None:
     entitle(figure, f"{found.engine.name}: {what}{assumed}{more}")
 
 
-def torque_figure(found: Balance) -> Any:
+def torque_figure(found: Balance) -> Figure:
     """Torque over the crank angle at the tuning speed with its first order, and the orders as bars."""
     degrees, gas, inertia, _ = map(np.array, _cycle(found).values())
     harmonics = found.engine.torque_harmonics(found.tuning_speed, found.load)
@@ -232,7 +233,7 @@ def torque_figure(found: Balance) -> Any:
     return figure
 
 
-def residual_figure(found: Balance) -> Any:
+def residual_figure(found: Balance) -> Figure:
     """First-order moment left, the arm that each design needs, forces and couples, over the speed."""
     shown = {}
     for up, key, scale in OVER_SPEED:
@@ -262,7 +263,7 @@ def residual_figure(found: Balance) -> Any:
     return figure
 
 
-def force_figure(found: Balance) -> Any:
+def force_figure(found: Balance) -> Figure:
     """The force vector over a turn at the tuning speed: first order on the left, all orders on the right."""
     engine = found.engine
     bare = shaking_of_crank(engine.cylinders, engine.masses, Counterweights(0.0, 0.0))[0]

@@ -20,6 +20,7 @@ from softstart.views.sheet import Sheet, records_file, rows_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from softstart.chain.model import Chain
     from softstart.chain.two_masses import TwoMassError, Verification
@@ -213,7 +214,7 @@ def verified_table(verified: Sequence[Verification]) -> TextTable:
 # figure ----------------------------------------------------------------------------------------------------
 
 
-def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
+def shapes_figure(vibration: Vibration, modes: int = 3) -> Figure:
     """The chain at the motor shaft to scale, and below it the lowest elastic shapes with their nodes.
 
     The height of a disc goes with the fourth root of its inertia, as that of steel discs of one thickness;

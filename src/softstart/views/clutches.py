@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from softstart.views.numbers import NOTHING, TextTable, column_of, printable, sh
 from softstart.views.sheet import Sheet, columns_file, rows_file
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softstart.clutch import Clutch, Engagement
 
 MOST_EVENTS = 12
@@ -88,7 +90,7 @@ def engagement_sheet(run: Engagement) -> Sheet:
 
 def engagement_figure(
     runs: Sequence[Engagement], title: str, labels: Sequence[str] = (), unit: tuple[float, str] = (1.0, "N m")
-) -> Any:
+) -> Figure:
     """Friction and shaft torque and speeds of engagements; `unit` is (size in N m, name)."""
     size, name = unit
     clutch = runs[0].clutch

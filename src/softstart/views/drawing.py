@@ -82,7 +82,7 @@ def drawing() -> Iterator[None]:
 
 def new_figure(
     rows: int = 1, columns: int = 1, size: tuple[float, float] | None = None, **options: Any
-) -> Any:
+) -> tuple[Figure, Any]:
     """A Figure outside pyplot (nothing to close, no window) and its axes."""
     from matplotlib.figure import Figure
 
@@ -182,7 +182,7 @@ def shade_open_gap(axes: Axes, run: Run, until: float = math.inf) -> None:
 
 def panels(
     count: int, size: tuple[float, float], across: int, x_label: str, y_label: str
-) -> tuple[Any, list[Axes]]:
+) -> tuple[Figure, list[Axes]]:
     """A figure of panels of this size in inches with the same axes, so many across at most, and these."""
     columns = min(count, across)
     rows = -(-count // columns)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from softstart.views.numbers import NOTHING, TextTable, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softstart.identification.planning import Experiment, ExperimentPlan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
@@ -109,7 +111,7 @@ def identification_sheet(
     )
 
 
-def identification_figure(found: Identification) -> Any:
+def identification_figure(found: Identification) -> Figure:
     """Each log beside the start of the drive found, and the residuals."""
     count = len(found.logs)
     with drawing():
@@ -180,7 +182,7 @@ def _write_log(plan: ExperimentPlan, one: Experiment, path: Path) -> None:
     log.to_csv(path, SIMULATED)
 
 
-def plan_figure(plan: ExperimentPlan) -> Any:
+def plan_figure(plan: ExperimentPlan) -> Figure:
     """The torque of each experiment."""
     count = len(plan.experiments)
     with drawing():
@@ -235,7 +237,7 @@ def wear_sheet(wear: Wear) -> Sheet:
     )
 
 
-def wear_figure(wear: Wear) -> Any:
+def wear_figure(wear: Wear) -> Figure:
     """The gaps over time, the line with its interval, and the limit."""
     years = [(one - wear.dates[0]).days / YEAR for one in wear.dates]
     reached = wear.line.reaches(wear.limit)[0] if wear.limit else 0.0

@@ -19,6 +19,7 @@ from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from softstart.linear.loop import Crossing, Loop, Margins
     from softstart.linear.systems import Mode
@@ -147,7 +148,7 @@ def response(loop: Loop) -> tuple[tuple[str, ...], list[list[float]]]:
     return headings, np.column_stack([w, np.abs(L), np.angle(L), 1.0 / np.abs(1.0 + L)]).tolist()
 
 
-def linear_figure(view: LinearView) -> Any:
+def linear_figure(view: LinearView) -> Figure:
     """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
     loop, Omega = view.loop, plant_scales(view.drive).Omega
     assert loop is not None

@@ -23,6 +23,7 @@ from softstart.views.traces import draw_trade_off, over_time, shaft_torques, spe
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 OBJECTIVES = {"heat": "minimum heat", "start_time": "minimum start time"}
 REPLAY = "softstart simulate {what}.toml --controller profile --param file=profile.csv"
@@ -204,7 +205,7 @@ def bound_sentence(best: Optimum) -> str:
     return f"The lower bound ({bound.kind}) covers {bound.covers}".rstrip(".") + "."
 
 
-def optimum_figure(best: Optimum) -> Any:
+def optimum_figure(best: Optimum) -> Figure:
     """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
     problem, others = best.problem, [one for one in best.runs if one is not best.run]
 
@@ -355,7 +356,7 @@ def _footnotes(front: Front) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def front_figure(front: Front) -> Any:
+def front_figure(front: Front) -> Figure:
     """Minimum K_dyn over start time with its lower bound, and the controllers as named points."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 5.0))

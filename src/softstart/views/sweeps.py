@@ -20,6 +20,7 @@ from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from softstart.drive.machine import Machine
     from softstart.sweeping.entry import SweepProgress
@@ -34,7 +35,7 @@ FILE, STATUS = "cells.csv", "status"
 Part = tuple[str, Any]  # title, and the values along the axes drawn
 
 
-def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Any:
+def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Figure | None:
     """A figure of the starts over the grid, or None where nothing can be drawn.
 
     Two long axes of numbers make a map; further axes make panels, or, if these were too many, the map shows

@@ -32,6 +32,7 @@ from softstart.views.numbers import units_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FEW = 8  # masses or shafts with a name each in a figure
 ACROSS = 4  # starts side by side
@@ -41,7 +42,7 @@ TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0,
 BELOW_BOUND: Any = {"fc": "#F1F1F1", "ec": "#DADADA", "hatch": "////", "lw": 0.0, "zorder": 0}
 
 
-def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: str, note: str = "") -> Any:
+def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: str, note: str = "") -> Figure:
     """Panels over the time of a start; of a single shaft grey where its gap is open."""
     single = len(run.drive.shaft_names) == 1
     with drawing():
@@ -63,7 +64,7 @@ def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: st
     return figure
 
 
-def run_figure(run: Run) -> Any:
+def run_figure(run: Run) -> Figure:
     """Torques, speeds and twists over time."""
     return over_time(run, (torques, speeds, twists), f"{run.drive.name}: {run.controller_name}")
 
@@ -144,7 +145,7 @@ def shown_until(rows: Sequence[Row]) -> float:
     return min(max(float(run.end_time) for run in reached), most)
 
 
-def comparison_figure(rows: Sequence[Row], title: str = "") -> Any:
+def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
     """Torques of several starts in small panels of one scale; grey where the gap is open."""
     runs, latest = [row.run for row in rows], shown_until(rows)
     lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
@@ -168,7 +169,7 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Any:
     return figure
 
 
-def before_after_figure(rows: Sequence[Row]) -> Any:
+def before_after_figure(rows: Sequence[Row]) -> Figure:
     """Shaft torque and load speed of `direct` and of another start, with the permissible torque as a line.
 
     Of several shafts the torque of the one that is loaded most.
@@ -198,7 +199,7 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
 Points = Sequence[tuple[float, float]]  # start time in s, K_dyn
 
 
-def trade_off_figure(points: Sequence[tuple[str, float, float]], **options: Any) -> Any:
+def trade_off_figure(points: Sequence[tuple[str, float, float]], **options: Any) -> Figure:
     """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 4.6))

@@ -28,6 +28,7 @@ from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from xarray import Dataset
 
     from softstart.tuning.outcome import RobustSet, Tuning
@@ -41,7 +42,7 @@ SHOWN = 24  # cells on a terminal
 SAME_TIME = 1e-3  # bounds on the start time that differ by less count as one
 
 
-def figure_of(tuning: Tuning, what: str) -> Any:
+def figure_of(tuning: Tuning, what: str) -> Figure:
     """Maps of the gains, of the metric tuned and by default, of the robust set, of its price."""
     robust = None if tuning.robust is None else tuning.robust.cells
     table = {"price": tuning.price, "robust": robust}.get(what, tuning.schedule)
