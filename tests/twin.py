@@ -10,7 +10,7 @@ import numpy as np
 from softstart import Chain, Command, Drive, PlainController
 from softstart.chain import Mass, Motor, Shaft
 from softstart.controller import Measured, Sensor
-from softstart.controller.compiled import STATE
+from softstart.kernel.motor import NEW_STATE
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class PlainTwin(PlainController):
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         size = self.twin.state_size
-        command = np.zeros(STATE + size)
+        command = np.zeros(NEW_STATE + size)
         before = np.array(state) if state else np.zeros(size)
         kernel = type(self.twin).kernel
         lines = getattr(kernel, "py_func", kernel)

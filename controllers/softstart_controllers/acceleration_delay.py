@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record, size
+from softstart.controller import (
+    CompiledController,
+    Effort,
+    Numbers,
+    ParameterValues,
+    compiled_step,
+    parameter,
+)
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
+from softstart.kernel.motor import encoder_count
 from softstart_controllers.reduced import (
     closing_speed,
     delay_of,
@@ -18,7 +26,6 @@ from softstart_controllers.reduced import (
     swing_duration,
 )
 from softstart_controllers.sampled import (
-    encoder_count,
     full_torque_parameter,
     mean_torque,
     period_parameter,
@@ -65,7 +72,7 @@ STATE = record(State, ring=RING)
 COMMAND = record(Reply, State, ring=RING)
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The angle lost against a free motor, its second difference, and the wait after contact."""
     p = as_record(parameters, PARAMETERS)
@@ -104,7 +111,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     y.realised = u
 
 
-def contact_drop(drive: Drive, p: Any) -> float:
+def contact_drop(drive: Drive, p: ParameterValues) -> float:
     """A drop that is seen early, and that the load behind the shaft brings about."""
     return min(max(0.5 * mean_under(drive, p.torque) / p.torque, SMALLEST_DROP), DROP)
 
@@ -118,30 +125,14 @@ class AccelerationDelay(CompiledController):
         a(t) = (phi(t) - 2 phi(t - W) + phi(t - 2 W))/W^2
 
     and the same difference of the angle which a free motor would have had under the torque realised so far,
-    int int u/J1, gives the acceleration a0(t) to be expected with the gap open. Contact is seen when
-    a < a0 - drop torque/J1, that is when the shaft has taken the share `drop` of the torque, on the
-    mean over the window. As a0 follows the realised torque, a lag that lets the acceleration rise first, a
-    window not yet filled, and a motor already turning change nothing.
-
-    *Window.* The encoder rounds each angle by at most half a count q, so a is wrong by at most
-    2 q/W^2. W is the smallest number of periods, at least 2, for which that is below a third of the drop,
-    W^2 >= 6 q J1/(drop torque); so rounding alone never looks like a contact. Up to 30 periods each sample is
-    used, with longer windows every second, third, ... one, so that 61 angles are always enough to keep.
+    int int u/J1, gives the acceleration a0(t) of an open gap. Contact is seen when a < a0 - drop torque/J1. W
+    is the shortest window in which the rounding of the encoder cannot look like that (`window`).
 
     *Delay.* From contact the torque stays reduced for `delay`, by default until the torque peak, [G](14),
-    from the nominal drive. What passes between contact and its being seen is known: `latency` is the time
-    after which the shaft torque of [G](11) brings the window to the threshold, and half the time between two
-    looks at it. Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
-    at the nearest sample. Damping is left out of both, as in [G].
+    less the `latency` of the detection, at the nearest sample. After `contact_timeout` it is raised anyway.
 
-    Contact that is not seen within `contact_timeout` (a load that takes little of the torque, an encoder
-    too coarse) is waited for no longer: the torque is raised then.
-
-    The torque is raised while the shaft carries the most, so that the gap stays closed (`raise_at` "peak").
-    [G] proposes the length of stage 2, (15), twice as long (`raise_at` "end"). At the end of stage 2 the gap
-    opens again, with the masses parting at the speed they met with. The torque raised there drives them into
-    the second contact about as hard as method 1 does into the first: the first contact is as soft as
-    [G](18) says (`run.k_dyn_first_contact`), the whole start is not (`run.k_dyn`).
+    [G] proposes the length of stage 2, (15), twice as long (`raise_at` "end"): then the gap opens again, and
+    the second contact is about as hard as the first one of method 1 (`run.k_dyn`, `run.k_dyn_first_contact`).
 
     Source: [G], conclusions; stages by [G](10), (11), (15).
 
@@ -151,38 +142,36 @@ class AccelerationDelay(CompiledController):
     (True, 1)
     """
 
-    name: ClassVar[str] = "acceleration-delay"
-    summary: ClassVar[str] = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
-    source: ClassVar[str] = "[G]"
-    effort: ClassVar[Effort | None] = Effort.STEPS
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "acceleration-delay"
+    summary = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
+    source = "[G]"
+    effort = Effort.STEPS
+    kernel = step
 
     # fmt: off
-    torque: float | None = reduced_torque_parameter("reduced torque", "above 0")
-    full_torque: float | None = full_torque_parameter("torque after the delay", "0 or more")
-    delay: float | None = parameter("s", "time from contact to full torque",
+    torque: float = reduced_torque_parameter("reduced torque", "above 0")
+    full_torque: float = full_torque_parameter("torque after the delay", "0 or more")
+    delay: float = parameter("s", "time from contact to full torque",
         lambda drive, p: delay_of(drive, p.torque, p.raise_at),
         "until the torque peak of stage 2, [G](14), or its end, [G](15)", "0 or more", multiples=(0.2, 3.0))
-    drop: float | None = parameter("1",
+    drop: float = parameter("1",
         "drop of the acceleration that means contact, as a share of torque/J1", contact_drop,
         "0.3, or half the share that a closed drive takes on the mean where that is less, at least 0.05",
         "above 0")
-    latency: float | None = parameter("s", "time from contact to its detection",
+    latency: float = parameter("s", "time from contact to its detection",
         lambda drive, p: detection_latency(drive, p.torque, p.drop, p.period),
         "from the window and the shaft torque of [G](11)", "0 or more")
-    contact_timeout: float | None = timeout_parameter("longest wait for contact")
-    period: float | None = period_parameter()
-    raise_at: str | None = raise_parameter()
+    contact_timeout: float = timeout_parameter("longest wait for contact")
+    period: float = period_parameter()
+    raise_at: str = raise_parameter()
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """The window, and the wait from when the contact is seen."""
         half, stride, threshold = window(drive, self.torque, self.drop, self.period)
         delay: Any = self.delay
         wait = max(delay - self.latency, 0.0)
-        return {"J1": drive.J1, "half": half, "stride": stride, "threshold": threshold, "wait": wait}
+        return {"half": half, "stride": stride, "threshold": threshold, "wait": wait}
 
 
 def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int, float]:
@@ -190,10 +179,10 @@ def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int,
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> half, stride, threshold = window(crane, 15.386, 0.3, 0.001)
-    >>> half, stride, round(threshold / encoder_count(crane), 1)
+    >>> half, stride, round(threshold / encoder_count(crane.encoder_lines), 1)
     (5, 1, 8.6)
     """
-    rounding = 2.0 * encoder_count(drive)
+    rounding = 2.0 * encoder_count(drive.encoder_lines)
     a = drop * torque / drive.J1
     samples = max(math.ceil(math.sqrt(rounding / (ROUNDING_SHARE * a)) / period), SHORTEST_WINDOW)
     stride = math.ceil(samples / LONGEST_WINDOW)

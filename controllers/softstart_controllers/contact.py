@@ -21,7 +21,8 @@ from typing import Any
 from softstart.controller import parameter
 from softstart.controller.compiled import Vector, compiled, inner, record
 from softstart.drive import Drive
-from softstart_controllers.sampled import encoder_count, mean_torque
+from softstart.kernel.motor import encoder_count
+from softstart_controllers.sampled import mean_torque
 from softstart_controllers.shaft_filter import (
     FREE,
     SHAFT,
@@ -78,12 +79,12 @@ class Parameters:
     detection_threshold: float
     free_noise: float
     speed_noise: float
-    twist_noise: float
+    uncertainty: float
     load_noise: float
     b_noise: float
     slew: float
     rate: float
-    lag: float
+    torque_lag: float
     queued: float
     rest: float
     wound: float
@@ -209,53 +210,48 @@ def time_since_contact(
 
 @inner
 def state_after_contact(
-    angle: float, s: float, speed: float, w2: float, b: float, drift: float, u: float, a: float, c: float,
-    d: float, Mc: float, Mb: float, pull: float,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    p: Parameters, m: State, s: float, speed: float, w2: float, b: float, drift: float, u: float, pull: float
+) -> tuple[float, float, float, float, float]:
     """phi1, w1, z, w2 and b now, s after contact.
 
-    Without the contact the motor would have this angle and speed, and the load w2 - b drift now: the load
-    torque, at last `pull`, has taken that impulse from it. From the contact on all go under the motor
-    torque u.
+    Without the contact the motor would have the angle m.now.angle and this speed, and the load w2 - b drift
+    now: the load torque, at last `pull`, has taken that impulse from it. From the contact on all go under the
+    motor torque u.
     """
+    a = m.free.inverse
     rolling = pull * s if drift != 0.0 else 0.0
     way, w1, z, load = predicted_motion(
-        speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, Mb
+        speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, p.c, p.d, p.Mc, p.Mb
     )
-    return angle - s * (speed - 0.5 * a * u * s) + way, w1, z, load, b
+    return m.now.angle - s * (speed - 0.5 * a * u * s) + way, w1, z, load, b
 
 
 @compiled
 def begin_shaft(
-    x: ShaftEstimate, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
-    drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, Mb: float,
-    pull: float,
-) -> None:  # fmt: skip
+    p: Parameters, m: State, s: float, s_variance: float, u: float, drift: float, pull: float
+) -> None:
     """Begin the filter of the shaft, a time s after contact, from the free motor now.
 
     The first guess owes its errors to s, to the free motion, to w2 and to 1/J2 = b. The covariance is the sum
     of what each of them does to (phi1, w1, z, w2, 1/J2), by central differences.
     """
-    speed = m.speed
+    x, now = m.shaft, m.now
+    speed, w2, b = now.speed, m.load_speed, m.b
     for k in range(N):
         for j in range(N):
             x.P[k, j] = 0.0
-    x.P[0, 0] = m.p00
+    x.P[0, 0] = now.p00
     for cause in range(4):
         at_s = SMALL * s if cause == 0 else 0.0
         at_speed = SMALL * (abs(speed) + abs(w2)) if cause == 1 else 0.0
         at_w2 = SMALL * (abs(speed) + abs(w2)) if cause == 2 else 0.0
         at_b = SMALL * b if cause == 3 else 0.0
         step = at_s + at_speed + at_w2 + at_b
-        variance = (s_variance, m.p11, w2_variance, b_variance)[cause]
+        variance = (s_variance, now.p11, m.load_variance, m.b_variance)[cause]
         if step <= 0.0:
             continue
-        up = state_after_contact(
-            m.angle, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, a, c, d, Mc, Mb, pull
-        )
-        down = state_after_contact(
-            m.angle, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, a, c, d, Mc, Mb, pull
-        )
+        up = state_after_contact(p, m, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, pull)
+        down = state_after_contact(p, m, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, pull)
         for k in range(N):
             x.F[0, k] = (up[k] - down[k]) / (2.0 * step)
         for k in range(N):
@@ -263,15 +259,13 @@ def begin_shaft(
                 x.P[k, j] += variance * x.F[0, k] * x.F[0, j]
         if cause == 1:  # angle and speed of the free motion err together
             for k in range(N):
-                x.P[0, k] += m.p01 * x.F[0, k]
-                x.P[k, 0] += m.p01 * x.F[0, k]
-    x.phi1, x.w1, x.z, x.w2, x.b = state_after_contact(
-        m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, Mb, pull
-    )
+                x.P[0, k] += now.p01 * x.F[0, k]
+                x.P[k, 0] += now.p01 * x.F[0, k]
+    x.phi1, x.w1, x.z, x.w2, x.b = state_after_contact(p, m, s, speed, w2, b, drift, u, pull)
 
 
 @inner
-def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
+def free_motion(p: Parameters, m: State, angle: float, mean: float, lead: float, extra_noise: float) -> None:
     """The filter of the free motor goes on a sample, p.samples behind; from there to now by the torque."""
     h = p.period
     kept = int(m.kept)
@@ -286,8 +280,8 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float
             m.contact_noises[i] = m.contact_noises[i + 1]
     m.angles[kept] = angle
     m.means[kept] = mean
-    m.leads[kept] = early
-    m.contact_noises[kept] = doubt
+    m.leads[kept] = lead
+    m.contact_noises[kept] = extra_noise
     m.kept = kept + 1.0
     free_after(p, m, kept + 1)
 
@@ -330,27 +324,15 @@ def drift_since(p: Parameters, m: State, t: float) -> float:
 
 @inner
 def update_shaft_filter(
-    p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float
+    p: Parameters, m: State, angle: float, mean: float, lead: float, extra_noise: float
 ) -> None:
     """The filter of the shaft goes on a sample."""
     h, a = p.period, m.free.inverse
     speed = a * h * p.speed_noise
-    twist = h * p.twist_noise * abs(m.shaft.w1 - m.shaft.w2)
+    twist = h * p.uncertainty * abs(m.shaft.w1 - m.shaft.w2)
     load = m.shaft.b * h * p.load_noise
-    shaft_predict(
-        m.shaft,
-        mean,
-        early,
-        h,
-        a,
-        p.c,
-        p.d,
-        p.Mc,
-        p.Mb,
-        speed * speed + doubt,
-        twist * twist,
-        load * load,
-    )
+    w1_noise = speed * speed + extra_noise
+    shaft_predict(m.shaft, mean, lead, h, a, p.c, p.d, p.Mc, p.Mb, w1_noise, twist * twist, load * load)
     m.shaft.P[4, 4] += p.b_noise
     shaft_update(m.shaft, angle, p.rounding, p.b_least, p.b_most)
 
@@ -376,15 +358,12 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
             u += m.means[i] / recent
         slope = a * u + (b * pull if drift != 0.0 else 0.0)
     s = time_since_contact(behind, V, slope, a, p.c, p.d, kept * h)
-    again = max(0, min(math.floor(s / h) - 1, kept - 1))
-    free_after(p, m, kept - again)
-    back = again * h if drift != 0.0 else 0.0
-    doubt = TIME_DEVIATION * s + 0.1 * h
-    begin_shaft(
-        m.shaft, m.now, s - again * h, doubt * doubt, u, m.load_speed, m.load_variance,
-        drift - pull * back, b, m.b_variance, a, p.c, p.d, p.Mc, p.Mb, pull,
-    )  # fmt: skip
-    first = kept - again
+    replayed = max(0, min(math.floor(s / h) - 1, kept - 1))
+    free_after(p, m, kept - replayed)
+    back = replayed * h if drift != 0.0 else 0.0
+    s_deviation = TIME_DEVIATION * s + 0.1 * h
+    begin_shaft(p, m, s - replayed * h, s_deviation * s_deviation, u, drift - pull * back, pull)
+    first = kept - replayed
     shaft_update(m.shaft, m.angles[first - 1], p.rounding, p.b_least, p.b_most)
     for i in range(first, kept):
         update_shaft_filter(p, m, m.angles[i], m.means[i], m.leads[i], m.contact_noises[i])
@@ -444,24 +423,24 @@ def observe(p: Parameters, m: State, t: float, u: float, angle: float, speed: fl
     m.mean = 0.0
     if share > 0.0:  # until then the one before it went on
         older = m.sent[queued + 1]
-        before = older + (before - older) * (math.exp(-p.rest / p.lag) if p.lag > 0.0 else 0.0)
+        before = older + (before - older) * (math.exp(-p.rest / p.torque_lag) if p.torque_lag > 0.0 else 0.0)
         m.mean = share * mean_torque(m.realised, before, older)
     m.mean += (1.0 - share) * mean_torque(before, u, newest)
-    early = torque_lead(before, u, newest, m.mean)
-    doubt = 0.0
+    lead = torque_lead(before, u, newest, m.mean)
+    extra_noise = 0.0
     if p.rate > 0.0:  # slewed, lagged or both: one sample does not tell, and the truth may lie outside
         line = mean_of_ramp(m.realised, u, p.rate * p.period)
-        doubt = (2.0 * p.a * p.period * (m.mean - line)) ** 2
+        extra_noise = (2.0 * p.a * p.period * (m.mean - line)) ** 2
         if p.slew > 0.0:
-            m.mean, early = line, lead_of_ramp(m.realised, u, p.rate * p.period)
+            m.mean, lead = line, lead_of_ramp(m.realised, u, p.rate * p.period)
     if m.closed != 0.0:
-        update_shaft_filter(p, m, angle, m.mean, early, doubt)
+        update_shaft_filter(p, m, angle, m.mean, lead, extra_noise)
         if m.shaft.z < 0.0 and m.shaft.w1 < m.shaft.w2:
             opened(m, t)
             m.closed = 0.0
             return OPENED
         return NOTHING
-    free_motion(p, m, angle, m.mean, early, doubt)
+    free_motion(p, m, angle, m.mean, lead, extra_noise)
     behind = m.now.angle - angle
     enough = margin(p, m)
     if behind > enough:
@@ -494,8 +473,8 @@ def predicted_state(p: Parameters, m: State, u: float) -> tuple[float, float, fl
                 mean = mean_of_ramp(u, after, reach)
                 u = after
             else:
-                left = math.exp(-length / p.lag) if p.lag > 0.0 else 0.0
-                mean = demand + (u - demand) * (1.0 - left) * p.lag / length
+                left = math.exp(-length / p.torque_lag) if p.torque_lag > 0.0 else 0.0
+                mean = demand + (u - demand) * (1.0 - left) * p.torque_lag / length
                 u = demand + (u - demand) * left
             _, w1, z, w2 = predicted_motion(w1, z, w2, m.shaft.b, mean, length, p.a, p.c, p.d, p.Mc, p.Mb)
         length = p.period
@@ -516,9 +495,13 @@ def uncertainty_parameter() -> Any:
 
 
 def estimator_parameters(
-    drive: Drive, p: Any, speed: float, inertia_ratio: float | None = None, deviation: float = RATIO_DEVIATION
+    drive: Drive,
+    p: Any,
+    speed: float,
+    inertia_ratio: float | None = None,
+    deviation: float = RATIO_DEVIATION,
 ) -> dict[str, float]:
-    """The numbers of `Parameters`, for flanks that meet at `speed` in rad/s.
+    """The numbers of `Parameters` beside drive and controller, for flanks that meet at `speed` in rad/s.
 
     p has the parameters `period`, `detection_threshold` and `uncertainty`. J2/J1 is `inertia_ratio`, or
     that of the drive, with this standard deviation as a share. A drive whose load hangs in the wound-up shaft
@@ -532,14 +515,10 @@ def estimator_parameters(
     ratio, noise = 1.0 / (inertia_ratio or drive.J2 / drive.J1), drive.torque_noise
     free = a * period * math.hypot(TORQUE_DEVIATION * drive.Ms, noise)
     delay, slewing = torque_delay(drive)
-    rounding = encoder_count(drive) ** 2 / 12.0 + (FLOOR * drive.Ms / drive.c) ** 2
+    rounding = encoder_count(drive.encoder_lines) ** 2 / 12.0 + (FLOOR * drive.Ms / drive.c) ** 2
     return {
-        "period": period,
-        "Mc": drive.Mc,
         "Mb": drive.backward_torque,
         "load_speed": drive.initial_load_speed,
-        "c": drive.c,
-        "d": drive.d,
         "a": a,
         "a_variance": (J1_DEVIATION * a) ** 2,
         "b": ratio * a,
@@ -548,15 +527,12 @@ def estimator_parameters(
         "b_most": max(MOST_RATIO, 3.0 * ratio) * a,
         "samples": _samples(drive, speed, rounding, detection_threshold, delay, period),
         "rounding": rounding,
-        "detection_threshold": detection_threshold,
         "free_noise": free**2,
         "speed_noise": math.hypot(SHAFT_DEVIATION * drive.Ms, noise),
-        "twist_noise": p.uncertainty,
         "load_noise": LOAD_DEVIATION * drive.Ms,
         "b_noise": 0.0 if inertia_ratio else (WANDER * ratio * a) ** 2 * drive.Omega * period,
         "slew": 0.5 / rate if slewing else 0.0,
         "rate": rate if math.isfinite(rate) else 0.0,
-        "lag": drive.torque_lag,
         "queued": queued,
         "rest": rest,
         "wound": wound,
@@ -593,7 +569,10 @@ def contact_undetectable(drive: Drive, coarse: float, slow: float = math.inf) ->
     [False, True]
     """
     late = 0.5 * drive.Ms / drive.torque_rate + drive.torque_lag + drive.computing_delay
-    return encoder_count(drive) > coarse * drive.Ms / drive.c or late * math.sqrt(drive.c / drive.J1) > slow
+    return (
+        encoder_count(drive.encoder_lines) > coarse * drive.Ms / drive.c
+        or late * math.sqrt(drive.c / drive.J1) > slow
+    )
 
 
 def torque_delay(drive: Drive) -> tuple[float, bool]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter
 from softstart.controller.compiled import Reply, Vector, as_record, record
@@ -19,7 +18,7 @@ class Parameters:
 PARAMETERS, COMMAND = record(Parameters), record(Reply)
 
 
-@compiled_step
+@compiled_step(PARAMETERS)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """One torque, once and for all."""
     y = as_record(command, COMMAND)
@@ -38,11 +37,10 @@ class Direct(CompiledController):
     3.1179
     """
 
-    name: ClassVar[str] = "direct"
-    summary: ClassVar[str] = "constant starting torque, the baseline"
-    source: ClassVar[str] = "[G]"
-    effort: ClassVar[Effort | None] = Effort.CONTACTOR
-    kernel: ClassVar[Any] = step
-    record: ClassVar[Any] = PARAMETERS
+    name = "direct"
+    summary = "constant starting torque, the baseline"
+    source = "[G]"
+    effort = Effort.CONTACTOR
+    kernel = step
 
-    torque: float | None = parameter("N*m", "motor torque", lambda drive, p: drive.Ms, "starting torque Ms")
+    torque: float = parameter("N*m", "motor torque", lambda drive, p: drive.Ms, "starting torque Ms")

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, parameter
+from softstart.controller import CompiledController, Effort, Numbers, ParameterValues, parameter
 from softstart.controller.compiled import inner, record
 from softstart.drive import Drive
 from softstart_controllers import contact
@@ -36,53 +36,53 @@ GAP_OPEN, CLOSED, RAISING, NEXT = 0.0, 1.0, 2.0, 3.0
 
 
 class Parameters:
-    """Estimator and limits; `approach` is the speed, `drift` the slowing down of the load."""
+    """Estimator and limits; `drift` the slowing down of the load."""
 
-    watch: contact.Parameters
+    estimator: contact.Parameters
     low_torque: float
     full_torque: float
-    approach: float
+    approach_speed: float
     horizon: float
     drift: float
     contact_timeout: float
-    blind: float
+    undetectable: float
 
 
 class State:
     """The estimate, and how far the landing is."""
 
-    watch: contact.State
+    estimator: contact.State
     sample: float
     phase: float
 
 
-PARAMETERS = record(Parameters, watch=contact.PARAMETERS)
-STATE = record(State, watch=contact.STATE)
+PARAMETERS = record(Parameters, estimator=contact.PARAMETERS)
+STATE = record(State, estimator=contact.STATE)
 
 
 @inner
 def landed(p: Parameters, x: State, m: Any) -> float:
     """See a sample and tell the phase; the torque while the gap is open, or where nothing can be seen."""
-    watch = x.watch
+    estimator = x.estimator
     if x.phase <= CLOSED:
-        contact.observe(p.watch, watch, m.time, m.motor_torque, m.motor_angle, m.motor_speed, 1.0)
-        x.phase = CLOSED if watch.closed != 0.0 else GAP_OPEN
-        if p.blind != 0.0 or m.time >= p.contact_timeout:
+        contact.observe(p.estimator, estimator, m.time, m.motor_torque, m.motor_angle, m.motor_speed, 1.0)
+        x.phase = CLOSED if estimator.closed != 0.0 else GAP_OPEN
+        if p.undetectable != 0.0 or m.time >= p.contact_timeout:
             x.phase = RAISING
     if x.phase == RAISING:
-        return min(watch.sent[0] + p.watch.raising, p.full_torque)
-    allowed = watch.load_speed + p.approach
-    if watch.load_time == 0.0:  # never less than half: a contact not seen must not let the load run back
-        allowed -= min(p.drift * m.time, 0.5 * p.approach)
-    return min(max((allowed - watch.now.speed) / (p.watch.a * p.horizon), 0.0), p.low_torque)
+        return min(estimator.sent[0] + p.estimator.raising, p.full_torque)
+    allowed = estimator.load_speed + p.approach_speed
+    if estimator.load_time == 0.0:  # never less than half: a contact not seen must not let the load run back
+        allowed -= min(p.drift * m.time, 0.5 * p.approach_speed)
+    return min(max((allowed - estimator.now.speed) / (p.estimator.a * p.horizon), 0.0), p.low_torque)
 
 
 @inner
 def sent(p: Parameters, x: State, torque: float, u: float) -> float:
     """Keep what this sample demands; the instant of the next one."""
-    contact.send(p.watch, x.watch, torque, u)
+    contact.send(p.estimator, x.estimator, torque, u)
     x.sample += 1.0
-    return x.sample * p.watch.period
+    return x.sample * p.estimator.period
 
 
 def shaft_torque_under(drive: Drive, torque: Any) -> float:
@@ -95,13 +95,13 @@ def shaft_torque_under(drive: Drive, torque: Any) -> float:
     return under
 
 
-def low_torque(drive: Drive, p: Any) -> float:
+def low_torque(drive: Drive, p: ParameterValues) -> float:
     """Load torque plus half the accelerating torque, in N m."""
     held = pulling_load(drive)
     return held + LOW_TORQUE_SHARE * (drive.Ms - held)
 
 
-def approach_speed(drive: Drive, p: Any) -> float:
+def approach_speed(drive: Drive, p: ParameterValues) -> float:
     """Speed in rad/s of which the impact alone swings the shaft to the share `impact` of the full torque."""
     return drive.Omega * p.impact * shaft_torque_under(drive, p.full_torque) / drive.c
 
@@ -117,31 +117,26 @@ def approach_parameter(impact: str) -> Any:
 class Landing(CompiledController):
     """A strategy that lands softly. `impact` is c dw12/Omega over the shaft torque under the full torque."""
 
-    effort: ClassVar[Effort | None] = Effort.ENCODER
+    effort = Effort.ENCODER
     impact: ClassVar[float] = 0.7
 
     # fmt: off
-    low_torque: float | None = parameter("N*m", "torque limit while the gap is open", low_torque,
+    low_torque: float = parameter("N*m", "torque limit while the gap is open", low_torque,
         "load torque plus half the accelerating torque", "above 0", multiples=(0.3, 2.0))
-    approach_speed: float | None = approach_parameter("0.7")
-    full_torque: float | None = full_torque_parameter("torque limit after the rise", "above 0")
-    detection_threshold: float | None = contact.threshold_parameter()
-    uncertainty: float | None = contact.uncertainty_parameter()
-    contact_timeout: float | None = timeout_parameter()
-    period: float | None = period_parameter()
+    approach_speed: float = approach_parameter("0.7")
+    full_torque: float = full_torque_parameter("torque limit after the rise", "above 0")
+    detection_threshold: float = contact.threshold_parameter()
+    uncertainty: float = contact.uncertainty_parameter()
+    contact_timeout: float = timeout_parameter()
+    period: float = period_parameter()
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """The numbers of `Parameters` as `landing`."""
-        p: Any = self  # fitted: every parameter is a number
         landing = {
-            "watch": contact.estimator_parameters(drive, p, p.approach_speed),
-            "low_torque": p.low_torque,
-            "full_torque": p.full_torque,
-            "approach": p.approach_speed,
-            "horizon": 2.0 * (p.period + drive.torque_lag + drive.computing_delay),
+            "estimator": contact.estimator_parameters(drive, self, self.approach_speed),
+            "horizon": 2.0 * (self.period + drive.torque_lag + drive.computing_delay),
             "drift": load_drift(drive),
-            "contact_timeout": p.contact_timeout,
-            "blind": contact.contact_undetectable(drive, COARSE) and not contact.hanging(drive)[0],
+            "undetectable": contact.contact_undetectable(drive, COARSE) and not contact.hanging(drive)[0],
         }
         return {"landing": landing}

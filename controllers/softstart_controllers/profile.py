@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot
     return knot
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The line that holds now, of the first profile or of the second."""
     p = as_record(parameters[:N_PARAMETERS], PARAMETERS)
@@ -120,21 +120,20 @@ class Profile(CompiledController):
     [41.0, 30.0]
     """
 
-    name: ClassVar[str] = "profile"
-    summary: ClassVar[str] = "plays a torque profile from a file or from Python"
-    source: ClassVar[str] = "practice"
-    sensors: ClassVar[Sensor] = Sensor.STAGE
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    needs: ClassVar[tuple[str, ...]] = ("file", "profile")
+    name = "profile"
+    summary = "plays a torque profile from a file or from Python"
+    source = "practice"
+    sensors = Sensor.STAGE
+    kernel = step
+    needs = ("file", "profile")
 
     # fmt: off
-    file: str | None = parameter("", "path of the profile (CSV or TOML)",
+    file: str = parameter("", "path of the profile (CSV or TOML)",
         default_text="none: this or profile is needed")
     profile: TorqueProfile | None = parameter("",  # noqa: RUF009  a field, as the others
         "the profile itself, a TorqueProfile; from Python only",
         default_text="none: this or file is needed", python_only=True)
-    period: float | None = parameter("s", "sample period", 0.0, "0: the profile as it is, without sampling",
+    period: float = parameter("s", "sample period", 0.0, "0: the profile as it is, without sampling",
         "0 or more")
     # fmt: on
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, record, size
+from softstart.controller import CompiledController, Effort, Numbers, compiled_step, parameter
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import full_torque_parameter, period_parameter, pulling_load
 
@@ -31,7 +30,7 @@ class State:
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """A line over time, straight or with rounded ends, sampled."""
     p = as_record(parameters, PARAMETERS)
@@ -76,23 +75,21 @@ class Ramp(CompiledController):
     [41.0]
     """
 
-    name: ClassVar[str] = "ramp"
-    summary: ClassVar[str] = "torque rises in a straight line from the load torque to the starting torque"
-    source: ClassVar[str] = "practice"
-    effort: ClassVar[Effort | None] = Effort.RAMPS
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "ramp"
+    summary = "torque rises in a straight line from the load torque to the starting torque"
+    source = "practice"
+    effort = Effort.RAMPS
+    kernel = step
 
     # fmt: off
-    initial: float | None = parameter("N*m", "torque at the start", lambda drive, p: pulling_load(drive),
+    initial: float = parameter("N*m", "torque at the start", lambda drive, p: pulling_load(drive),
         "load torque, 0 where it does not brake", multiples=(0.3, 4.0))
-    time: float | None = parameter("s", "duration of the rise", lambda drive, p: 2.0 * drive.elastic_period,
+    time: float = parameter("s", "duration of the rise", lambda drive, p: 2.0 * drive.elastic_period,
         "two elastic periods", "0 or more", multiples=(0.1, 10.0))
-    full_torque: float | None = full_torque_parameter("torque after the rise")
-    period: float | None = period_parameter()
+    full_torque: float = full_torque_parameter("torque after the rise")
+    period: float = period_parameter()
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """Straight from end to end."""
         return {"rounding": 0.0}

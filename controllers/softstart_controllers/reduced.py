@@ -40,7 +40,7 @@ class State:
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step_of_gap(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced until the wait after contact has passed or the gap opens again; asked at its events."""
     p = as_record(parameters, PARAMETERS)

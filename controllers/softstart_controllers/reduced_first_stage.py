@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Sensor
-from softstart.controller.compiled import size
+from softstart.controller import CompiledController, Numbers, Sensor
 from softstart.drive import Drive
-from softstart_controllers.reduced import PARAMETERS, STATE, reduced_torque_parameter, step_of_gap
+from softstart_controllers.reduced import reduced_torque_parameter, step_of_gap
 from softstart_controllers.sampled import full_torque_parameter
 
 
@@ -24,17 +22,15 @@ class ReducedFirstStage(CompiledController):
     2.3894
     """
 
-    name: ClassVar[str] = "reduced-first-stage"
-    summary: ClassVar[str] = "torque reduced while the gap is first open, Ms from contact on (method 1)"
-    source: ClassVar[str] = "[G](17)"
-    sensors: ClassVar[Sensor] = Sensor.STAGE
-    kernel: ClassVar[Any] = step_of_gap
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "reduced-first-stage"
+    summary = "torque reduced while the gap is first open, Ms from contact on (method 1)"
+    source = "[G](17)"
+    sensors = Sensor.STAGE
+    kernel = step_of_gap
 
-    torque: float | None = reduced_torque_parameter("reduced torque of stage 1")
-    full_torque: float | None = full_torque_parameter("torque from contact on")
+    torque: float = reduced_torque_parameter("reduced torque of stage 1")
+    full_torque: float = full_torque_parameter("torque from contact on")
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """The torque is raised at once."""
         return {"wait": 0.0}

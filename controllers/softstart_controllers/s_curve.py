@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import parameter
+from softstart.controller import Numbers, parameter
 from softstart.drive import Drive
 from softstart_controllers.ramp import Ramp
 
@@ -34,14 +33,14 @@ class SCurve(Ramp):
     [7.75, 31.0, 54.25]
     """
 
-    name: ClassVar[str] = "s-curve"
-    summary: ClassVar[str] = "torque rises in an S from the load torque to the starting torque"
+    name = "s-curve"
+    summary = "torque rises in an S from the load torque to the starting torque"
 
     # fmt: off
-    rounding: float | None = parameter("1", "share of the time spent in the rounded ends", 1.0,
+    rounding: float = parameter("1", "share of the time spent in the rounded ends", 1.0,
         limit="from 0 to 1", between=(0.0, 1.0))
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """None beside the parameters."""
         return {}

@@ -10,7 +10,6 @@ from numba import njit
 from softstart.controller import parameter
 from softstart.drive import Drive
 from softstart.input.parameters import Limit
-from softstart.kernel.motor import COUNTS_PER_LINE
 
 LONGEST_PERIOD = 1e-3  # s
 SAMPLES_PER_ELASTIC_PERIOD = 32
@@ -46,15 +45,6 @@ def full_torque_parameter(meaning: str, limit: Limit = "any") -> Any:
     """`full_torque` as a field of a controller."""
     default = "starting torque Ms"
     return parameter("N*m", meaning, lambda drive, p: drive.Ms, default, limit, multiples=(0.4, 1.0))
-
-
-def encoder_count(drive: Drive) -> float:
-    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
-
-    >>> round(encoder_count(Drive.load("crane-4amtkf")) * 1e6, 2)
-    383.5
-    """
-    return 2.0 * math.pi / (COUNTS_PER_LINE * drive.encoder_lines) if drive.encoder_lines > 0.0 else 0.0
 
 
 def pulling_load(drive: Drive) -> float:

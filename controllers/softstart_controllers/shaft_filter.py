@@ -49,8 +49,8 @@ FREE, SHAFT = record(Free), record(ShaftEstimate, P=(N, N), F=(N, N), G=(N, N))
 
 
 @compiled
-def free_predict(m: Free, u: float, early: float, h: float, noise: float) -> None:
-    """The free motor h later: w1' = u/J1, under the mean torque u, which acts `early` (see `contact.lead`).
+def free_predict(m: Free, u: float, lead: float, h: float, noise: float) -> None:
+    """The free motor h later: w1' = u/J1, under the mean torque u with its `lead` (`contact.torque_lead`).
 
     1/J1 is an unknown of its own, which the pulse reveals; `noise` (rad^2/s^2) is what the torque measured
     may be wrong by, as variance of w1.
@@ -62,7 +62,7 @@ def free_predict(m: Free, u: float, early: float, h: float, noise: float) -> Non
     [0.75, 3.0, 2.0]
     """
     g = u * h
-    f = 0.5 * g * h + early * h * h
+    f = 0.5 * g * h + lead * h * h
     m.angle += h * m.speed + f * m.inverse
     m.speed += g * m.inverse
     p00, p01, p02 = m.p00, m.p01, m.p02
@@ -159,7 +159,7 @@ def predicted_motion(
 
 @compiled
 def shaft_predict(
-    x: ShaftEstimate, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
+    x: ShaftEstimate, u: float, lead: float, h: float, a: float, c: float, d: float, Mc: float,
     Mb: float, speed_noise: float, twist_noise: float, load_noise: float,
 ) -> None:  # fmt: skip
     """The shaft in contact h later (`predicted_motion`); covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
@@ -215,9 +215,9 @@ def shaft_predict(
     x.P[2, 2] += twist_noise
     x.P[3, 3] += load_noise
     way, w1, z, w2 = predicted_motion(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, Mb)
-    x.phi1 += way + a * early * h * h
+    x.phi1 += way + a * lead * h * h
     x.w1 = w1
-    x.z = z + a * early * h * h
+    x.z = z + a * lead * h * h
     x.w2 = w2
 
 

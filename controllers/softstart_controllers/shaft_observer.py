@@ -28,7 +28,7 @@ from numba import njit
 
 from softstart.controller.compiled import record
 from softstart.drive import Drive
-from softstart_controllers.sampled import encoder_count
+from softstart.kernel.motor import encoder_count
 
 SMALLEST_INDEX = -18.0  # decades
 FASTEST = (
@@ -114,7 +114,7 @@ def observer(drive: Drive, period: float, uncertainty: float) -> Observer:
     (0.66, 0.0059, True)
     """
     h, Omega, unit = period, drive.Omega, drive.J1 / period**2
-    deviation = encoder_count(drive) / math.sqrt(12.0)
+    deviation = encoder_count(drive.encoder_lines) / math.sqrt(12.0)
     noise = uncertainty * Omega**2 * drive.Ms / math.sqrt(Omega * h) * h**4 / drive.J1
     slowest = 10.0 ** (0.5 * SMALLEST_INDEX)
     fastest = max((FASTEST * Omega * h) ** 4, slowest)

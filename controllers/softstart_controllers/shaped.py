@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import compiled_step, parameter
+from softstart.controller import Numbers, compiled_step, parameter
 from softstart.controller.compiled import (
     MEASURED,
     Reply,
@@ -15,7 +14,6 @@ from softstart.controller.compiled import (
     compiled,
     keep_state,
     record,
-    size,
 )
 from softstart.drive import Drive
 from softstart_controllers import landing
@@ -57,10 +55,10 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
 
     With M = (u J2 + Mc J1)/(J1 + J2), the mean torque of the shaft under the motor torque u.
     """
-    near, shaft = p.landing.watch, y.landing.watch.shaft
+    near, shaft = p.landing.estimator, y.landing.estimator.shaft
     a, b, c, d = near.a, shaft.b, near.c, near.d
-    w1, z, w2, u = predicted_state(near, y.landing.watch, u)
-    if y.landing.watch.held != 0.0:  # by the brake, under the torque that holds the load
+    w1, z, w2, u = predicted_state(near, y.landing.estimator, u)
+    if y.landing.estimator.held != 0.0:  # by the brake, under the torque that holds the load
         return p.landing.low_torque
     if near.Mb != near.Mc and w2 == 0.0 and c * z + d * w1 <= near.Mc:
         return p.landing.low_torque  # until the load breaks away
@@ -70,8 +68,8 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
     sigma, omega = -ratio * Omega, Omega * math.sqrt(1.0 - ratio * ratio)
     level = share * u + load
     rate = w1 - w2
-    W = vector(z, rate, c, sigma, omega, near.lag, level)
-    D = sensitivity(rate, c * z, 1.0 / (a + b), sigma, omega, near.lag, level)
+    W = vector(z, rate, c, sigma, omega, near.torque_lag, level)
+    D = sensitivity(rate, c * z, 1.0 / (a + b), sigma, omega, near.torque_lag, level)
     full = share * p.landing.full_torque + load
     n, M0, M1, M2, M3 = plan_levels(int(p.order), W, D, max(0.0, load), full, sigma, omega, near.period)
     if n == 0:
@@ -86,7 +84,7 @@ def torque_after_contact(p: Parameters, u: float, y: State) -> float:
     return float(y.levels[0])
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Land, follow the swing, plan the steps once, play them."""
     p = as_record(parameters, PARAMETERS)
@@ -117,31 +115,21 @@ class Shaped(Landing):
     It measures the motor angle (encoder) and the motor torque. The gap is nowhere among its numbers.
 
     *Landing.* The motor closes the gap `approach_speed` faster than the load, with at most `low_torque`
-    (`landing`). The contact and what follows are estimated (`contact`).
-
-    *Steps.* The impact has already excited the shaft: T(0) = 0, T'(0) = c dw12. From this state the torque is
-    raised in levels of n samples each, two (`zv`) or four (`zvd`), to `full_torque`, chosen so that nothing
-    swings after the last step. Undamped and for n samples in a quarter of the elastic period, with I = c
-    dw12/Omega and the mean torque M_f under the full torque, the two levels of the mean torque are
+    (`landing`); contact and state are estimated (`contact`).
+    *Steps.* From T(0) = 0, T'(0) = c dw12 the torque is raised in levels of n samples each, two (`zv`) or
+    four (`zvd`), to `full_torque`, so that nothing oscillates after the last step. Undamped and for n samples
+    in a quarter of the elastic period, with I = c dw12/Omega and the mean torque M_f under the full torque,
 
         M_0, M_1 = (M_f - I)/2, (M_f + I)/2
 
-    and I = 0 gives the two equal steps of the textbook. n is the smallest number whose levels rise; then T
-    never exceeds M_f: K_dyn = 1 with `full_torque` = Ms. The equations, with damping and lag, are in
-    `shaping`. `zvd` makes the derivative of what is left with respect to the frequency zero as well; it takes
-    twice as long, and a softer landing.
+    (`shaping` has damping and lag). n is the smallest number whose levels rise; then K_dyn = 1 with
+    `full_torque` = Ms. Where no such levels exist, M = T - 4 T'/Omega, within 0 and the full torque, damps
+    the oscillation, and the levels are planned again in every sample; where a load at rest still holds, the
+    torque is low until it breaks away.
 
-    No such levels may exist: the landing was too hard, or a load at rest still holds. Then the mean torque
-    is T - 4 T'/Omega, within 0 and the full torque, which lets the swing die out (T'' = -4 Omega T'), or the
-    torque is low until the load breaks away, and the levels are asked for again in every sample. Where the
-    flanks part again, the gap is closed again.
-
-    *Hanging.* Where the drive that it is set up for starts with its load hanging in the wound-up shaft, the
-    steps begin from that twist, once the brake has let the motor go.
-
-    *Limits.* The steps are played without looking: inertias, load torque and elastic `frequency` are those
-    of the nominal drive (J2 as far as it has shown until then). A first-order lag of the torque commutes
-    with the shaper, and is allowed for, and so is a dead time. A limited torque rate is not.
+    The steps have no feedback: inertias, load torque and `frequency` are those of the nominal drive. Lag and
+    dead time are compensated, a limited torque rate is not. A hanging load begins with its twist, once the
+    brake has let the motor go.
 
     Source: posicast of Smith (1957), ZV and ZVD of Singer and Seering (1990), with the state at contact.
 
@@ -151,17 +139,15 @@ class Shaped(Landing):
     [1.0, 1.0]
     """
 
-    name: ClassVar[str] = "shaped"
-    summary: ClassVar[str] = "soft landing, then torque steps that leave no swing in the shaft (ZV, ZVD)"
-    source: ClassVar[str] = "Smith 1957, Singer and Seering 1990"
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "shaped"
+    summary = "soft landing, then torque steps that leave no swing in the shaft (ZV, ZVD)"
+    source = "Smith 1957, Singer and Seering 1990"
+    kernel = step
 
     # fmt: off
-    shaper: str | None = parameter("", "shaper", "zv", choices=tuple(SHAPERS))
-    approach_speed: float | None = landing.approach_parameter("0.7 (zv) or 0.3 (zvd)")
-    frequency: float | None = parameter("rad/s", "undamped elastic frequency of the model",
+    shaper: str = parameter("", "shaper", "zv", choices=tuple(SHAPERS))
+    approach_speed: float = landing.approach_parameter("0.7 (zv) or 0.3 (zvd)")
+    frequency: float = parameter("rad/s", "undamped elastic frequency of the model",
         lambda drive, p: drive.Omega, "Omega", "above 0", multiples=(0.7, 1.4))
     # fmt: on
 
@@ -170,9 +156,8 @@ class Shaped(Landing):
         """C dw12/Omega, of the shaft torque under the full torque."""
         return IMPACT[self.shaper or "zv"]
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """Landing, with the stiffness that has this frequency, and steps."""
-        p: Any = self  # fitted: every parameter is a number
         numbers = super().numbers(drive)
-        numbers["landing"]["watch"]["c"] = drive.J1 * drive.J2 / (drive.J1 + drive.J2) * p.frequency**2
-        return numbers | {"order": SHAPERS[p.shaper]}
+        numbers["landing"]["estimator"]["c"] = drive.J1 * drive.J2 / (drive.J1 + drive.J2) * self.frequency**2
+        return numbers | {"order": SHAPERS[self.shaper]}

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import compiled_step, parameter
+from softstart.controller import Numbers, compiled_step, parameter
 from softstart.controller.compiled import (
     MEASURED,
     Reply,
@@ -15,7 +14,6 @@ from softstart.controller.compiled import (
     compiled,
     keep_state,
     record,
-    size,
 )
 from softstart.drive import Drive
 from softstart_controllers import landing
@@ -52,16 +50,16 @@ COMMAND = record(Reply, State, landing=landing.STATE)
 @compiled
 def feedback(p: Parameters, u: float, y: State) -> float:
     """The torque that the feedback asks for, within 0 and the full torque; raises the reference."""
-    watch = y.landing.watch
-    near, shaft = p.landing.watch, watch.shaft
+    estimator = y.landing.estimator
+    near, shaft = p.landing.estimator, estimator.shaft
     a, b, c = near.a, shaft.b, near.c
-    w1, z, w2, u = predicted_state(near, watch, u)
+    w1, z, w2, u = predicted_state(near, estimator, u)
     share, load = a / (a + b), near.Mc * b / (a + b)  # of the motor torque, in the mean torque of the shaft
     Omega = math.sqrt(c * (a + b))
     low, full = share * p.landing.low_torque + load, share * ROOM * p.landing.full_torque + load
     reference = low + (full - low) * y.progress
     rate = (full - low) / p.rise if y.progress < 1.0 else 0.0
-    if watch.held == 0.0:  # else the reference waits for the brake
+    if estimator.held == 0.0:  # else the reference waits for the brake
         y.progress = min(1.0, y.progress + near.period / p.rise)
     mean = reference + near.d / c * rate - p.f_twist * (c * z - reference)
     mean -= p.f_rate * (c * (w1 - w2) - rate) / Omega
@@ -69,7 +67,7 @@ def feedback(p: Parameters, u: float, y: State) -> float:
     return min(max((mean - load) / share, 0.0), p.landing.full_torque)
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Land; from contact on estimate the state and feed it back."""
     p = as_record(parameters, PARAMETERS)
@@ -106,12 +104,8 @@ class StateFeedback(Landing):
     for the drive with its lag, sampled. Here T is c z. A limited torque rate counts as more lag, by the time
     in which it slews a quarter of Ms; a dead time is bridged by the model.
 
-    *Hanging.* Where the drive that it is set up for starts with its load hanging in the wound-up shaft, there
-    is no contact to be seen: the feedback acts from the first sample on, from that twist, and waits with the
-    reference until the brake has let the motor go. Else the start position is nowhere among its numbers.
-
-    *Limits.* Designs are made for groups without units on a grid (`regulator`), so neighbouring weights may
-    give the same start. Where the flanks part again, the gap is closed again.
+    A load that hangs at first is in contact from the first sample on, and the reference waits for the brake.
+    Weights are on a grid (`regulator`), so neighbouring ones may give the same start.
 
     Source: linear-quadratic-Gaussian control as in the manual of python-control; landing as `shaped`.
 
@@ -121,36 +115,33 @@ class StateFeedback(Landing):
     [1.0, 1.0]
     """
 
-    name: ClassVar[str] = "state-feedback"
-    summary: ClassVar[str] = "soft landing, then LQR of the shaft torque on a Kalman filter"
-    source: ClassVar[str] = "LQG, python-control"
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "state-feedback"
+    summary = "soft landing, then LQR of the shaft torque on a Kalman filter"
+    source = "LQG, python-control"
+    kernel = step
 
     # fmt: off
-    rise: float | None = parameter("s", "rise time of the reference after contact",
+    rise: float = parameter("s", "rise time of the reference after contact",
         lambda drive, p: 0.75 * drive.elastic_period, "three quarters of the elastic period", "0 or more",
         multiples=(0.2, 5.0))
-    torque_weight: float | None = parameter("1",
+    torque_weight: float = parameter("1",
         "weight of the error of T, that of the mean torque under the motor being 1", 3.0, limit="above 0",
         multiples=(0.03, 30.0))
-    rate_weight: float | None = parameter("1",
+    rate_weight: float = parameter("1",
         "weight of T'/Omega, that of the mean torque under the motor being 1", 4.0, limit="above 0",
         multiples=(0.03, 30.0))
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """Landing, rise, and gains."""
-        p: Any = self  # fitted: every parameter is a number
         ratio = min(0.5 * drive.d * drive.Omega / drive.c, LARGEST_DAMPING)
         lag = drive.torque_lag + SLEWED_SHARE * drive.Ms / drive.torque_rate
-        step = drive.Omega * p.period
+        step = drive.Omega * self.period
         f_twist, f_rate, f_torque = feedback_gains(
-            step, ratio, drive.Omega * lag, p.torque_weight, p.rate_weight
+            step, ratio, drive.Omega * lag, self.torque_weight, self.rate_weight
         )
         return super().numbers(drive) | {
-            "rise": max(p.rise, p.period),
+            "rise": max(self.rise, self.period),
             "f_twist": f_twist,
             "f_rate": f_rate,
             "f_torque": f_torque,

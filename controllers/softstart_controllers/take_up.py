@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, Effort, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record, size
+from softstart.controller import (
+    CompiledController,
+    Effort,
+    Numbers,
+    ParameterValues,
+    compiled_step,
+    parameter,
+)
+from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import (
     full_torque_parameter,
@@ -80,7 +86,7 @@ PARAMETERS = record(Parameters, first=GAINS, later=GAINS)
 STATE, COMMAND = record(State), record(Reply, State)
 
 
-@compiled_step
+@compiled_step(PARAMETERS, STATE)
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Estimate w1, T and T', tell whether the load is met, set the torque."""
     p = as_record(parameters, PARAMETERS)
@@ -138,31 +144,31 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     y.phase = phase
 
 
-def delay(drive: Drive, p: Any) -> float:
+def delay(drive: Drive, p: ParameterValues) -> float:
     """By how much in s the torque is late: lag, dead time, a sample, a quarter of the slewing time to Ms."""
     slewing = SLEWED_SHARE * drive.Ms / drive.torque_rate
     late: float = drive.torque_lag + drive.computing_delay + p.period + slewing
     return late
 
 
-def share_left(drive: Drive, p: Any) -> float:
+def share_left(drive: Drive, p: ParameterValues) -> float:
     """Share of the damping by T' that a torque so late leaves, 1 to 0."""
     return min(max((NONE_LEFT - drive.Omega * delay(drive, p)) / (NONE_LEFT - ALL_LEFT), 0.0), 1.0)
 
 
-def contact_share(drive: Drive, p: Any) -> float:
+def contact_share(drive: Drive, p: ParameterValues) -> float:
     """At least as much as the rounding of a coarse encoder may feign."""
     eyes = observer(drive, p.period, p.uncertainty)
     feigned: float = CERTAINTY * eyes.torque_deviation * eyes.rate_lag / (drive.J1 * p.take_up_speed)
     return max(CONTACT_SHARE, feigned)
 
 
-def contact_time(drive: Drive, p: Any) -> float:
+def contact_time(drive: Drive, p: ParameterValues) -> float:
     """Several times as long as the speed loop needs for the impulse, so that a load is always noticed."""
     return max(0.16 * drive.elastic_period, HELD * p.contact_share * drive.J1 / p.speed_gain)
 
 
-def loop_damping(drive: Drive, p: Any) -> float:
+def loop_damping(drive: Drive, p: ParameterValues) -> float:
     """0.28 where the torque is quick, at most a loop gain of one at 1 rad of phase lag, 0 if later still."""
     phase = drive.Omega * delay(drive, p)
     damping = min(0.28 * (LATE_SHARE + (1.0 - LATE_SHARE) * share_left(drive, p)), 0.5 / phase)
@@ -176,37 +182,19 @@ class TakeUp(CompiledController):
     For drivelines with several gaps, where the first contact is not that with the load. It measures the motor
     angle (encoder) and the motor torque. Gaps, positions and light parts are nowhere among its numbers.
 
-    *Observer.* Every `period` the estimates of phi1, w1, T and T' go on under the torque realised and are
-    corrected by the encoder (`shaft_observer`), T being the torque that the motor shaft passes on. The model
-    of the chain behind it is T'' = 0, with an unknown part of `uncertainty` Omega^2 Ms while the gaps are
-    taken up, and a tenth of that afterwards: then it is to see the first mode only.
-
-    *Taking up.* A stiff speed loop, u = clip(`speed_gain` (v - w1), 0, full_torque), brings the motor to
-    v = `take_up_speed` above the initial speed of the load. Under an active load v falls by `slowing` Mc t/J2
-    to 0.3 of it, since the load itself closes a wide gap by then. A part between two gaps that a load falling
-    at w2 hits leaves at up to twice that speed and hits the next one: hence the low speed.
-
-    *The load is met* when the impulse of the shaft, int T dt with a memory of `contact_time`, exceeds
-    `contact_share` J1 take_up_speed. A light part of inertia J takes 2 J v at most, and is swept along. A
-    load that stops the motor is always noticed: the memory is at least four times as long as the speed loop
-    needs for that impulse.
-
-    *Rise.* From the torque of then on, in the time `rise`, with two dampers that share the work:
+    *Taking up.* u = clip(`speed_gain` (v - w1), 0, full_torque) brings the motor to v = `take_up_speed` above
+    the initial speed of the load; under an active load v falls by `slowing` Mc t/J2, to 0.3 of it at most.
+    *Contact with the load.* The impulse of the shaft, int T dt with a memory of `contact_time`, exceeds
+    `contact_share` J1 take_up_speed: more than a light part can take.
+    *Rise.* From the torque of then on, in the time `rise`, with two dampers:
 
         u = clip(low + (full_torque - low) s - D1 (w1 - w2) - D2 T'/c, 0, Ms),   D = 2 zeta J1 Omega
 
-    zeta is `damping_ratio` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
-    ahead of the load in a gap that is still open. w2 is the estimated speed of the load: it begins at
-    w1 - T'/c, accelerates by (T - Mc)/J2 and follows w1 by a loop of the bandwidth `corner`, so that a wrong
-    J2 does not matter. It falls back no more. The start takes longer where D1 holds the motor back.
+    zeta is `damping_ratio` (D1) and `rate_damping_ratio` (D2). T and T' are from the observer
+    (`shaft_observer`); w2 accelerates by (T - Mc)/J2 and follows w1 with the bandwidth `corner`. A delay of
+    the torque limits speed_gain and both dampers, and slows the rise.
 
-    *Late torque.* With the delay tau = lag + dead time + period + a quarter of the time that the rate limit
-    takes to Ms, speed_gain and D1 are at most J1/tau. A derivative that comes late drives the second mode:
-    D2 is full up to Omega tau = 0.5 and gone from 1 on, D1 0.6 of itself then and gone from 2.5 on, and the
-    rise slower. A coarse encoder raises contact_share to 3 standard deviations of the estimated motor speed.
-    After `contact_timeout` the torque is just raised.
-
-    Source: docs/take-up.md.
+    Source: softstart.
 
     >>> from softstart import simulate
     >>> from softstart.chain import Chain
@@ -216,68 +204,61 @@ class TakeUp(CompiledController):
     [1.1, 1.8]
     """
 
-    name: ClassVar[str] = "take-up"
-    summary: ClassVar[str] = "all gaps taken up at low speed, then a damped rise once the load is met"
-    source: ClassVar[str] = "softstart: docs/take-up.md"
-    effort: ClassVar[Effort | None] = Effort.ENCODER
-    kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = size(STATE)
-    record: ClassVar[Any] = PARAMETERS
+    name = "take-up"
+    summary = "all gaps taken up at low speed, then a damped rise once the load is met"
+    source = "softstart: docs/take-up.md"
+    effort = Effort.ENCODER
+    kernel = step
 
     # fmt: off
-    take_up_speed: float | None = parameter("rad/s",
+    take_up_speed: float = parameter("rad/s",
         "motor speed relative to the initial load speed while the gaps are taken up",
         lambda drive, p: 0.16 * drive.Ms / math.sqrt(drive.c * drive.J1), "0.16 Ms/sqrt(c J1)", "above 0",
         multiples=(0.3, 3.0))
-    slowing: float | None = parameter("1",
+    slowing: float = parameter("1",
         "reduction of that speed, as a multiple of the speed at which an active load falls back", 2.0,
         limit="0 or more", between=(0.0, 8.0))
-    speed_gain: float | None = parameter("N*m*s/rad", "gain of the speed loop while the gaps are taken up",
+    speed_gain: float = parameter("N*m*s/rad", "gain of the speed loop while the gaps are taken up",
         lambda drive, p: min(2.4 * math.sqrt(drive.c * drive.J1), drive.J1 / delay(drive, p)),
         "2.4 sqrt(c J1), at most J1 over the delay", "above 0", multiples=(0.3, 4.0))
-    contact_share: float | None = parameter("1",
+    contact_share: float = parameter("1",
         "impulse of the shaft that means the load, as a share of J1 take_up_speed", contact_share,
         "0.56, more for a coarse encoder", "above 0", between=(0.1, 1.5))
-    contact_time: float | None = parameter("s", "memory of that impulse", contact_time,
+    contact_time: float = parameter("s", "memory of that impulse", contact_time,
         "0.16 elastic periods, at least 4 contact_share J1/speed_gain", "above 0", multiples=(0.2, 5.0))
-    full_torque: float | None = full_torque_parameter("torque after the rise", "above 0")
-    rise: float | None = parameter("s", "rise time of the torque once the load is met",
+    full_torque: float = full_torque_parameter("torque after the rise", "above 0")
+    rise: float = parameter("s", "rise time of the torque once the load is met",
         lambda drive, p: (LATE_RISE + (0.72 - LATE_RISE) * share_left(drive, p)) * drive.elastic_period,
         "0.72 elastic periods, 1.5 for a late torque", "0 or more", multiples=(0.3, 5.0))
-    damping_ratio: float | None = parameter("1",
+    damping_ratio: float = parameter("1",
         "damping ratio added by w1 less the estimated speed of the load", loop_damping,
         "0.28, less for a late torque", "0 or more", between=(0.0, 1.5))
-    rate_damping_ratio: float | None = parameter("1", "damping ratio added by the estimated T'",
+    rate_damping_ratio: float = parameter("1", "damping ratio added by the estimated T'",
         lambda drive, p: 0.23 * share_left(drive, p), "0.23, down to 0 for a late torque", "0 or more",
         between=(0.0, 1.5))
-    corner: float | None = parameter("rad/s",
+    corner: float = parameter("rad/s",
         "bandwidth at which the estimated speed of the load follows the motor",
         lambda drive, p: 0.073 * drive.Omega, "0.073 Omega", "0 or more", multiples=(0.2, 5.0))
-    uncertainty: float | None = parameter("1",
+    uncertainty: float = parameter("1",
         "unknown part of T'' in the observer's model, as a share of Omega^2 Ms", 0.18, limit="above 0",
         multiples=(0.1, 10.0))
-    contact_timeout: float | None = timeout_parameter()
-    period: float | None = period_parameter()
+    contact_timeout: float = timeout_parameter()
+    period: float = period_parameter()
     # fmt: on
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
+    def numbers(self, drive: Drive) -> Numbers:
         """Gains and thresholds; neither gap nor start position enter."""
-        p: Any = self  # fitted: every parameter is a number
         damping = 2.0 * drive.J1 * drive.Omega
         return {
-            "J1": drive.J1,
-            "c": drive.c,
-            "Mc": drive.Mc,
             "load_share": 1.0 / drive.J2,
             "load_speed": drive.initial_load_speed,
-            "slowest": SLOWEST * p.take_up_speed,
-            "falling": p.slowing * max(drive.falling_torque, 0.0) / drive.J2,
-            "contact": p.contact_share * drive.J1 * p.take_up_speed,
-            "leak": math.exp(-p.period / p.contact_time),
-            "Ms": drive.Ms,
-            "rise": p.period / max(p.rise, p.period),
-            "D1": damping * p.damping_ratio,
-            "D2": damping * p.rate_damping_ratio / drive.c,
-            "first": observer(drive, p.period, p.uncertainty).gains,
-            "later": observer(drive, p.period, CALM * p.uncertainty).gains,
+            "slowest": SLOWEST * self.take_up_speed,
+            "falling": self.slowing * max(drive.falling_torque, 0.0) / drive.J2,
+            "contact": self.contact_share * drive.J1 * self.take_up_speed,
+            "leak": math.exp(-self.period / self.contact_time),
+            "rise": self.period / max(self.rise, self.period),
+            "D1": damping * self.damping_ratio,
+            "D2": damping * self.rate_damping_ratio / drive.c,
+            "first": observer(drive, self.period, self.uncertainty).gains,
+            "later": observer(drive, self.period, CALM * self.uncertainty).gains,
         }

@@ -21,6 +21,7 @@ PAGES = {
     "softstart.drive.data_sheet": ("howto/own-drive",),
     "softstart.drive.machine_table": ("howto/python-in-a-notebook",),
     "softstart.identification": ("identification",),
+    "softstart.kernel.records": ("howto/add-a-controller", "theory/feedback"),
     "softstart.linear": ("linear-view",),
     "softstart.optimal": ("optimal-starts", "theory/optimum"),
     "softstart.profile": ("optimal-starts", "theory/optimum"),

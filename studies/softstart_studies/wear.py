@@ -102,7 +102,7 @@ def _fixed(tuning: Tuning) -> Controller:
     """The controller with the gains of the new drive."""
     assert tuning.schedule is not None
     cell = tuning.schedule.isel(gap=0, load_inertia=0)
-    gains: dict[str, Any] = {one.name: float(cell[one.name]) for one in tuning.question.ranges}
+    gains: dict[str, Any] = {one.name: float(cell[one.name]) for one in tuning.problem.ranges}
     return published(tuning.controller, **gains)
 
 

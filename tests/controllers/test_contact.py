@@ -32,7 +32,7 @@ LANDING = [(CurrentLimitFeedback, current_limit_feedback), (Shaped, shaped), (St
 
 def seen(states: Any, trace: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
     """A column of the estimate."""
-    return trace[:, 1 + index(states, f"landing.watch.{name}")]
+    return trace[:, 1 + index(states, f"landing.estimator.{name}")]
 
 
 # the filters ---------------------------------------------------------------------------------------------
@@ -166,7 +166,7 @@ def test_looks_ahead_by_dead_time_and_lag(dead: float, lag: float, seed: int) ->
     )  # fmt: skip
     run = simulate(drive, Profile(profile=profile), until=0.03)
     numbers = Shaped().fitted(drive).vector(drive)
-    p = numbers.view(shaped.PARAMETERS)[0].landing.watch
+    p = numbers.view(shaped.PARAMETERS)[0].landing.estimator
     m = np.zeros(size(contact.STATE)).view(contact.STATE)[0]
     now = 9 * h
     at = run.at([now, now + dead])

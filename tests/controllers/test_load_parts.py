@@ -9,7 +9,7 @@ from tests.softstart.kernel.pieces import Pieces
 from softstart import Drive, simulate
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.formulas import contact_stage
-from softstart_controllers import contact
+from softstart_controllers import contact, shaped
 from softstart_controllers.reduced import load_drift, stage_2_duration
 
 CRANE = Drive.load("crane-4amtkf").replace(encoder_lines=4096)
@@ -72,11 +72,8 @@ def test_the_estimated_speed_of_a_load_in_the_open_gap(friction: float, w2: floa
         load_torque=5.0, load_friction=friction, gap=300.0, initial_speed=w2, start_position="mid-gap"
     )
     run = simulate(drive, Pieces(pieces=((0.0, 0.0),)), until=0.6)
-    p = np.zeros(1, contact.PARAMETERS)[0]
-    for name, value in contact.estimator_parameters(
-        drive, make_controller("shaped").fitted(drive), 10.0
-    ).items():
-        p[name] = value
+    numbers = make_controller("shaped").fitted(drive).vector(drive)
+    p = numbers.view(shaped.PARAMETERS)[0].landing.estimator
     m = np.zeros(1, contact.STATE)[0]
     m["load_speed"], m["b"] = w2, 1.0 / drive.J2
     for t in (0.05, 0.2, 0.5):

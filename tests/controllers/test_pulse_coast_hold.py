@@ -52,7 +52,7 @@ def test_the_pulse_tells_motor_inertia_and_delay() -> None:
     nominal = told("reactive", torque_lag=0.001)
     _, trace = traced_as(drive, nominal)
     coasting = state(trace, "phase") == stepping.COAST
-    assert state(trace, "watch.free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)
+    assert state(trace, "estimator.free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)
     assert state(trace, "delay")[coasting][-1] == pytest.approx(0.002, rel=0.01)
 
 

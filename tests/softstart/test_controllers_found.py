@@ -8,11 +8,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import softstart
 from softstart import Command, Drive, InputError, PlainController, SimulationError, plugins, simulate
 from softstart.controller import Measured, make_controller
 
@@ -76,7 +78,7 @@ def test_wrong_names(mine: Path, monkeypatch: pytest.MonkeyPatch, name: str, wor
     [
         (lambda: Command(math.nan), SimulationError, "NaN or with a past instant"),
         (lambda: Command(1.0, 0.0), SimulationError, "NaN or with a past instant"),
-        (lambda: None, InputError, "return Command"),
+        (lambda: None, InputError, r"return a torque in N m or Command"),
         (
             lambda: Command(1 / 0),
             SimulationError,
@@ -93,6 +95,35 @@ def test_a_controller_that_fails_or_answers_nonsense(
 
     with pytest.raises(error, match=words):
         simulate(CRANE, Nonsense())
+
+
+def test_a_torque_alone_is_held_for_a_period_and_keeps_the_state() -> None:
+    """Samples are at multiples of the period to the bit; without a period there is one sample only."""
+    seen: list[tuple[float, tuple[float, ...]]] = []
+
+    @dataclass(frozen=True)
+    class Held(PlainController):
+        initial_state = (3.0,)
+        period: float = 0.001
+
+        def step(self, measured: Measured, state: tuple[float, ...]) -> float:
+            seen.append((measured.time, state))
+            return 30.0 + len(seen) / 8
+
+    run = simulate(CRANE, Held(), until=0.1)
+    assert seen == [(k * 0.001, (3.0,)) for k in range(len(seen))]
+    assert len(seen) in (100, 101)
+    assert run.at([0.0505])["u"].tolist() == [36.375]
+    seen.clear()
+    simulate(CRANE, Held(period=0.0), until=0.1)
+    assert len(seen) == 1
+
+
+def test_the_root_shows_its_public_names_only() -> None:
+    assert dir(softstart) == sorted(softstart.__all__)
+    assert {"parameter", "compiled_step", "make_controller", "Command", "PlainController"} <= set(
+        dir(softstart)
+    )
 
 
 def test_what_is_not_declared_is_not_seen() -> None:
@@ -113,7 +144,8 @@ def test_a_compiled_step_notices_a_change_in_what_it_calls(tmp_path):
         "from numba import njit\n\n@njit(cache=True)\ndef answer():\n    return 10.0\n"
     )
     (tmp_path / "step_with_helper.py").write_text(
-        "import numpy as np\nfrom softstart.controller.compiled import compiled_step, TORQUE, ASK_AGAIN\n"
+        "import numpy as np\nfrom softstart import compiled_step\n"
+        "from softstart.kernel.motor import TORQUE, ASK_AGAIN\n"
         "from helper_of_a_step import answer\n\n"
         "@compiled_step\ndef step(parameters, measured, state, command):\n"
         "    command[TORQUE] = answer()\n    command[ASK_AGAIN] = 1.0\n\n"

@@ -26,7 +26,7 @@ from softstart import (
 )
 from softstart.identification.planning import simulated_log
 from softstart.start.comparison import LEFT_POSSIBLE, intervals
-from softstart.tuning.question import scenarios_drawn, tuning_scenarios
+from softstart.tuning.problem import scenarios_drawn, tuning_scenarios
 
 TRUTH = UNKNOWN.replace(start_position="mid-gap")
 
@@ -179,8 +179,8 @@ def test_gains_are_tuned_over_the_drives_that_are_left(
     monkeypatch.setattr("softstart.tuning.solving.DRAWN", 20)
     quick: Any = {"certified": False, "workers": 1, "schedule": False, "restarts": 1, "generations": 2}
     tuned = tune(found, "ramp", free=["time"], start_time="1.6x", **quick)
-    assert len(tuned.question.scenarios) == 21
-    assert tuned.question.cells == ((found.drive.gap, found.drive.load_inertia),)
+    assert len(tuned.problem.scenarios) == 21
+    assert tuned.problem.cells == ((found.drive.gap, found.drive.load_inertia),)
     assert tuned.robust is not None
     # K_dyn over the mean torque of the drive found, as tolerances have it
     gains: Any = {"parameters": tuned.robust.parameters, "fitted_to": found.drive, "base": found.drive}

@@ -117,7 +117,7 @@ def test_tolerances_count_at_either_end(sheet):
     asked = {"free": ["time"], "schedule": False, **SEARCH, "generations": 1}
     tuning = tune(sheet, "ramp", ["1x"], ["1x"], tolerances={"load_torque": [1.0, 2.0]}, **asked)
     met = [stiff.replace(**{name: level.of(getattr(stiff, name)) for name, level in one.items()})
-           for one in tuning.question.scenarios]  # fmt: skip
+           for one in tuning.problem.scenarios]  # fmt: skip
     frequencies = [one.Omega / math.tau for one in met]
     assert frequencies == pytest.approx([STIFF] * 3 + [SOFT] * 3, rel=1e-12)
     assert [one.damping_ratio for one in met] == pytest.approx([stiff.damping_ratio] * 6, rel=1e-12)

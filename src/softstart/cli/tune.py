@@ -168,7 +168,7 @@ def tune_command(
     if any_in_time(tuning):
         return tuning
     late = SimulationError(
-        f"No gains within these ranges start in time ({tuning.question.bound}); allow more time with "
+        f"No gains within these ranges start in time ({tuning.problem.bound}); allow more time with "
         "--start-time, or wider ranges with --free."
     )
     return tuning.summary, tuning.sheet, late

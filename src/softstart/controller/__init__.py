@@ -6,9 +6,9 @@ from softstart.controller.base import (
     CompiledController,
     Controller,
     Effort,
+    Numbers,
     PlainController,
     Sensor,
-    stack,
 )
 from softstart.controller.compiled import compiled_step
 from softstart.controller.finding import (
@@ -16,7 +16,7 @@ from softstart.controller.finding import (
     make_controller,
     ready_controller_names,
 )
-from softstart.controller.parameters import declared_parameters, parameter
+from softstart.controller.parameters import ParameterValues, declared_parameters, parameter
 from softstart.kernel.records import Measured
 from softstart.plugins import controller_names
 
@@ -27,6 +27,8 @@ __all__ = [
     "Controller",
     "Effort",
     "Measured",
+    "Numbers",
+    "ParameterValues",
     "PlainController",
     "Sensor",
     "compiled_step",
@@ -36,5 +38,4 @@ __all__ = [
     "make_controller",
     "parameter",
     "ready_controller_names",
-    "stack",
-]
+]  # fmt: skip

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum, IntFlag
 from itertools import repeat
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.controller.parameters import ParameterValues, declared_parameters
 from softstart.drive import Drive
+from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
 from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
@@ -67,31 +69,28 @@ class Effort(Enum):
     ('an inverter with torque ramps', True)
     """
 
-    CONTACTOR = "contactor"
-    RAMPS = "ramps"
-    STEPS = "steps"
-    CODE = "code"
-    ENCODER = "encoder"
-    SENSOR = "sensor"
+    meaning: str  # what is needed, in words
+
+    CONTACTOR = "contactor", "a contactor"
+    RAMPS = "ramps", "an inverter with torque ramps"
+    STEPS = "steps", "an inverter with torque steps"
+    CODE = "code", "code of your own in the inverter"
+    ENCODER = "encoder", "code of your own in the inverter, and an encoder"
+    SENSOR = "sensor", "a sensor that drives do not have"
+
+    def __new__(cls, value: str, meaning: str) -> Effort:
+        """The value is the name in files; the meaning stands in tables."""
+        member = object.__new__(cls)
+        member._value_, member.meaning = value, meaning
+        return member
 
     @property
     def order(self) -> int:
         """Its place, 0 for the least effort."""
         return list(Effort).index(self)
 
-    @property
-    def meaning(self) -> str:
-        """What is needed, in words."""
-        return {
-            Effort.CONTACTOR: "a contactor",
-            Effort.RAMPS: "an inverter with torque ramps",
-            Effort.STEPS: "an inverter with torque steps",
-            Effort.CODE: "code of your own in the inverter",
-            Effort.ENCODER: "code of your own in the inverter, and an encoder",
-            Effort.SENSOR: "a sensor that drives do not have",
-        }[self]
 
-
+SAME_SAMPLE = 1e-6  # of a period
 NEVER = -math.inf  # as `ask_again`: not at gap events either, the torque stays as it is
 
 
@@ -103,9 +102,10 @@ class Command(NamedTuple):
     Parameters
     ----------
     torque : torque demand, N m.
-    ask_again : when to be asked again, s, an instant later than now. Infinity is none: then a controller that
+    ask_again : when to be asked again, s, an instant later than now. By default at the next sample, where the
+        controller has a parameter `period`, else not again. Infinity is not again: then a controller that
         sees the stage is still asked at each gap event, unless it says NEVER.
-    state : the new state, handed to the next step.
+    state : the new state, handed to the next step; by default the state stays.
     slope : rate of the demand, N m/s. It needs an `ask_again`, where its line ends. Where
         the demand is beyond the torque limits of the drive, it is cut off at them.
 
@@ -117,15 +117,17 @@ class Command(NamedTuple):
 
     Examples
     --------
-    >>> Command(62.0)
-    Command(torque=62.0, ask_again=inf, state=(), slope=0.0)
+    >>> Command(62.0, ask_again=0.1).torque
+    62.0
     """
 
     torque: float
-    ask_again: float = math.inf
-    state: tuple[float, ...] = ()
+    ask_again: float | None = None
+    state: tuple[float, ...] | None = None
     slope: float = 0.0
 
+
+WholeReply = tuple[float, float, tuple[float, ...], float]  # the fields of a Command, none left out
 
 # what a class says of itself: its type, and how it is written
 DECLARED: dict[str, tuple[Any, str]] = {
@@ -235,15 +237,15 @@ class Controller:
         [(1.0, True), (2.0, True)]
         """
         arrays = self._arrays()
-        given: Iterable[Any]
+        machines: Iterable[Machine]
         if isinstance(drives, MachineTable):
-            given, shape = drives.elements(), drives.shape
+            machines, shape = drives.elements(), drives.shape
         elif isinstance(drives, Sequence):
-            given, shape = drives, (len(drives),)
+            machines, shape = drives, (len(drives),)
         else:
             shape = np.broadcast_shapes(*(values.shape for values in arrays.values()))
-            given = repeat(drives) if arrays else (drives,)
-        each = (one.design_drive for one in given)
+            machines = repeat(drives) if arrays else (drives,)
+        each = (machine.design_drive for machine in machines)
         if not arrays:
             yield from map(self.set_up, each)
             return
@@ -257,6 +259,7 @@ class Controller:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
+Numbers = dict[str, Any]  # of a step, by name; those of a record within its record are a dict again
 SetUp = tuple[Controller, Drive]  # a controller with every parameter a number, the drive of its numbers
 
 
@@ -289,8 +292,39 @@ class PlainController(Controller, ABC):
 
         Returns
         -------
-        The reply; of a controller with a `period` the torque alone is enough, if its state stays as it is.
+        The answer; a torque alone is `Command(torque)`.
         """
+
+
+def reply_of(controller: PlainController, measured: Measured, state: tuple[float, ...]) -> WholeReply:
+    """What the step of a controller answers, with the next instant and the new state filled in.
+
+    >>> class Constant(PlainController):
+    ...     period = 0.001
+    ...     def step(self, measured, state):
+    ...         return 62.0
+    >>> reply_of(Constant(), Measured(0.002, 0.0, 0.0, 0.0, math.nan, math.nan, math.nan), (1.0,))
+    (62.0, 0.003, (1.0,), 0.0)
+    """
+    reply = controller.step(measured, state)
+    if isinstance(reply, Real) and not isinstance(reply, bool):
+        reply = Command(float(reply))
+    try:
+        torque, instant, kept, slope = Command(*reply)  # type: ignore[misc]  # may be any tuple
+        after = _next_sample(controller, measured.time) if instant is None else float(instant)
+        return float(torque), after, state if kept is None else tuple(kept), float(slope)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"controller {type(controller).__name__}: its step answered {reply!r}; return a torque in N m or "
+            "Command(torque, ask_again, state, slope)."
+        ) from None
+
+
+def _next_sample(controller: PlainController, time: float) -> float:
+    """The next multiple of the `period`; infinite for a controller without one."""
+    period = getattr(controller, "period", None) or math.inf
+    # counted, so that rounding does not add up; SAME_SAMPLE: time is a rounding below its sample
+    return (math.floor(time / period + SAME_SAMPLE) + 1.0) * period
 
 
 def label_of(controller: Controller) -> str:
@@ -320,10 +354,9 @@ class CompiledController(Controller):
 
     Attributes
     ----------
-    kernel : the step, compiled by `compiled_step`.
-    state_size : how many numbers the state has.
-    record : the names of the numbers that the step is given, from `softstart.controller.compiled.record`. A
-        class without them defines `vector`.
+    kernel : the step, compiled by `compiled_step` with the records of its parameters and its state.
+    record, state_size : these records: the names of the numbers that the step is given, and how many numbers
+        its state has. A class without a record defines `vector`.
 
     Examples
     --------
@@ -333,50 +366,46 @@ class CompiledController(Controller):
     [62.0]
     """
 
-    kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]
+    kernel: ClassVar[Any]
     state_size: ClassVar[int] = 0
     record: ClassVar[Any] = np.dtype([])
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if records := getattr(vars(cls).get("kernel"), "records", None):
+            cls.record, cls.state_size = records
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers the kernel needs; called on a fitted controller.
 
         Returns
         -------
-        Shape (n,), in SI units: what `record` names, from `numbers` and the parameters of the same name.
+        Shape (n,), in SI units: what `record` names. Each is looked up in `numbers`, then among the
+        parameters of the controller, then in the drive, as `J1`.
         """
-        return np.array([*_in_order(self.record, self.numbers(drive), self)], dtype=np.float64)
+        return np.array([*self._in_order(self.record, self.numbers(drive), drive)], dtype=np.float64)
 
-    def numbers(self, drive: Drive) -> dict[str, Any]:
-        """What the kernel needs beside the parameters, by name; called on a fitted controller."""
+    def numbers(self, drive: Drive) -> Numbers:
+        """What the kernel needs beside parameters and drive, by name; called on a fitted controller."""
         return {}
 
-
-def _in_order(record: Any, numbers: Mapping[str, Any], controller: Controller | None) -> Iterator[float]:
-    """The numbers in the order of the record; a record within it has its own numbers."""
-    for name in record.names or ():
-        value = numbers[name] if name in numbers else getattr(controller, name)
-        if isinstance(value, Mapping):
-            yield from _in_order(record[name], value, None)
-        else:
-            yield value
+    def _in_order(self, record: Any, numbers: Mapping[str, Any], drive: Drive) -> Iterator[float]:
+        for name in record.names or ():
+            sources = (source for source in (self, drive) if hasattr(source, name))
+            value = numbers[name] if name in numbers else getattr(next(sources), name)
+            if isinstance(value, Mapping):  # a record within the record
+                yield from self._in_order(record[name], value, drive)
+            else:
+                yield value
 
 
 def numbers_of(set_ups: Iterable[SetUp]) -> tuple[CompiledController, Matrix] | list[SetUp]:
     """A compiled controller with its numbers, a row for each set-up; those in plain Python as they are."""
     plain, rows, compiled = list[SetUp](), list[Vector](), None
-    for ready, own in set_ups:
-        if isinstance(ready, CompiledController):
-            compiled = ready
-            rows.append(ready.vector(own))
+    for controller, drive in set_ups:
+        if isinstance(controller, CompiledController):
+            compiled = controller
+            rows.append(controller.vector(drive))
         else:
-            plain.append((ready, own))
+            plain.append((controller, drive))
     return plain if compiled is None else (compiled, np.array(rows, dtype=np.float64))
-
-
-def stack(*values: Any) -> Vector:
-    """Numbers as the vector that a compiled controller gives its kernel.
-
-    >>> stack(62.0, True).tolist()
-    [62.0, 1.0]
-    """
-    return np.array(values, dtype=np.float64)

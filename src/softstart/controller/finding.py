@@ -55,18 +55,23 @@ def controller_class(name: str) -> type[Controller]:
     """
     if ".py:" in name or name.endswith(".py"):
         return _from_file(name)
-    found = load(CONTROLLERS, "controller", name, "softstart controllers")
-    return _checked(found, name)
+    cls = load(CONTROLLERS, "controller", name, "softstart controllers")
+    return _checked(cls, name)
 
 
 def make_controller(
     name: str | Controller, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
 ) -> Controller:
-    """A controller from its name and parameters (bare SI numbers or strings with a unit).
+    """A controller from its name and parameters.
 
-    A name that ends in .toml is a file of tuned gains (see `softstart.controller.tuned`). Such a file may
-    name an installed controller; one that names a Python file of its own would run it, and is refused
-    without `allow_code`.
+    Parameters
+    ----------
+    name : str or Controller
+        A name, `path/to/file.py:ClassName`, a file of tuned gains (.toml), or a finished controller.
+    parameters : mapping, optional
+        Values by name, each a number in SI or a text with a unit.
+    allow_code : bool
+        Whether a file of gains may name a Python file, which would run. Installed controllers need no leave.
 
     Parameters
     ----------
@@ -213,13 +218,13 @@ def _from_file(text: str) -> type[Controller]:
         if isinstance(value, type) and value.__module__ == module_name
     }
     if not class_name:
-        own = [value for value in classes.values() if issubclass(value, Controller)]
-        if len(own) != 1:
+        controllers = [value for value in classes.values() if issubclass(value, Controller)]
+        if len(controllers) != 1:
             raise InputError(
                 f'controller = "{text}": say which class, as {path}:ClassName; it has '
                 f"{', '.join(classes) or 'none'}."
             )
-        return own[0]
+        return controllers[0]
     if class_name not in classes:
         hint = did_you_mean(
             class_name, classes, otherwise=f"it has {', '.join(classes) or 'none'}.", quote='"'
@@ -228,10 +233,10 @@ def _from_file(text: str) -> type[Controller]:
     return _checked(classes[class_name], text)
 
 
-def _checked(found: object, name: str) -> type[Controller]:
-    if isinstance(found, type) and issubclass(found, Controller):
-        return found
+def _checked(cls: object, name: str) -> type[Controller]:
+    if isinstance(cls, type) and issubclass(cls, Controller):
+        return cls
     raise InputError(
-        f'controller = "{name}": {found!r} is no controller; derive the class from '
+        f'controller = "{name}": {cls!r} is no controller; derive the class from '
         "softstart.controller.PlainController or CompiledController."
     )

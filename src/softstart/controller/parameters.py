@@ -86,20 +86,24 @@ def parameter(
 
     Returns
     -------
-    A field of a dataclass.
+    A dataclass field; its value is None until the controller is set up, unless it was given.
 
     Raises
     ------
     InputError
-        When a controller is made with a value that is not allowed.
+        When a controller is made with a value that is no such quantity or beyond the limit, not here.
 
     Examples
     --------
+    >>> from dataclasses import dataclass
     >>> from softstart import PlainController
-    >>> class Pulse(PlainController):
-    ...     torque: float = parameter("N*m", "torque of the pulse", 20.0, limit="above 0")
+    >>> @dataclass(frozen=True)
+    ... class Half(PlainController):
+    ...     torque: float = parameter("N*m", "torque", lambda drive, p: 0.5 * drive.Ms, "Ms/2", "above 0")
     ...     def step(self, measured, state):
-    ...         return Command(self.torque if measured.time < 0.1 else 0.0, measured.time + 0.1)
+    ...         return self.torque
+    >>> Half(torque="3 kgf*m").torque, Half().fitted(Drive.load("crane-4amtkf")).torque
+    (29.41995, 31.0)
     """
     shown = default_text or ("" if default is None or callable(default) else str(default).removesuffix(".0"))
     declaration = ControllerParameter(

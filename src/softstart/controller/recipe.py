@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -41,10 +40,10 @@ class Recipe:
 
     def class_of(self, name: str = "") -> type[Controller]:
         """The class of the controller; `name` where it is from an axis."""
-        given = name or self.given
-        if isinstance(given, str) and not is_gain_file(given):
-            return controller_class(given)
-        return type(make_controller(given, allow_code=self.allow_code))
+        source = name or self.given
+        if isinstance(source, str) and not is_gain_file(source):
+            return controller_class(source)
+        return type(make_controller(source, allow_code=self.allow_code))
 
     @property
     def label(self) -> str:
@@ -58,10 +57,10 @@ class Recipe:
             return self.given
         cls = type(self.given)
         point = registered(CONTROLLERS).get(cls.name)
-        own = f"{cls.__module__}:{cls.__qualname__}"
-        return cls.name if point is not None and point.value == own else ""
+        address = f"{cls.__module__}:{cls.__qualname__}"
+        return cls.name if point is not None and point.value == address else ""
 
-    def about(self) -> Any:
+    def about(self) -> object:
         """All of it as plain data: equal data make controllers that answer alike."""
         if isinstance(self.given, Controller):
             return _plain(self.given)
@@ -92,7 +91,7 @@ def _split(name: str) -> tuple[Path | None, str]:
     return (Path(name[:end]), name[end:]) if end else (None, name)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """A value as plain data that tells it from others, with fingerprints of files and arrays."""
     if isinstance(value, str | Path):
         path = Path(value)
@@ -104,9 +103,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if is_dataclass(value):
         kind = f"{type(value).__module__}.{type(value).__qualname__}"
         return {"class": kind} | {f.name: _plain(getattr(value, f.name)) for f in fields(value)}

@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,8 +111,8 @@ class RobustGains(Tuned):
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller set up for the nominal drive, and that drive."""
-        ready, own = self.controller.set_up(self.nominal)
-        return self._called(ready), own
+        ready, drive_of_gains = self.controller.set_up(self.nominal)
+        return self._called(ready), drive_of_gains
 
     def set_ups(self, drives: Any) -> Iterator[SetUp]:
         """One for all drives."""
@@ -150,18 +150,18 @@ class GainSchedule(Tuned):
         """The gains for a gap in rad and a load inertia in kg m2."""
         row, below, across = _place(self.gaps, gap)
         column, right, along = _place(self.load_inertias, load_inertia)
-        found = {}
+        gains = {}
         for name, scale, values in self.gains:
             near = _mixed(values[row, column], values[row, right], along, scale)
             far = _mixed(values[below, column], values[below, right], along, scale)
-            found[name] = float(_mixed(near, far, across, scale))
-        return found
+            gains[name] = float(_mixed(near, far, across, scale))
+        return gains
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller with the gains for the drive's gap and load inertia, set up for the drive."""
         gains = self.gains_at(drive.gap, drive.load_inertia)
-        ready, own = replace(self.controller, **gains).set_up(drive)
-        return self._called(ready), own
+        ready, drive_of_gains = replace(self.controller, **gains).set_up(drive)
+        return self._called(ready), drive_of_gains
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -205,11 +205,11 @@ def scheduled(saved: ScheduleFile, label: str, controller: Controller) -> GainSc
             f"it has {', '.join(known) or 'none'}."
         )
     gains = tuple((name, gain.scale, gain.values) for name, gain in saved.gains.items())
-    made = GainSchedule(label, controller, saved.gaps, saved.load_inertias, gains)
+    schedule = GainSchedule(label, controller, saved.gaps, saved.load_inertias, gains)
     for gap in saved.gaps:  # the gains of each node are ones that the controller takes
         for inertia in saved.load_inertias:
-            replace(controller, **made.gains_at(gap, inertia))
-    return made
+            replace(controller, **schedule.gains_at(gap, inertia))
+    return schedule
 
 
 # ---- reading --------------------------------------------------------------------------------------------
@@ -255,10 +255,10 @@ def _name(document: Mapping[str, Any], path: Path) -> str:
 
 
 def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
-    found = document.get(key, None if needed else {})
-    if not isinstance(found, dict):
+    section = document.get(key, None if needed else {})
+    if not isinstance(section, dict):
         raise refused_file(path, f"the table [{key}] is missing; write the file again with softstart tune")
-    return found
+    return section
 
 
 def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
@@ -283,30 +283,30 @@ def _read_schedule(document: Mapping[str, Any], path: Path) -> ScheduleFile:
     return ScheduleFile(name, gaps, inertias, _positive(gains, path), dict(fixed))
 
 
-def _axis(values: Any, name: str, path: Path) -> tuple[float, ...]:
-    try:
-        numbers = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.zeros(0)
+def _axis(values: object, name: str, path: Path) -> tuple[float, ...]:
+    numbers = _array(values)
     good = numbers.ndim == 1 and numbers.size > 0 and bool(np.all(np.isfinite(numbers)))
     if not good or bool(np.any(np.diff(numbers) <= 0.0)) or numbers[0] < 0.0:
         raise refused_file(path, f"{name} = {values}: give a list of numbers that rise, 0 or more")
     return tuple(numbers.tolist())
 
 
-def _scale(scale: Any, name: str, path: Path) -> Scale:
-    if scale == "linear":
-        return "linear"
-    if scale == "logarithmic":
-        return "logarithmic"
+def _array(values: object) -> Vector:
+    """The values as an array; an empty one for what is no table of numbers."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
+
+
+def _scale(scale: object, name: str, path: Path) -> Scale:
+    if scale in get_args(Scale):
+        return cast(Scale, scale)
     raise refused_file(path, f'[gains.{name}] scale = {scale!r}: write "linear" or "logarithmic"')
 
 
-def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArray[np.float64]:
-    try:
-        table = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        table = np.zeros(0)
+def _values(values: object, shape: tuple[int, int], name: str, path: Path) -> NDArray[np.float64]:
+    table = _array(values)
     if table.shape != shape or not np.all(np.isfinite(table)):
         raise refused_file(
             path,
@@ -393,7 +393,7 @@ def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]]
     return stream.getvalue()
 
 
-def _figure(value: Any) -> str:
+def _figure(value: object) -> str:
     if isinstance(value, float):
         return "" if math.isnan(value) else repr(float(f"{value:.6g}"))
     return str(value)

@@ -110,13 +110,13 @@ class SampledStart:
     @classmethod
     def of(cls, machine: Machine, controller: Controller, fitted_to: Machine | None = None) -> SampledStart:
         """The controller set up for this (or that) machine; no rounding or noise, the target speed far."""
-        fitted, own = controller.set_up((fitted_to or machine).design_drive)
+        fitted, fitted_drive = controller.set_up((fitted_to or machine).design_drive)
         rows = kernel_input(machine)
         differencing = bool(rows.machine.encoder > 0.0)
         rows.machine.target *= FAR
         rows.machine.encoder = rows.machine.torque_noise = 0.0
         if isinstance(fitted, CompiledController):
-            step = _compiled(fitted, np.array(fitted.vector(own), dtype=np.float64).ravel())
+            step = _compiled(fitted, np.array(fitted.vector(fitted_drive), dtype=np.float64).ravel())
             first = np.zeros(fitted.state_size)
         elif isinstance(fitted, PlainController):
             step, first = _plain(fitted), np.array(fitted.initial_state, dtype=np.float64)
@@ -134,10 +134,10 @@ class SampledStart:
     @property
     def inputs(self) -> tuple[int, ...]:
         """The indices of what is measured that a small motion changes."""
-        found = [exchange.M_MOTOR_ANGLE, exchange.M_MOTOR_SPEED, exchange.M_MOTOR_TORQUE]
-        found += [exchange.M_SHAFT_TORQUE] * bool(self.sees & exchange.SEES_SHAFT_TORQUE)
-        found += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
-        return tuple(found)
+        indices = [exchange.M_MOTOR_ANGLE, exchange.M_MOTOR_SPEED, exchange.M_MOTOR_TORQUE]
+        indices += [exchange.M_SHAFT_TORQUE] * bool(self.sees & exchange.SEES_SHAFT_TORQUE)
+        indices += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
+        return tuple(indices)
 
     def samples(self, until: float, begin: Sample | None = None) -> Iterator[Sample]:
         """The start from its beginning or from a kept sample."""
@@ -225,19 +225,19 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     sizes = plant_scales(start.machine)
     samples: list[Sample] = []
     contact, kept = range(0), {}
-    first, period, here = 0, math.nan, dict[int, Sample]()
+    first, period, candidates = 0, math.nan, dict[int, Sample]()
     pressing, steady = 0, False  # samples since it was last open
     for index, sample in enumerate(
         start.samples(LONGEST * sizes.period + STIFF * float(start.rows.machine.time_limit))
     ):
         samples.append(replace(sample, work=NONE))
         if not abs(sample.period - period) <= 1e-6 * sample.period:
-            first, period, here = index, sample.period, {}
+            first, period, candidates = index, sample.period, {}
         elif index - 1 - first not in TRIED:
-            del here[index - 1]
-        here[index] = sample
+            del candidates[index - 1]
+        candidates[index] = sample
         if period > 0.0 and index + 1 - first >= len(contact):
-            contact, kept = range(first, index + 1), here
+            contact, kept = range(first, index + 1), candidates
         pressing = pressing + 1 if sample.pressing else 0
         if index % 8 == 7 and sample.period > 0.0:
             back = max(WINDOW, math.ceil(2.0 * sizes.period / sample.period))
@@ -322,9 +322,9 @@ class OperatingPoint:
 def operating_point(start: SampledStart, run: SampledRun) -> OperatingPoint | None:
     """The steady one if its law is good and feeds back; else the best that feeds back; else the best."""
 
-    def rank(one: OperatingPoint) -> tuple[bool, ...]:
-        feeds, good = one.feeds_back, one.mismatch < GOOD
-        return feeds and good and one.steady, feeds and good, feeds and one.mismatch < FAIR, good, feeds
+    def rank(point: OperatingPoint) -> tuple[bool, ...]:
+        feeds, good = point.feeds_back, point.mismatch < GOOD
+        return feeds and good and point.steady, feeds and good, feeds and point.mismatch < FAIR, good, feeds
 
     return max(operating_points(start, run), key=rank, default=None)
 
@@ -333,8 +333,8 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
     """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
     if len(run.contact) < 3:
         return []
-    found = [_linearised_at(start, run, index, one) for index, one in run.kept.items()]
-    return sorted(found, key=lambda one: one.mismatch)
+    points = [_linearised_at(start, run, index, sample) for index, sample in run.kept.items()]
+    return sorted(points, key=lambda sample: sample.mismatch)
 
 
 def _linearised_at(start: SampledStart, run: SampledRun, index: int, sample: Sample) -> OperatingPoint:

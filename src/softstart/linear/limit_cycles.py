@@ -85,11 +85,11 @@ def bias_for(mean_torque: float, amplitude: float, half_gap: float, stiffness: f
     if amplitude <= abs(wound):  # never leaves the flank
         return math.copysign(half_gap, wound) + wound
     reach = half_gap + abs(wound)
-    found = optimize.brentq(
+    bias = optimize.brentq(
         lambda bias: mean_twist_beyond(amplitude, half_gap, bias) - wound, -reach, reach,
         xtol=1e-15 * (reach + amplitude), rtol=1e-14,
     )  # fmt: skip
-    return float(found)
+    return float(bias)
 
 
 def n_at(amplitude: float, half: float, c: float, mean_torque: float) -> float:
@@ -136,8 +136,8 @@ def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
     if not drive.gap:
         return ()
     back = max(1, round(float(drive.elastic_period) / run.period))
-    alone = replace(loop, open=True).broken
-    if abs(1.0 + alone.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING:
+    open_loop = replace(loop, open=True).broken
+    if abs(1.0 + open_loop.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING:
         w = float(np.mean([one.measured[M_MOTOR_SPEED] for one in run.samples[-1 - back :]]))
         mean = float(drive.Mc + drive.load_viscous_friction * w)
         demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w)
@@ -152,7 +152,7 @@ def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
     def excess(n: float, amplitudes: Vector) -> Vector:
         return np.array([n_at(float(one), half, c, mean) for one in amplitudes]) - n
 
-    found = []
+    cycles = []
     for n in crossings(loop):
         pole, vector, read = _on_the_circle(loop, n)
         w = cmath.phase(pole) / loop.period
@@ -162,8 +162,8 @@ def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
             swing = amplitude * abs(complex(read[1] @ vector))
             bias = bias_for(mean, amplitude, half, c)
             stable = bool((upper - lower) * (more - less) < 0.0)
-            found.append(Cycle(n, w, amplitude, bias, mean, swing, stable, swing > room))
-    return tuple(sorted(found, key=lambda one: (one.frequency, one.amplitude)))
+            cycles.append(Cycle(n, w, amplitude, bias, mean, swing, stable, swing > room))
+    return tuple(sorted(cycles, key=lambda one: (one.frequency, one.amplitude)))
 
 
 def oscillating(loop: Loop, n: float) -> tuple[Complex, Complex, Matrix]:
@@ -188,12 +188,12 @@ def crossings(loop: Loop) -> list[float]:
         return float([*outside(n), *[-1.0] * rank, -1.0][rank])
 
     counts = [int(np.sum(outside(float(n)) > 0.0)) for n in SHARES]
-    found = [
+    roots = [
         float(optimize.brentq(excess, SHARES[i], SHARES[i + 1], (rank,), 1e-13 * SHARES[i + 1], 1e-14))
         for i, (one, other) in enumerate(pairwise(counts))
         for rank in range(min(one, other), max(one, other))
     ]
-    return [n for n in found if np.min(np.abs(outside(n))) < SMALL]
+    return [n for n in roots if np.min(np.abs(outside(n))) < SMALL]
 
 
 def _on_the_circle(loop: Loop, n: float, near: complex | None = None) -> tuple[complex, Complex, Matrix]:

@@ -117,8 +117,8 @@ def margins(loop: System, period: float, delay_margin: tuple[float, float] | Non
 def _gain_crossovers(loop: System, period: float) -> tuple[Crossing, ...]:
     """Where |L| = 1, and the angle from -1 to L, -pi to pi: positive where more lag brings L to -1."""
     grid = frequencies(period, loop)
-    found = np.array(zeros_of(lambda w: np.log(np.abs(loop.at(w, period))), grid))
-    return tuple(map(Crossing, found.tolist(), np.angle(-loop.at(found, period)).tolist()))
+    crossovers = np.array(zeros_of(lambda w: np.log(np.abs(loop.at(w, period))), grid))
+    return tuple(map(Crossing, crossovers.tolist(), np.angle(-loop.at(crossovers, period)).tolist()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +202,8 @@ class Loop:
         if harmful is None:
             return math.inf, math.nan
         last, least = delays[harmful - 1 : harmful + 1]
-        found = float(optimize.brentq(self._excess, last, least, xtol=1e-13 * least, rtol=1e-14))
-        return found, self._largest_pole(found)[1]
+        margin = float(optimize.brentq(self._excess, last, least, xtol=1e-13 * least, rtol=1e-14))
+        return margin, self._largest_pole(margin)[1]
 
     def _excess(self, delay: float) -> float:
         """By how much the largest pole is outside of the unit circle with a further dead time."""
@@ -219,8 +219,8 @@ class Loop:
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """The poles of the closed loop but for the rotation as a whole, which no torque holds (at 1)."""
-        found = modes(self.closed()[0], self.period)
-        return tuple(mode for mode in found if abs(mode.value - 1.0) > self.rotation)
+        poles = modes(self.closed()[0], self.period)
+        return tuple(mode for mode in poles if abs(mode.value - 1.0) > self.rotation)
 
     @property
     def stable(self) -> bool:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,7 +57,7 @@ class PlantScales(NamedTuple):
     speed: float
 
 
-def at_one_position(machine: Machine) -> Any:
+def at_one_position(machine: Machine) -> Machine:
     """The machine at one of its positions: the loop in contact is the same from anywhere."""
     positions = list(machine.positions.values())
     return positions[len(positions) // 2]
@@ -65,21 +65,21 @@ def at_one_position(machine: Machine) -> Any:
 
 def plant_scales(machine: Machine) -> PlantScales:
     """The sizes of a machine with all gaps closed."""
-    rows = kernel_input(at_one_position(machine))
-    base, period = float(machine.mean_torque), float(rows.machine.period)
+    kernel = kernel_input(at_one_position(machine))
+    base, period = float(machine.mean_torque), float(kernel.machine.period)
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
-    c = rows.shafts.view(rec.SHAFT)[0, :, 0]["c"]
+    c = kernel.shafts.view(rec.SHAFT)[0, :, 0]["c"]
     windup, Omega = base * float((1.0 / c[c > 0.0]).sum()), 2.0 * math.pi / period
     return PlantScales(base, windup, Omega, period, Omega * windup)
 
 
-def _motor_side(rows: KernelInput) -> slice:
+def _motor_side(kernel: KernelInput) -> slice:
     """The masses that turn with the motor while all gaps are open."""
-    half = rows.shafts.view(rec.SHAFT)[0, :, 0]["half_gap"]
-    motor, open_ = int(rows.machine.motor), np.flatnonzero(half)
+    half = kernel.shafts.view(rec.SHAFT)[0, :, 0]["half_gap"]
+    motor, open_ = int(kernel.machine.motor), np.flatnonzero(half)
     first = max((int(k) + 1 for k in open_ if k < motor), default=0)
-    return slice(first, min((int(k) + 1 for k in open_ if k >= motor), default=rows.count))
+    return slice(first, min((int(k) + 1 for k in open_ if k >= motor), default=kernel.count))
 
 
 def contact_plant(
@@ -91,11 +91,11 @@ def contact_plant(
     `inclines` are those of the load curves of its masses at an instant: there a curve is a spring or a damper
     to the ground. `share` multiplies stiffness and damping of the shafts, as the describing function does.
     """
-    given = kernel_input(at_one_position(machine))
-    kept = _motor_side(given) if gaps_open else slice(0, given.count)
-    motor, load = int(given.machine.motor) - kept.start, int(given.machine.load) - kept.start
-    mass = given.masses.view(rec.MASS)[0, kept, 0]
-    shaft = given.shafts.view(rec.SHAFT)[0, kept.start : kept.stop - 1, 0]
+    kernel = kernel_input(at_one_position(machine))
+    kept = _motor_side(kernel) if gaps_open else slice(0, kernel.count)
+    motor, load = int(kernel.machine.motor) - kept.start, int(kernel.machine.load) - kept.start
+    mass = kernel.masses.view(rec.MASS)[0, kept, 0]
+    shaft = kernel.shafts.view(rec.SHAFT)[0, kept.start : kept.stop - 1, 0]
     rigid = shaft["rigid"] != 0.0
     if rigid[max(motor - 1, 0) : motor + 1].any():
         raise InputError(
@@ -120,7 +120,7 @@ def contact_plant(
     torque = -mass["ground"][:, None] * w  # on each mass
     torque[:-1] -= np.where(behind, 1.0, passed_on) * T
     torque[1:] += np.where(behind, passed_on, 1.0) * T
-    for curve in given.curves[0].view(rec.CURVE)[:, 0]:
+    for curve in kernel.curves[0].view(rec.CURVE)[:, 0]:
         i = int(curve.mass) - kept.start
         if inclines is not None and 0 <= i < body.size:
             torque[i] -= inclines[int(curve.mass)] * (angle[i] if curve.by_angle else w[i])
@@ -129,13 +129,13 @@ def contact_plant(
     np.add.at(A, first + body, torque)
     A[first:] /= inertia[:, None]
     B[first + body[motor]] = 1.0 / inertia[body[motor]]
-    beside, none = given.motor_shaft - kept.start, np.zeros(unit.shape[0])
+    beside, none = kernel.motor_shaft - kept.start, np.zeros(unit.shape[0])
     phi2, w2 = (angle[load], w[load]) if 0 <= load < body.size else (none, none)
     rows = {
         "phi1": unit[0], "w1": w[motor], "phi2": phi2, "w2": w2,
         "T": (1.0 if driven[beside] else -1.0) * T[beside] if 0 <= beside < rigid.size else none,
     }  # fmt: skip
-    lag = float(given.machine.lag)
+    lag = float(kernel.machine.lag)
     if lag > 0.0:
         n = unit.shape[0]
         A = np.block([[A, B], [np.zeros((1, n)), np.full((1, 1), -1.0 / lag)]])

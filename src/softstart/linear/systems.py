@@ -129,5 +129,5 @@ def modes(transition: Matrix, period: float) -> tuple[Mode, ...]:
     s = np.log(poles) / period
     with np.errstate(invalid="ignore"):
         columns = (abs(s), -s.real / abs(s), poles.real, poles.imag)
-    found = map(Mode, *(column.tolist() for column in columns))
-    return tuple(sorted(found, key=lambda mode: (mode.frequency, mode.imag)))
+    modes_of_poles = map(Mode, *(column.tolist() for column in columns))
+    return tuple(sorted(modes_of_poles, key=lambda mode: (mode.frequency, mode.imag)))

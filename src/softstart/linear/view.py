@@ -124,9 +124,9 @@ class LinearView(Result, view="linear.linear_sheet"):
     def elastic_mode(self) -> Mode | None:
         """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
         of_loop = () if self.loop is None else self.loop.modes
-        swinging = [mode for mode in of_loop if mode.damping_ratio < 1.0 and mode.imag > 0.0]
+        oscillatory = [mode for mode in of_loop if mode.damping_ratio < 1.0 and mode.imag > 0.0]
         Omega = plant_scales(self.drive).Omega
-        return min(swinging, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
+        return min(oscillatory, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
 
     @property
     def conclusion(self) -> str:
@@ -141,7 +141,7 @@ class LinearView(Result, view="linear.linear_sheet"):
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
-        found: dict[str, Any] = {
+        plain: dict[str, Any] = {
             "drive": self.drive.name,
             "controller": self.name,
             "parameters": self.controller.parameters,
@@ -150,9 +150,9 @@ class LinearView(Result, view="linear.linear_sheet"):
             "notes": list(self.notes),
         }
         if self.loop is None:
-            return found
+            return plain
         point, elastic = self.loop.point, self.elastic_mode
-        return found | {
+        return plain | {
             "stable": self.loop.stable,
             "period": self.loop.period,
             "operating_point": {
@@ -218,12 +218,12 @@ def linear_view(
     >>> linear_view("crane-4amtkf", "ramp").kind
     'open loop'
     """
-    drive, made = as_machine(drive), make_controller(controller, parameters)
+    drive, strategy = as_machine(drive), make_controller(controller, parameters)
     fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
-    for one in (drive, fitted_to or drive):
-        if one.motor is None or one.target_speed is None:
-            raise InputError(f"{one.name} has no motor or no target speed; add them to the chain.")
-    start = SampledStart.of(at_one_position(drive), made, fitted_to or drive)
+    for machine in (drive, fitted_to or drive):
+        if machine.motor is None or machine.target_speed is None:
+            raise InputError(f"{machine.name} has no motor or no target speed; add them to the chain.")
+    start = SampledStart.of(at_one_position(drive), strategy, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
     point = operating_point(start, run)
@@ -242,14 +242,15 @@ def _notes(name: str, run: SampledRun, loop: Loop) -> tuple[str, ...]:
     if not point.steady:
         why = "the start does not become steady in contact"
         if run.steady:
-            why = "where the start is steady, a linear law is less accurate (a limit or a switch)"
+            why = "a linear law is less accurate where the start is steady (a limit or a switch)"
         notes.append(f"Linearised at t = {point.sample.time:.4g} s, during the start: {why}.")
     if point.mismatch > POOR:
         notes.append(
-            f"{name} is poorly approximated by one linear law: after small displacements the exact plant "
-            f"and the linear loop differ by up to {100.0 * point.mismatch:.2g} %; take the margins with "
-            "caution."
+            f"{name} is poorly approximated by one linear law (linearisation error "
+            f"{100.0 * point.mismatch:.2g} %); use the margins with caution."
         )
     if not loop.stable:
-        notes.append("The closed loop is unstable in contact: the margins are crossings, not reserves.")
+        notes.append(
+            "The closed loop is unstable in contact; the margins are those of crossings, not reserves."
+        )
     return tuple(notes)

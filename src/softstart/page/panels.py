@@ -14,7 +14,7 @@ from softstart.page.job_panel import JobPanel, Task
 from softstart.page.panel_parts import TERMINALS, choice, text_field, upload
 from softstart.plugins import controller_names
 from softstart.quantities import values_in
-from softstart.tuning.question import gaps_of, inertias_of
+from softstart.tuning.problem import gaps_of, inertias_of
 from softstart.views.numbers import units_of
 
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}

@@ -18,7 +18,9 @@ from softstart.controller.base import (
     Controller,
     PlainController,
     Sensor,
+    WholeReply,
     label_of,
+    reply_of,
 )
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
@@ -109,13 +111,13 @@ def _run_compiled(controller: CompiledController, drive: Any, recorder: StartRec
     return reason
 
 
-def plain_answer(
-    controller: PlainController, measured: Vector, state: tuple[float, ...]
-) -> tuple[float, float, tuple[float, ...], float]:
-    """The reply of a plain controller: torque, when to be asked again, its state, slope."""
+def plain_answer(controller: PlainController, measured: Vector, state: tuple[float, ...]) -> WholeReply:
+    """What a plain controller answers; SimulationError where its code fails."""
     try:
         with watched(controller):
-            reply: Any = controller.step(Measured(*measured.tolist()), state)
+            return reply_of(controller, Measured(*measured.tolist()), state)
+    except InputError:
+        raise
     except (Exception, SystemExit) as error:  # the user's own code may fail in any way
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(
@@ -123,17 +125,6 @@ def plain_answer(
             f"t = {measured[M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
             f"({type(error).__name__}: {error})."
         ) from error
-    period = getattr(controller, "period", None)
-    if isinstance(reply, float | int) and period:
-        return float(reply), float(measured[M_TIME]) + period, state, 0.0
-    try:
-        slope = float(reply[3]) if len(reply) > 3 else 0.0
-        return float(reply[0]), float(reply[1]), tuple(reply[2]), slope
-    except (TypeError, IndexError, ValueError):
-        raise InputError(
-            f"controller {type(controller).__name__}: its step returned {reply!r}; return Command(torque, "
-            "ask_again, state, slope), or, of a controller with a `period`, the torque alone."
-        ) from None
 
 
 def check_limits(

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -64,90 +63,92 @@ class StartCounter:
 
 
 def best_gains(
-    trials: Trials, pool: Pool, kept: PartStore, log: StartCounter, schedule: GainSearch | None = None
+    trials: Trials, pool: Pool, parts: PartStore, log: StartCounter, schedule: GainSearch | None = None
 ) -> GainSearch:
     """The best gains of every job; those of some cells of a `schedule` begin the first search of one set."""
-    question, costs = trials.question, partial(shared_costs, trials, pool)
+    problem, costs = trials.problem, partial(shared_costs, trials, pool)
     if not np.any(np.isfinite(trials.default.metric)):
         raise InputError(
-            f"metric = {question.metric_name}: no start of {question.recipe.label} with its defaults has "
-            "this figure; choose another metric, or give parameters with which it starts."
+            f"metric = {problem.metric_name}: no start of {problem.recipe.label} with its defaults has "
+            "this result; choose another metric, or give parameters with which it starts."
         )
-    jobs, restarts = len(trials.drives), question.restarts
-    last = _searched(trials, costs, kept, log, schedule)
+    jobs, restarts = len(trials.drives), problem.restarts
+    last = _searched(trials, costs, parts, log, schedule)
     restart_costs = last.best[1].reshape(jobs, restarts)
     best = np.arange(jobs) * restarts + restart_costs.argmin(axis=1)
-    places, found = (part[best] for part in last.best)
+    places, best_costs = (part[best] for part in last.best)
     if not trials.robust:
-        places = _smooth(trials, costs, places, found)
+        places = _smooth(trials, costs, places, best_costs)
     return _rounded(trials, _settled(trials, places, restart_costs))
 
 
 def _searched(
-    trials: Trials, costs: Costs, kept: PartStore, log: StartCounter, schedule: GainSearch | None
+    trials: Trials, costs: Costs, parts: PartStore, log: StartCounter, schedule: GainSearch | None
 ) -> Populations:
     """All searches to their end: the restarts of each job in a row. What is kept is gone on from."""
-    question = trials.question
+    problem = trials.problem
     title = "robust set" if trials.robust else "schedule"
-    part, random = [title, schedule is not None], (question.seed, 2 + trials.robust)
-    searches = np.repeat(np.arange(len(trials.drives)), question.restarts)
-    size = question.population * (WIDER if trials.robust else 1)
+    part, random = [title, schedule is not None], (problem.seed, 2 + trials.robust)
+    searches = np.repeat(np.arange(len(trials.drives)), problem.restarts)
+    size = problem.population * (WIDER if trials.robust else 1)
     several = trials.starts_of.shape[1]
 
-    def tried(which: Indices, places: Vector) -> Vector:
+    def cost_of(indices: Indices, places: Vector) -> Vector:
         log.starts += len(places) * several
-        return costs(searches[which], places)
+        return costs(searches[indices], places)
 
-    if record := kept.find(part):
+    if record := parts.find(part):
         now = Populations(np.array(record["places"]), np.array(record["costs"]), record["generation"])
     else:
-        now = populations(tried, _seeds(trials, schedule, searches, size // 2), size, random)
+        now = populations(cost_of, _seeds(trials, schedule, searches, size // 2), size, random)
     written, unkept = time.monotonic(), record is None
 
     def keep() -> None:
         nonlocal written, unkept
-        places, found, generation = now
-        kept.add({"part": part, "places": places.tolist(), "costs": found.tolist(), "generation": generation})
+        places, reached, generation = now
+        parts.add(
+            {"part": part, "places": places.tolist(), "costs": reached.tolist(), "generation": generation}
+        )
         written, unkept = time.monotonic(), False
 
     # of several starts the mean is still to become small where the worst one is the same
     converged = CONVERGED * (TIE if several > 1 else 1.0)
-    for later in evolve(tried, now, random, question.generations, converged):
+    for later in evolve(cost_of, now, random, problem.generations, converged):
         now, unkept = later, True
         if time.monotonic() > written + KEPT_EACH:
             keep()
-        log.tell(title, now.generation, question.generations)
+        log.tell(title, now.generation, problem.generations)
     if unkept:
         keep()
     return now
 
 
-def _seeds(trials: Trials, schedule: GainSearch | None, searches: Any, most: int) -> Vector:
+def _seeds(trials: Trials, schedule: GainSearch | None, searches: Indices, most: int) -> Vector:
     """The first places of each search: the defaults; of the first one of a set the gains of cells too.
 
     The other searches begin alone, so that agreeing means something.
     """
-    own = trials.places(searches, {name: value[searches] for name, value in trials.defaults.items()})
+    defaults = trials.places(searches, {name: value[searches] for name, value in trials.defaults.items()})
     if schedule is None:
-        return own[:, None]
+        return defaults[:, None]
     count = len(schedule.costs)
     cells = sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
     gains = {name: value[cells] for name, value in schedule.values.items()}
-    others = np.random.default_rng((trials.question.seed, 4)).random(
-        (len(searches), len(cells), own.shape[1])
+    others = np.random.default_rng((trials.problem.seed, 4)).random(
+        (len(searches), len(cells), defaults.shape[1])
     )
     others[0] = trials.places(np.zeros(len(cells), dtype=int), gains)
-    return np.concatenate([own[:, None], others], axis=1)
+    return np.concatenate([defaults[:, None], others], axis=1)
 
 
-def _smooth(trials: Trials, costs: Costs, places: Vector, found: Vector) -> Vector:
+def _smooth(trials: Trials, costs: Costs, places: Vector, best_costs: Vector) -> Vector:
     """Places nearer to the median of their neighbours, where that is equally good within 0.1 %.
 
     First all parameters move together, then each by itself: one that hardly matters is often far off.
     """
     cells, size = np.arange(len(places)), places.shape[1]
-    allowed = np.where(in_time(found), found + EQUALLY_GOOD * np.abs(found), -np.inf)
-    near = [list(trials.question.neighbours(cell)) or [cell] for cell in cells.tolist()]
+    allowed = np.where(in_time(best_costs), best_costs + EQUALLY_GOOD * np.abs(best_costs), -np.inf)
+    near = [list(trials.problem.neighbours(cell)) or [cell] for cell in cells.tolist()]
     masks = np.concatenate([np.ones((1, size)), np.eye(size)])[: size + (size > 1)]
     for mask in np.tile(masks, (SMOOTHINGS, 1)):
         aims = np.array([np.median(places[some], axis=0) for some in near])
@@ -175,19 +176,19 @@ def _settled(trials: Trials, places: Vector, restart_costs: Vector) -> GainSearc
     return GainSearch(values, judged, np.where(back, before, ours), restart_costs)
 
 
-def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
+def _rounded(trials: Trials, search: GainSearch) -> GainSearch:
     """Gains with few digits, of one set all its parameters, the derived ones too: as their file has them.
 
     What each job reaches is what its rounded values reach: in time as before, never worse than the defaults,
     and no more than `ROUNDED` above the exact ones; else they have more digits, or all.
     """
-    values = {name: value.copy() for name, value in found.values.items()}
+    values = {name: value.copy() for name, value in search.values.items()}
     if trials.robust:
         exact = replace(trials.controller, **{name: float(value[0]) for name, value in values.items()})
         parameters = exact.set_up(trials.drives[0])[0].parameters
         numbers = {k: v for k, v in parameters.items() if isinstance(v, float) and math.isfinite(v)}
         values = {name: np.array([value]) for name, value in numbers.items()}
-    costs, judged = found.costs.copy(), Judged(*(part.copy() for part in found.judged))
+    costs, judged = search.costs.copy(), Judged(*(part.copy() for part in search.judged))
     left = np.arange(len(costs))
     before = trials.cost(left, trials.default)
     allowed = np.maximum(costs, np.minimum(before, (1.0 + ROUNDED) * costs))
@@ -208,4 +209,4 @@ def _rounded(trials: Trials, found: GainSearch) -> GainSearch:
         left = left[~good]
         if not left.size:
             break
-    return GainSearch(values, judged, costs, found.restart_costs)
+    return GainSearch(values, judged, costs, search.restart_costs)

@@ -27,7 +27,7 @@ from softstart.controller.tuned import (
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.results import OneLine, Result
-from softstart.tuning.question import TuningProblem, given_to
+from softstart.tuning.problem import TuningProblem, given_to
 
 if TYPE_CHECKING:
     import xarray
@@ -70,8 +70,8 @@ class RobustSet(OneLine):
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        found = plain_fields(self, "cells", "controller")
-        return {**found, "feasible": self.feasible, "cells": _rows(self.cells)}
+        plain = plain_fields(self, "cells", "controller")
+        return {**plain, "feasible": self.feasible, "cells": _rows(self.cells)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,8 +80,8 @@ class Tuning(Result, view="tuning.tuning_sheet"):
 
     Attributes
     ----------
-    question : Question
-        What was asked.
+    problem : TuningProblem
+        What was tuned, over what, within which bounds.
     schedule : xarray.Dataset or None
         Over `gap` (rad) and `load_inertia` (kg m2): each tuned parameter, the metric tuned and with the
         defaults, start times (s), their bounds (s), and how many searches agree. None if not asked for.
@@ -106,7 +106,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
     ('reduced-first-stage', 'k_dyn', {'gap': 1, 'load_inertia': 1})
     """
 
-    question: TuningProblem
+    problem: TuningProblem
     schedule: xarray.Dataset | None
     robust: RobustSet | None
     price: xarray.Dataset | None
@@ -117,42 +117,42 @@ class Tuning(Result, view="tuning.tuning_sheet"):
     @property
     def drive(self) -> Machine:
         """The nominal drive or chain."""
-        return self.question.drive
+        return self.problem.drive
 
     @property
     def controller(self) -> str:
         """Name of the controller."""
-        return self.question.recipe.label
+        return self.problem.recipe.label
 
     @property
     def metric(self) -> str:
         """Name of the figure that was made small."""
-        return self.question.metric_name
+        return self.problem.metric_name
 
     @property
     def scheduled(self) -> GainSchedule:
         """The controller that takes its gains from the schedule. InputError if none was asked for."""
-        return scheduled(self._schedule_file(), "schedule", self.question.recipe.make())
+        return scheduled(self._schedule_file(), "schedule", self.problem.recipe.make())
 
     @property
     def plausibility_warnings(self) -> list[str]:
-        """Sentences on what can hardly be meant: a drive that is not within the gaps and inertias tuned over.
+        """Warnings: a drive outside the gaps and inertias tuned over.
 
         >>> from softstart import tune
         >>> options = {"free": ["torque"], "certified": False, "generations": 1, "restarts": 1}
         >>> tuned = tune("crane-4amtkf", "reduced-first-stage", [0.01], ["1x"], **options)
         >>> tuned.plausibility_warnings[0][:75]
-        'the gap of the drive, 0.5 rad, lies outside those tuned over, 0.01 rad: wha'
+        'the gap of the drive, 0.5 rad, is outside the tuned range, 0.01 rad: the re'
         """
-        q, (gap, inertia) = self.question, self.drive.gap_and_inertia
+        q, (gap, inertia) = self.problem, self.drive.gap_and_inertia
         return [
-            f"the {name} of the drive, {own:.5g} {unit}, lies outside those tuned over, "
-            f"{' to '.join(dict.fromkeys(f'{one:.5g}' for one in (axis[0], axis[-1])))} {unit}: what is said "
-            'of the gains is not said of this drive. Values at the output of a gear are written "at output".'
-            for name, unit, own, axis in (
+            f"the {name} of the drive, {value:.5g} {unit}, is outside the tuned range, "
+            f"{' to '.join(dict.fromkeys(f'{end:.5g}' for end in (axis[0], axis[-1])))} {unit}: the results "
+            'do not apply to this drive. Values at the output of a gear are written "at output".'
+            for name, unit, value, axis in (
                 ("gap", "rad", gap, q.gaps), ("load inertia", "kg m2", inertia, q.load_inertias)
             )
-            if not axis[0] * (1.0 - SAME) <= own <= axis[-1] * (1.0 + SAME)
+            if not axis[0] * (1.0 - SAME) <= value <= axis[-1] * (1.0 + SAME)
         ]  # fmt: skip
 
     def summary(self) -> dict[str, Any]:
@@ -162,8 +162,8 @@ class Tuning(Result, view="tuning.tuning_sheet"):
             **self._asked(),
             "plausibility_warnings": self.plausibility_warnings,
             "controller": self.controller,
-            "given": given_to(self.question.recipe.make()),
-            "free": {one.name: one.text() for one in self.question.ranges},
+            "given": given_to(self.problem.recipe.make()),
+            "free": {one.name: one.text() for one in self.problem.ranges},
             **{name: None if table is None else _rows(table) for name, table in tables.items()},
             "robust": None if self.robust is None else self.robust.summary(),
             "starts": self.starts,
@@ -189,16 +189,16 @@ class Tuning(Result, view="tuning.tuning_sheet"):
 
         By default the schedule, or the robust set if there is no schedule.
         """
-        about = {"softstart": __version__, **self._asked(), "free": list(self.question.names)}
+        about = {"softstart": __version__, **self._asked(), "free": list(self.problem.names)}
         if what == "schedule" or (what is None and self.schedule is not None):
-            text = schedule_text(self._schedule_file(), about, meanings_of(self.question.recipe.make()))
-        elif (one := self.robust) is None:
+            text = schedule_text(self._schedule_file(), about, meanings_of(self.problem.recipe.make()))
+        elif (robust := self.robust) is None:
             raise InputError("robust: no robust set was tuned; call tune with robust=True.")
         else:
-            saved = RobustFile(self._name(), one.parameters, one.controller.nominal)
-            worst, before = (float(f"{value:.6g}") for value in (one.worst, one.worst_default))
-            told = {"worst": worst, "worst_default": before, "in_time": one.feasible}
-            text = robust_text(saved, about | told, meanings_of(one.controller.controller))
+            saved = RobustFile(self._name(), robust.parameters, robust.controller.nominal)
+            worst, before = (float(f"{value:.6g}") for value in (robust.worst, robust.worst_default))
+            reached = {"worst": worst, "worst_default": before, "in_time": robust.feasible}
+            text = robust_text(saved, about | reached, meanings_of(robust.controller.controller))
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def to_csv(self, path: str | Path) -> None:
@@ -212,7 +212,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def _asked(self) -> dict[str, Any]:
-        q = self.question
+        q = self.problem
         return {
             "drive": self.drive.name,
             "metric": self.metric,
@@ -226,13 +226,13 @@ class Tuning(Result, view="tuning.tuning_sheet"):
     def _schedule_file(self) -> ScheduleFile:
         if self.schedule is None:
             raise InputError("schedule: no schedule was tuned; call tune with schedule=True.")
-        q = self.question
+        q = self.problem
         gains = gains_on_grid(q, {one.name: self.schedule[one.name].to_numpy() for one in q.ranges})
-        given = {k: value for k, value in given_to(q.recipe.make()).items() if k not in gains}
-        return ScheduleFile(q.recipe.name, *q.declared(), gains, given)
+        fixed = {k: value for k, value in given_to(q.recipe.make()).items() if k not in gains}
+        return ScheduleFile(q.recipe.name, *q.declared(), gains, fixed)
 
     def _name(self) -> str:
-        if name := self.question.recipe.name:
+        if name := self.problem.recipe.name:
             return name
         raise InputError(
             f"controller = {self.controller}: it has no name under which a file could call it; give tune "
@@ -240,14 +240,14 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         )
 
 
-def gains_on_grid(question: TuningProblem, values: Mapping[str, Any]) -> dict[str, Gain]:
+def gains_on_grid(problem: TuningProblem, values: Mapping[str, Any]) -> dict[str, Gain]:
     """The gains of all cells as tables; a gain searched in the logarithm is interpolated in it too."""
-    found = {}
-    for one in question.ranges:
-        table = np.asarray(values[one.name]).reshape(len(question.gaps), len(question.load_inertias))
-        curved = one.logarithmic and bool(np.all(table > 0.0))
-        found[one.name] = Gain("logarithmic" if curved else "linear", table)
-    return found
+    gains = {}
+    for tuned in problem.ranges:
+        table = np.asarray(values[tuned.name]).reshape(len(problem.gaps), len(problem.load_inertias))
+        curved = tuned.logarithmic and bool(np.all(table > 0.0))
+        gains[tuned.name] = Gain("logarithmic" if curved else "linear", table)
+    return gains
 
 
 def _rows(dataset: xarray.Dataset) -> dict[str, Any]:

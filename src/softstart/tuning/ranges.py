@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
@@ -35,7 +36,7 @@ class Range:
     between: tuple[float, float] | None = None
     logarithmic: bool = False
 
-    def ends(self, default: Any) -> tuple[Vector, Vector]:
+    def ends(self, default: ArrayLike) -> tuple[Vector, Vector]:
         """Lowest and highest value, where the derived default is this."""
         value = np.asarray(default, dtype=np.float64)
         fixed = self.between or (-np.inf, np.inf)
@@ -44,23 +45,23 @@ class Range:
         low, high = (np.clip(factor * value, *fixed) for factor in self.multiples)
         return low, high
 
-    def value(self, place: Any, default: Any) -> Vector:
+    def value(self, place: ArrayLike, default: ArrayLike) -> Vector:
         """The value at a place."""
         low, high = self.ends(default)
         share = np.asarray(place, dtype=np.float64)
         even = (1.0 - share) * self._scaled(low, low) + share * self._scaled(high, low)
         curved = self._curved(low)
-        found = np.clip(np.where(curved, np.exp(np.where(curved, even, 0.0)), even), low, high)
-        return np.where(share == 0.0, low, np.where(share == 1.0, high, found))
+        values = np.clip(np.where(curved, np.exp(np.where(curved, even, 0.0)), even), low, high)
+        return np.where(share == 0.0, low, np.where(share == 1.0, high, values))
 
-    def place(self, value: Any, default: Any) -> Vector:
+    def place(self, value: ArrayLike, default: ArrayLike) -> Vector:
         """The place of a value, within 0 and 1."""
         low, high = self.ends(default)
-        given = np.clip(np.asarray(value, dtype=np.float64), low, high)
-        first, last, own = (self._scaled(one, low) for one in (low, high, given))
-        return np.where(last > first, (own - first) / np.where(last > first, last - first, 1.0), 0.5)
+        inside = np.clip(np.asarray(value, dtype=np.float64), low, high)
+        first, last, scaled = (self._scaled(one, low) for one in (low, high, inside))
+        return np.where(last > first, (scaled - first) / np.where(last > first, last - first, 1.0), 0.5)
 
-    def _curved(self, low: Vector) -> Any:
+    def _curved(self, low: Vector) -> NDArray[np.bool_]:
         return self.logarithmic & (low > 0.0)
 
     def _scaled(self, values: Vector, low: Vector) -> Vector:
@@ -112,10 +113,10 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     if not asked:
         example = next((name for name, one in known.items() if one.kind == "quantity"), "NAME")
         raise InputError(
-            f"free: {what} has no parameter to tune by itself; name one with its range, as "
+            f"free: {what} declares no tunable parameter; name one with its range, as "
             f'free={{"{example}": ("0.5x", "2x")}}.'
         )
-    found, wrong = list[Range](), Mistakes()
+    ranges, wrong = list[Range](), Mistakes()
     for name, ends in asked.items():
         with wrong.collect("free: "):
             if name not in known:
@@ -124,15 +125,15 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
                 raise InputError(f"{what} has no parameter {name}; {hint}")
             if known[name].kind != "quantity":
                 raise InputError(f"{name} of {what} is not a quantity; it cannot be tuned.")
-            own = _declared(known[name]) if ends is None else _named(known[name], ends)
-            if own is None:
+            declared = _declared(known[name]) if ends is None else _named(known[name], ends)
+            if declared is None:
                 raise InputError(
                     f'{what} gives no range for {name}; give one, as free={{"{name}": ("0.5x", "2x")}} or '
                     "with two values."
                 )
-            found.append(own)
+            ranges.append(declared)
     wrong.raise_if_any()
-    return tuple(found)
+    return tuple(ranges)
 
 
 def _declared(p: ControllerParameter) -> Range | None:
@@ -142,7 +143,7 @@ def _declared(p: ControllerParameter) -> Range | None:
     return Range(p.name, p.unit, p.multiples, p.between, logarithmic=p.multiples is not None)
 
 
-def _named(p: ControllerParameter, ends: Any) -> Range:
+def _named(p: ControllerParameter, ends: object) -> Range:
     """The user's own range."""
     name, unit = p.name, p.unit
     both = [] if isinstance(ends, str) or not isinstance(ends, Iterable) else list(ends)

@@ -5,8 +5,8 @@ A point is a place in a unit box. Costs are only compared, so that jumps of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +39,8 @@ def populations(costs: Costs, seeds: Vector, size: int, random: tuple[int, ...])
     rng = np.random.default_rng(random)
     fresh = max(size - seeds.shape[1], size // 2, 5)
     places = np.concatenate([seeds, [latin(rng, fresh, seeds.shape[2]) for _ in seeds]], axis=1)
-    found = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
-    return Populations(places, found.reshape(places.shape[:2]))
+    cost = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
+    return Populations(places, cost.reshape(places.shape[:2]))
 
 
 def evolve(
@@ -67,22 +67,22 @@ def evolve(
         if not active.size:
             return
         candidates = _candidates(places, cost, np.random.default_rng((*random, number)))[active]
-        found = costs(np.repeat(active, places.shape[1]), np.concatenate(candidates))
-        found = found.reshape(candidates.shape[:2])
-        better = found <= cost[active]
+        candidate_costs = costs(np.repeat(active, places.shape[1]), np.concatenate(candidates))
+        candidate_costs = candidate_costs.reshape(candidates.shape[:2])
+        better = candidate_costs <= cost[active]
         places, cost = places.copy(), cost.copy()
         places[active] = np.where(better[..., None], candidates, places[active])
-        cost[active] = np.where(better, found, cost[active])
+        cost[active] = np.where(better, candidate_costs, cost[active])
         yield Populations(places, cost, number)
 
 
 def _candidates(places: Vector, costs: Vector, rng: np.random.Generator) -> Vector:
     """A candidate for each member of each search; the same whatever other searches are at their end."""
     searches, members, size = places.shape
-    rows, own = np.arange(searches)[:, None], np.arange(members)
+    rows, member = np.arange(searches)[:, None], np.arange(members)
     step = rng.integers(1, members, (searches, members))
     other = rng.integers(1, members - 1, (searches, members))
-    a, b = (own + step) % members, (own + other + (other >= step)) % members  # two different others
+    a, b = (member + step) % members, (member + other + (other >= step)) % members  # two different others
     best = places[rows, costs.argmin(axis=1)[:, None]]
     weight = rng.uniform(*WEIGHTS, (searches, members, 1))
     mutant = best + weight * (places[rows, a] - places[rows, b])
@@ -99,7 +99,7 @@ def latin(rng: np.random.Generator, count: int, size: int) -> Vector:
     return places
 
 
-def agreement(costs: Any, settled: float) -> int:
+def agreement(costs: Sequence[float] | Vector, settled: float) -> int:
     """How many of several searches came within 1 % of the best of them and of what was settled on.
 
     >>> agreement([1.0, 1.005, 1.2], 1.1)

@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from numbers import Real
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softstart.chain.machines import MachineLike, as_machine
+from softstart.chain.machines import MachineLike
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
-from softstart.errors import InputError, Mistakes
-from softstart.optimal.problem import StartTime
+from softstart.errors import InputError
 from softstart.parallel import Pool, checked_workers, usable_workers
-from softstart.quantities import check_whole
-from softstart.start.comparison import Uncertain, as_far_as_known
-from softstart.start.results import has_margin
+from softstart.start.comparison import Uncertain
 from softstart.store import PartStore, Target
 from softstart.tuning.gains import GainSearch, Progress, StartCounter, best_gains
 from softstart.tuning.outcome import Tuning
-from softstart.tuning.question import (
-    MARGIN,
-    TuningProblem,
-    gaps_of,
-    inertias_of,
-    recipe_of,
-    scenarios_drawn,
-    tuning_scenarios,
-)
-from softstart.tuning.ranges import Free, ranges_of
+from softstart.tuning.problem import tuning_problem
+from softstart.tuning.ranges import Free
 from softstart.tuning.tables import (
     CellOptimum,
     between_table,
@@ -41,15 +29,13 @@ from softstart.tuning.tables import (
 from softstart.tuning.trials import Part, Trials
 
 GENERATIONS = 60
-DRAWN = 100  # drives that stand for an identification
-SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
 
 def tune(
     drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
     controller: str | Controller,
-    gaps: Iterable[Any] | Any | None = None,
-    inertias: Iterable[Any] | Any | None = None,
+    gaps: object = None,
+    inertias: object = None,
     *,
     parameters: Mapping[str, object] | None = None,
     free: Free = None,
@@ -151,70 +137,37 @@ def tune(
     R. Storn, K. Price: Differential evolution - a simple and efficient heuristic for global optimization over
     continuous spaces, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
     """
-    if not (schedule or robust):
-        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
-    known, drawn, soft = as_far_as_known(drive, DRAWN)
-    if drawn is not None:
-        gaps = [known.gap] if gaps is None else gaps
-        inertias = [known.load_inertia] if inertias is None else inertias
-    drive = as_machine(known)
-    certified = isinstance(drive, Drive) if certified is None else certified
-    wrong = Mistakes()
-    whole = {"seed": (seed, 0), "restarts": (restarts, 1), "generations": (generations, 1)}
-    whole |= {} if population is None else {"population": (population, 5)}
-    for name, (number, least) in whole.items():
-        with wrong.collect():
-            check_whole(number, name, least)
-    with wrong.collect():
-        scenarios = tuning_scenarios(drive, tolerances, 0 if wrong.sentences else seed)
-        if others := drawn or soft:
-            scenarios = scenarios_drawn(known, others, scenarios)
-    with wrong.collect():
-        recipe = recipe_of(controller, parameters)
-        ranges = ranges_of(recipe.make(), free)
-    with wrong.collect():
-        rows = gaps_of(drive, gaps)
-    with wrong.collect():
-        columns = inertias_of(drive, inertias)
-    with wrong.collect():
-        bound = None if start_time is None else StartTime.of(start_time)
-    share: Any = quantile
-    if not isinstance(share, Real) or isinstance(share, bool) or not 0.0 < float(share) <= 1.0:
-        wrong.sentences.append(f"quantile = {share!r}: give a share of the starts above 0, at most 1.")
-    if not isinstance(metric, str):
-        wrong.sentences.append(f"metric = {metric!r}: name a figure of a start, as k_dyn.")
-    if metric == MARGIN and not has_margin(drive.limits):
-        wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
-    wrong.raise_if_any()
-    question = TuningProblem(
-        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), seed, restarts,
-        population or max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges)), generations, soft,
+    wanted = [name for name, asked in (("schedule", schedule), ("robust", robust)) if asked]
+    if not wanted:
+        raise InputError("schedule = False, robust = False: set one of them to True.")
+    search = {"seed": seed, "restarts": restarts, "population": population, "generations": generations}
+    problem = tuning_problem(
+        drive, controller, gaps, inertias, parameters=parameters, free=free, metric=metric,
+        start_time=start_time, tolerances=tolerances, quantile=quantile, search=search,
     )  # fmt: skip
+    certified = isinstance(problem.drive, Drive) if certified is None else certified
     log = StartCounter(progress)
     log.tell("starts with the defaults")
-    sides = {
-        name: Trials(question, robust=name == "robust")
-        for name, wanted in (("schedule", schedule), ("robust", robust)) if wanted
-    }  # fmt: skip
-    found: dict[str, tuple[Trials, GainSearch]] = {}
+    sides = {name: Trials(problem, robust=name == "robust") for name in wanted}
+    searches: dict[str, tuple[Trials, GainSearch]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
-    with PartStore(target, question.inputs(), ["part"]) as kept:
+    with PartStore(target, problem.inputs(), ["part"]) as parts:
         threads = next(iter(sides.values())).compiled
-        count = usable_workers(question, "the controller", workers, scheduler, threads)
+        count = usable_workers(problem, "the controller", workers, scheduler, threads)
         with Pool(count, threads=threads, scheduler=scheduler, describe=_described) as pool:
             for name, trials in sides.items():
-                before = found.get("schedule")
-                found[name] = trials, best_gains(trials, pool, kept, log, before and before[1])
-        best = {}
+                _, gains = searches.get("schedule", (None, None))
+                searches[name] = trials, best_gains(trials, pool, parts, log, gains)
+        optima = {}
         if certified and metric == "k_dyn":
             with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
-                best = cell_optima(pool, sides.values(), kept, log)
-    scheduled = found.get("schedule")
+                optima = cell_optima(pool, sides.values(), parts, log)
+    scheduled = searches.get("schedule")
     return Tuning(
-        question,
+        problem,
         scheduled and schedule_table(*scheduled),
-        robust_outcome(*found["robust"]) if robust else None,
-        price_table(found, best),
+        robust_outcome(*searches["robust"]) if robust else None,
+        price_table(searches, optima),
         scheduled and between_table(*scheduled),
         log.starts,
         log.seconds,

@@ -14,15 +14,16 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softstart.arrays import Indices, Vector
 from softstart.chain.machines import varied
-from softstart.controller import CompiledController, make_controller
+from softstart.controller import CompiledController, Controller, make_controller
 from softstart.errors import InputError
 from softstart.hints import nearest
 from softstart.parallel import Pool
 from softstart.start.batch import Batch, prepared
-from softstart.tuning.question import MARGIN, TuningProblem
+from softstart.tuning.problem import MARGIN, TuningProblem
 
 Values = Mapping[str, Vector]  # parameter -> one value a candidate
 
@@ -39,67 +40,69 @@ class Judged(NamedTuple):
 
 
 class Trials:
-    """Candidates for the jobs of a question: one for each cell or, if `robust`, one for all cells.
+    """Candidates for the jobs of a problem: one for each cell or, if `robust`, one for all cells.
 
     `defaults` are the parameters as the controller derives them, by name, one a job; `default` is what they
     reach and `bound` the bound on the start time of each start in s (axes: job, start).
     """
 
     def __init__(
-        self, question: TuningProblem, robust: bool, known: tuple[Judged, Vector] | None = None
+        self, problem: TuningProblem, robust: bool, known: tuple[Judged, Vector] | None = None
     ) -> None:
-        self.question, self.robust = question, robust
-        self.controller = question.recipe.make()
-        count, scenarios = len(question.cells), len(question.scenarios)
+        self.problem, self.robust = problem, robust
+        self.controller = problem.recipe.make()
+        count, scenarios = len(problem.cells), len(problem.scenarios)
         starts = np.arange(count * scenarios)
         self.starts_of = starts.reshape(1 if robust else count, -1)  # job -> its starts, cell by cell
-        cells = [question.drive_of(cell) for cell in range(count)]
-        self.drives = [question.drive.design_drive] if robust else [one.design_drive for one in cells]
+        cells = [problem.drive_of(cell) for cell in range(count)]
+        self.drives = [problem.drive.design_drive] if robust else [one.design_drive for one in cells]
         self.base = np.repeat([one.mean_torque for one in cells], scenarios)
-        self.batch = _starts_of_cells(question)
+        self.batch = _starts_of_cells(problem)
         set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
         self.compiled = isinstance(set_up[0], CompiledController)
-        self.defaults = {name: _defaults(question, name, set_up) for name in question.names}
+        self.defaults = {name: _defaults(problem, name, set_up) for name in problem.names}
         self.time_limit: float | None = None
         self.default, self.bound = known or self._measured()
         if np.isfinite(longest := float(self.bound.max())):
             self.time_limit = PATIENCE * longest
 
-    def __reduce__(self) -> Any:  # made again in another process
-        return Trials, (self.question, self.robust, (self.default, self.bound))
+    def __reduce__(self) -> tuple[object, ...]:  # made again in another process
+        return Trials, (self.problem, self.robust, (self.default, self.bound))
 
     def _measured(self) -> tuple[Judged, Vector]:
         """What the defaults reach, and the bounds that follow."""
-        asked, default = self.question.start_time, self.judged(np.arange(len(self.drives)), {})
-        if asked is not None and asked.multiple:
-            return default, asked.value * self._direct()[self.starts_of]
-        if asked is not None or self.question.limited:
-            return default, np.full(self.starts_of.shape, asked.value if asked else math.inf)
+        limit, default = self.problem.start_time, self.judged(np.arange(len(self.drives)), {})
+        if limit is not None and limit.multiple:
+            return default, limit.value * self._direct()[self.starts_of]
+        if limit is not None or self.problem.limited:
+            return default, np.full(self.starts_of.shape, limit.value if limit else math.inf)
         return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
 
     def _direct(self) -> Vector:
         """Start time of `direct` for every start."""
-        question = self.question
-        drives = [question.drive_of(cell).design_drive for cell in range(len(question.cells))]
-        found: Vector = self.batch.figures(make_controller("direct").set_ups(drives), 1.0)["start_time"][0]
-        if np.any(failed := np.isnan(found)):
-            gap, inertia = question.cells[int(failed.argmax()) // len(question.scenarios)]
+        problem = self.problem
+        drives = [problem.drive_of(cell).design_drive for cell in range(len(problem.cells))]
+        start_times: Vector = self.batch.figures(make_controller("direct").set_ups(drives), 1.0)[
+            "start_time"
+        ][0]
+        if np.any(failed := np.isnan(start_times)):
+            gap, inertia = problem.cells[int(failed.argmax()) // len(problem.scenarios)]
             raise InputError(
                 f"start_time: direct does not bring a load of {inertia:g} kg m2 behind a gap of {gap:g} rad "
                 "to its target speed; give the start time in s instead of a multiple."
             )
-        return found
+        return start_times
 
     def values(self, jobs: Indices, places: Vector) -> dict[str, Vector]:
         """Values of the tuned parameters at places in their ranges; the last axis are the parameters."""
         return {
             one.name: one.value(places[..., k], self.defaults[one.name][jobs])
-            for k, one in enumerate(self.question.ranges)
+            for k, one in enumerate(self.problem.ranges)
         }
 
     def places(self, jobs: Indices, values: Values) -> Vector:
         """The places of values; the last axis are the parameters."""
-        each = [one.place(values[one.name], self.defaults[one.name][jobs]) for one in self.question.ranges]
+        each = [one.place(values[one.name], self.defaults[one.name][jobs]) for one in self.problem.ranges]
         return np.stack(each, axis=-1)
 
     def costs(self, jobs: Indices, places: Vector) -> Vector:
@@ -108,11 +111,11 @@ class Trials:
 
     def cost(self, jobs: Indices, judged: Judged) -> Vector:
         """The cost of what candidates reach."""
-        return cost(judged.metric, judged.start_time, self.bound[jobs], self.question.quantile)
+        return cost(judged.metric, judged.start_time, self.bound[jobs], self.problem.quantile)
 
     def latest(self, jobs: Indices, judged: Judged) -> Vector:
         """Start time over its bound, at the quantile over the starts of each job."""
-        return np.asarray(upper(judged.start_time / self.bound[jobs], self.question.quantile))
+        return np.asarray(upper(judged.start_time / self.bound[jobs], self.problem.quantile))
 
     def judged(self, jobs: Indices, values: Values, to_the_end: bool = False) -> Judged:
         """What candidates reach, each for a job of its own; NaN where the controller refuses its values.
@@ -130,7 +133,7 @@ class Trials:
         )
         try:
             limit = None if to_the_end else self.time_limit
-            figured = self.batch.figures(set_ups, self.base[starts].ravel(), starts.ravel(), time_limit=limit)
+            figures = self.batch.figures(set_ups, self.base[starts].ravel(), starts.ravel(), time_limit=limit)
         except InputError:
             if not values:
                 raise  # the defaults are no candidate: the input is wrong
@@ -141,36 +144,38 @@ class Trials:
                 for k in range(len(jobs))
             ]
             return Judged(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
-        metric = self.question.metric
-        if metric not in figured:
-            near = nearest(metric, figured)
-            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figured)}."
-            raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
-        found, time = (figured[name][0].reshape(starts.shape) for name in (metric, "start_time"))
-        return Judged(1.0 - found if metric == MARGIN else found.astype(np.float64), time)
+        metric = self.problem.metric
+        if metric not in figures:
+            near = nearest(metric, figures)
+            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figures)}."
+            raise InputError(f'metric = "{metric}": this is not a result of a start; {hint}')
+        figure, time = (figures[name][0].reshape(starts.shape) for name in (metric, "start_time"))
+        return Judged(1.0 - figure if metric == MARGIN else figure.astype(np.float64), time)
 
 
-def _starts_of_cells(question: TuningProblem) -> Batch:
+def _starts_of_cells(problem: TuningProblem) -> Batch:
     """The machines that start: of each cell, one after another, those of all scenarios."""
-    own: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(question.cells).T, strict=True))
-    drives: list[Any] = [question.drive_of(cell) for cell in range(len(question.cells))]
-    found = {}
-    for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
+    of_cells: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(problem.cells).T, strict=True))
+    drives: list[Any] = [problem.drive_of(cell) for cell in range(len(problem.cells))]
+    columns_by_name = {}
+    for name in sorted({*of_cells, *(name for one in problem.scenarios for name in one)}):
         # of a chain each gap goes with all others
         value = (
-            own[name] if name in own else np.array([float(one.parameter_value(name).value) for one in drives])
+            of_cells[name]
+            if name in of_cells
+            else np.array([float(one.parameter_value(name).value) for one in drives])
         )
-        columns = [one[name].of(value) if name in one else value for one in question.scenarios]
-        found[name] = np.stack(columns, axis=1).ravel()
-    return prepared(varied(question.drive, found))
+        columns = [one[name].of(value) if name in one else value for one in problem.scenarios]
+        columns_by_name[name] = np.stack(columns, axis=1).ravel()
+    return prepared(varied(problem.drive, columns_by_name))
 
 
-def _defaults(question: TuningProblem, name: str, set_up: list[Any]) -> Vector:
+def _defaults(problem: TuningProblem, name: str, set_up: list[Controller]) -> Vector:
     """A tuned parameter as the controller derives it for each job."""
     values = [one.parameters[name] for one in set_up]
     if None in values:
         raise InputError(
-            f"free: the controller {question.recipe.label} derives no default for {name}; "
+            f"free: the controller {problem.recipe.label} derives no default for {name}; "
             "tuning starts from the default, so give the parameter one."
         )
     return np.array(values, dtype=np.float64)
@@ -194,10 +199,10 @@ def shared_costs(trials: Trials, pool: Pool, jobs: Indices, places: Vector) -> V
     most = STARTS_A_THREAD if pool.threads and pool.count > 1 else STARTS_A_CALL
     size = min(-(-len(jobs) // pool.count), max(most // trials.starts_of.shape[1], 1))
     parts = (Part(k, trials, jobs[k : k + size], places[k : k + size]) for k in range(0, len(jobs), size))
-    found = np.empty(len(jobs))
+    all_costs = np.empty(len(jobs))
     for part, costs in pool.results(_costs_of, parts):
-        found[part.first : part.first + size] = costs
-    return found
+        all_costs[part.first : part.first + size] = costs
+    return all_costs
 
 
 TOO_SLOW = 1e30  # where the costs of candidates begin that start, but not in time
@@ -206,13 +211,13 @@ SLACK = 1e-9  # of the bound on the start time, for rounding
 TIE = 1e-6  # share of the metric within which the mean over the starts decides
 
 
-def _within(values: Any, quantile: float) -> Any:
+def _within(values: Vector, quantile: float) -> Vector:
     """The share `quantile` of the last axis, rising."""
     count = max(math.ceil(quantile * np.shape(values)[-1] - 1e-9), 1)
     return np.sort(values, axis=-1)[..., :count]
 
 
-def upper(values: Any, quantile: float) -> Any:
+def upper(values: Vector, quantile: float) -> Vector:
     """The value that the share `quantile` of the last axis does not exceed; one of the values.
 
     >>> float(upper(np.array([3.0, 1.0, 2.0, np.inf]), 0.75)), float(upper(np.array([3.0, 1.0]), 1.0))
@@ -221,14 +226,14 @@ def upper(values: Any, quantile: float) -> Any:
     return _within(values, quantile)[..., -1]
 
 
-def excess(start_time: Any, bound: Any, quantile: float) -> Any:
+def excess(start_time: Vector, bound: Vector | float, quantile: float) -> Vector:
     """By which share the start time is beyond its bound, 0 or more; infinite where a start fails."""
     share = np.where(np.isnan(start_time), np.inf, np.maximum(start_time / bound - 1.0, 0.0))
     over = upper(share, quantile)
     return np.where(over <= SLACK, 0.0, over)
 
 
-def cost(metric: Any, start_time: Any, bound: Any, quantile: float) -> Vector:
+def cost(metric: Vector, start_time: Vector, bound: Vector | float, quantile: float) -> Vector:
     """The lower the better: in time beats too slow, less too slow beats more, then the metric decides.
 
     The last axis are the starts that one candidate is judged by; metric and start time both count at their
@@ -250,6 +255,6 @@ def cost(metric: Any, start_time: Any, bound: Any, quantile: float) -> Vector:
     return np.asarray(np.where(timely & np.isfinite(value), ranked, unfinished))
 
 
-def in_time(found: Any) -> Any:
+def in_time(costs: ArrayLike) -> NDArray[np.bool_]:
     """Whether a cost is that of a candidate within its bound on the start time."""
-    return np.asarray(found) < TOO_SLOW
+    return np.asarray(costs) < TOO_SLOW

@@ -11,7 +11,7 @@ import numpy as np
 
 from softstart.drive.data_sheet_mechanics import BAND
 from softstart.errors import Sentence
-from softstart.tuning.question import MARGIN
+from softstart.tuning.problem import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
 from softstart.views.numbers import (
     Column,
@@ -49,7 +49,7 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
     assert table is not None
     name, metric = tuning.metric, _metric(tuning)
     if what == "gains":
-        maps = {one.name: label(one.name, one.unit) for one in tuning.question.ranges}
+        maps = {one.name: label(one.name, one.unit) for one in tuning.problem.ranges}
         return _maps(tuning, table, maps, "gains of each cell")
     if what == "price":
         maps = {one: title for one, title in PRICES.items() if one in table}
@@ -61,7 +61,7 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
 
 def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alike: int = 0) -> Any:
     """Maps side by side; the first `alike` share one scale of colours."""
-    q = tuning.question
+    q = tuning.problem
     gaps, inertias = ([f"{value:.3g}" for value in axis] for axis in (q.gaps, q.load_inertias))
     size = max(3.2, 1.2 + 0.62 * len(inertias)), max(1.6, 0.9 + 0.42 * len(gaps))
     fields = [np.asarray(table[name], dtype=np.float64) for name in maps]
@@ -85,7 +85,7 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
 
 def _metric(tuning: Tuning) -> str:
     """The metric in words."""
-    return "share of the limits" if tuning.question.metric == MARGIN else label(tuning.metric)
+    return "share of the limits" if tuning.problem.metric == MARGIN else label(tuning.metric)
 
 
 def any_in_time(tuning: Tuning) -> bool:
@@ -96,7 +96,7 @@ def any_in_time(tuning: Tuning) -> bool:
 
 def tuning_question(tuning: Tuning) -> str:
     """What was asked, in a sentence."""
-    q = tuning.question
+    q = tuning.problem
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
@@ -118,7 +118,7 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     numbers = {
         "gap\nrad": of["gap"],
         "J2\nkg m2": of["load_inertia"],
-        **{label(one.name, one.unit, "\n"): of[one.name] for one in tuning.question.ranges},
+        **{label(one.name, one.unit, "\n"): of[one.name] for one in tuning.problem.ranges},
         f"{metric}\ndefault": of[f"{tuning.metric}_default"],
         f"{metric}\ntuned": of[tuning.metric],
         "start\ntime s": of["start_time"],
@@ -126,14 +126,14 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     columns = {heading: column_of(values) for heading, values in numbers.items()} | {
         "at most\ns": [one.replace("inf", "-") for one in column_of(of["start_time_bound"])],
         "in\ntime": ["yes" if good else "no" for good in of["in_time"]],
-        "searches\nagree": [f"{n} of {tuning.question.restarts}" for n in of["agreement"]],
+        "searches\nagree": [f"{n} of {tuning.problem.restarts}" for n in of["agreement"]],
     }
     return TextTable.of("Gains for each cell", columns, most=SHOWN, keys=2)
 
 
 def _robust_table(tuning: Tuning, robust: RobustSet) -> TextTable:
     """The robust set beside the defaults."""
-    units = {one.name: one.unit for one in tuning.question.ranges}
+    units = {one.name: one.unit for one in tuning.problem.ranges}
     columns = [
         DataColumn("parameter", str),
         DataColumn("default", lambda name: short(robust.defaults[name])),
@@ -163,7 +163,7 @@ def _tables(tuning: Tuning) -> Iterator[TextTable]:
 
 def _grid(tuning: Tuning, title: str, values: Any) -> TextTable:
     """A figure over the grid, one row per gap."""
-    q = tuning.question
+    q = tuning.problem
     cells = [short(gap) for gap in q.gaps], *(column_of(column) for column in values.to_numpy().T.tolist())
     headings = ["gap rad", *(f"J2 {inertia:.4g}" for inertia in q.load_inertias)]
     return TextTable(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
@@ -180,7 +180,7 @@ def _between(values: Any) -> str:
 def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
     name, metric, table, price = tuning.metric, _metric(tuning), tuning.schedule, tuning.price
-    one, quantile = tuning.robust, tuning.question.quantile
+    one, quantile = tuning.robust, tuning.problem.quantile
     sentences = [f"Warning: {warning}" for warning in tuning.plausibility_warnings]
     shares = list[tuple[str, Any, Any]]()
     if table is not None:
@@ -206,7 +206,7 @@ def conclusions(tuning: Tuning) -> list[str]:
                 f"{worst:.3f} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
             )
             sentences.append(f"One set at both ends of the stiffness: {ends}. The {end} end is critical.")
-    if tuning.question.metric == MARGIN:
+    if tuning.problem.metric == MARGIN:
         margins = (
             f"{what} {100.0 * (1.0 - float(np.max(tuned))):.3g} % (defaults "
             f"{100.0 * (1.0 - float(np.max(default))):.3g} %)"
@@ -223,7 +223,7 @@ def conclusions(tuning: Tuning) -> list[str]:
 
 def tuning_notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how reliable the search is."""
-    drive, q, price, notes = tuning.drive, tuning.question, tuning.price, list[str]()
+    drive, q, price, notes = tuning.drive, tuning.problem, tuning.price, list[str]()
     if len(drive.mass_names) > 2:
         load = drive.mass_names[drive.load_index]
         notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")

@@ -13,7 +13,7 @@ from softstart import DataSheet, Drive, compare
 from softstart.cli.sweep import read_axes
 from softstart.cli.tune import read_axis
 from softstart.controller.recipe import Recipe
-from softstart.tuning.question import gaps_of
+from softstart.tuning.problem import gaps_of
 
 # 3 kW, 1410 rpm, 38.1:1, 6.5 t on wheels of 315 mm; gearbox at its output: 9 arcmin, 35 kN m/rad, 1.6 kN m
 SHEET = {

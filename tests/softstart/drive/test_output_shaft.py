@@ -20,7 +20,7 @@ from softstart.reporting.document import data_of
 from softstart.reporting.project import Project
 from softstart.start.recommendation import Row
 from softstart.sweeping.grid import Subject
-from softstart.tuning.question import gaps_of, inertias_of, tuning_scenarios
+from softstart.tuning.problem import gaps_of, inertias_of, tuning_scenarios
 from softstart.views.tuning import conclusions
 
 CRANE = Drive.load("crane-4amtkf")
@@ -291,7 +291,7 @@ def test_a_tuning_that_leaves_the_drive_out_is_doubted() -> None:
     beside = tune(drive, name, ["4.5 arcmin", "9 arcmin"], ["100 kg*m^2 at output"], **quick)
     gap, inertia = beside.plausibility_warnings
     assert gap.startswith(
-        "the gap of the drive, 0.099746 rad, lies outside those tuned over, 0.001309 to 0.002618 rad:"
+        "the gap of the drive, 0.099746 rad, is outside the tuned range, 0.001309 to 0.002618 rad:"
     )
     assert inertia.startswith("the load inertia of the drive, ")
     assert [one[:16] for one in conclusions(beside)][:2] == ["Warning: the gap", "Warning: the loa"]

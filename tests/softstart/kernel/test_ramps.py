@@ -23,7 +23,7 @@ from softstart import (
 )
 from softstart.arrays import Vector
 from softstart.controller import compiled_step, make_controller
-from softstart.controller.compiled import ASK_AGAIN, SLOPE, TIME, TORQUE
+from softstart.kernel.motor import ASK_AGAIN, M_TIME, SLOPE, TORQUE
 
 CRANE = Drive.load("crane-4amtkf")
 BLOCKS = 3
@@ -103,8 +103,8 @@ def test_a_slope_without_an_end_is_refused(answer: Command) -> None:
 def slope_once(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """A slope in the first answer only: later ones do not write it."""
     command[TORQUE] = 20.0
-    command[ASK_AGAIN] = measured[TIME] + 0.05
-    if measured[TIME] == 0.0:
+    command[ASK_AGAIN] = measured[M_TIME] + 0.05
+    if measured[M_TIME] == 0.0:
         command[SLOPE] = 400.0
 
 

@@ -8,7 +8,7 @@ from tests.softstart.tuning.test_trials import CHAIN
 
 from softstart import InputError, simulate, tune
 from softstart.chain import Chain
-from softstart.tuning.question import gaps_of, inertias_of
+from softstart.tuning.problem import gaps_of, inertias_of
 
 DAMPED = Chain.from_toml(CHAIN.to_toml(), also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
 QUICK = {"restarts": 1, "generations": 3, "workers": 1}
@@ -41,9 +41,7 @@ def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
     found.to_toml(schedule)
     found.to_toml(robust, "robust")
     for cell in np.ndindex(2, 2):
-        chain = DAMPED.with_gap_and_inertia(
-            found.question.gaps[cell[0]], found.question.load_inertias[cell[1]]
-        )
+        chain = DAMPED.with_gap_and_inertia(found.problem.gaps[cell[0]], found.problem.load_inertias[cell[1]])
         assert float(found.schedule.k_dyn[cell]) == simulate(chain, str(schedule)).k_dyn
         assert float(found.robust.cells.k_dyn[cell]) == simulate(chain, str(robust), base=chain).k_dyn
     assert found.price is not None

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, simulate
 from softstart.chain import Chain
 from softstart.controller import make_controller
-from softstart.tuning.question import TuningProblem, recipe_of, tuning_scenarios
+from softstart.tuning.problem import TuningProblem, recipe_of, tuning_scenarios
 from softstart.tuning.ranges import Range, ranges_of
 from softstart.tuning.trials import Trials
 
@@ -43,14 +43,14 @@ OF_CHAINS = {"gaps": (0.5, 1.0), "load_inertias": (40.0, 69.2)}
 )
 def test_each_candidate_is_the_start_that_simulate_makes(name, machine, tolerances, cells):
     tried = trials(name, machine, tolerances, **cells)
-    places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
+    places = np.random.default_rng(3).random((3, len(tried.problem.ranges)))
     cells = np.array([0, 3, 1])
     values = tried.values(cells, places)
     judged = tried.judged(cells, values, to_the_end=True)
     for k, cell in enumerate(cells):
-        one = tried.question.drive_of(int(cell))
+        one = tried.problem.drive_of(int(cell))
         controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
-        for s, scenario in enumerate(tried.question.scenarios):
+        for s, scenario in enumerate(tried.problem.scenarios):
             off = one.with_values(
                 {key: level.of(one.parameter_value(key).value) for key, level in scenario.items()}
             )
@@ -64,7 +64,7 @@ def test_one_set_is_set_up_for_the_nominal_drive():
     judged = tried.judged(np.zeros(2, dtype=int), {"torque": np.array([12.0, 20.0])})
     for k, torque in enumerate((12.0, 20.0)):
         for cell in range(4):
-            drive = tried.question.drive_of(cell)
+            drive = tried.problem.drive_of(cell)
             run = simulate(drive, "acceleration-delay", parameters={"torque": torque}, fitted_to=CRANE)
             assert judged.metric[k, cell] == pytest.approx(run.k_dyn, rel=1e-12)
             assert judged.start_time[k, cell] == pytest.approx(run.start_time, rel=1e-12)
@@ -75,7 +75,7 @@ def test_a_candidate_that_its_controller_refuses_is_the_worst_and_alone():
     values = {"rounding": np.array([0.5, 1.5, 1.0])}  # a share
     judged = tried.judged(np.zeros(3, dtype=int), values)
     assert np.isnan(judged.metric[:, 0]).tolist() == [False, True, False]
-    run = simulate(tried.question.drive_of(0), "s-curve", parameters={"rounding": 0.5})
+    run = simulate(tried.problem.drive_of(0), "s-curve", parameters={"rounding": 0.5})
     assert judged.metric[0, 0] == run.k_dyn
 
 

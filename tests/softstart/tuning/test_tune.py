@@ -260,7 +260,7 @@ def test_a_schedule_is_written_with_few_digits_and_is_what_was_promised(tmp_path
     for name, _, values in make_controller(str(path)).gains:
         assert [float(f"{one:.9g}") for one in values.ravel()] == values.ravel().tolist()
         assert np.array_equal(values, found.schedule[name].to_numpy())
-    for inertia in found.question.load_inertias:
+    for inertia in found.problem.load_inertias:
         cell = found.schedule.sel(gap=0.5, load_inertia=inertia)
         run = simulate(CRANE.replace(gap=0.5, load_inertia=inertia), str(path))
         assert (run.k_dyn, run.start_time) == (float(cell.k_dyn), float(cell.start_time))
@@ -284,8 +284,8 @@ BAD = {
     "workers": ({"workers": 0}, ["workers = 0"]),
     "tolerance": ({"tolerances": {"stifness": "10 %"}}, ["stifness", "did you mean stiffness?"]),
     "impossible": ({"tolerances": {"stiffness": [-3.0]}}, ["tolerances", "stiffness = -3"]),
-    "nothing": ({"schedule": False, "robust": False}, ["nothing is asked for"]),
-    "nothing to tune": ({"controller": "direct"}, ["no parameter to tune", "free="]),
+    "nothing": ({"schedule": False, "robust": False}, ["set one of them to True"]),
+    "nothing to tune": ({"controller": "direct"}, ["declares no tunable parameter", "free="]),
 }
 
 
@@ -313,7 +313,7 @@ def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(mo
     monkeypatch.setattr("softstart.tuning.gains.SMOOTHINGS", 0)
     rough = tune(CRANE, "ramp", **grid, **options)
     assert bool((smooth.schedule.k_dyn <= rough.schedule.k_dyn * (1.0 + 1.001e-3)).all())
-    free = smooth.question.ranges
+    free = smooth.problem.ranges
 
     def roughness(table):
         places = [
@@ -337,7 +337,7 @@ def test_the_tuner_equals_brute_force():
     places = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 20)] * 2), axis=-1).reshape(-1, 2)
     for robust, jobs in best.items():
         for job, least in enumerate(jobs):
-            brute = Trials(found.question, robust).costs(np.full(400, job), places).min()
+            brute = Trials(found.problem, robust).costs(np.full(400, job), places).min()
             assert 0.95 * brute <= least <= brute * (1.0 + 1.001e-3)
 
 

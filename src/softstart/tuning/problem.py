@@ -6,12 +6,14 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softstart import __version__
-from softstart.chain.machines import listed_of, quantity_of, varied
+from softstart.arrays import Vector
+from softstart.chain.machines import as_machine, listed_of, quantity_of, varied
 from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
@@ -22,8 +24,10 @@ from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
 from softstart.input.parameters import ParameterValue
 from softstart.optimal.problem import StartTime
-from softstart.quantities import multiplied, to_si
-from softstart.tuning.ranges import Range
+from softstart.quantities import check_whole, multiplied, to_si
+from softstart.start.comparison import as_far_as_known
+from softstart.start.results import has_margin
+from softstart.tuning.ranges import Free, Range, ranges_of
 from softstart.tuning.search import latin
 
 MARGIN = "margin"  # a metric that is made large
@@ -110,12 +114,68 @@ class TuningProblem:
         }
 
 
+DRAWN = 100  # drives that stand for an identification
+SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
+LEAST_OF_SEARCH = {"seed": 0, "restarts": 1, "generations": 1, "population": 5}
+
+
+def tuning_problem(
+    machine: Any,
+    controller: str | Controller,
+    gaps: object,
+    inertias: object,
+    *,
+    parameters: Mapping[str, object] | None,
+    free: Free,
+    metric: str,
+    start_time: float | str | None,
+    tolerances: Mapping[str, Any] | None,
+    quantile: Any,
+    search: Mapping[str, Any],
+) -> TuningProblem:
+    """The arguments of `tune`, read; InputError with all mistakes."""
+    known, drawn, soft = as_far_as_known(machine, DRAWN)
+    if drawn is not None:
+        gaps = [known.gap] if gaps is None else gaps
+        inertias = [known.load_inertia] if inertias is None else inertias
+    drive, wrong = as_machine(known), Mistakes()
+    search = {name: number for name, number in search.items() if number is not None}
+    for name, number in search.items():
+        with wrong.collect():
+            check_whole(number, name, LEAST_OF_SEARCH[name])
+    with wrong.collect():
+        scenarios = tuning_scenarios(drive, tolerances, 0 if wrong.sentences else search["seed"])
+        if others := drawn or soft:
+            scenarios = scenarios_drawn(known, others, scenarios)
+    with wrong.collect():
+        recipe = recipe_of(controller, parameters)
+        ranges = ranges_of(recipe.make(), free)
+    with wrong.collect():
+        rows = gaps_of(drive, gaps)
+    with wrong.collect():
+        columns = inertias_of(drive, inertias)
+    with wrong.collect():
+        bound = None if start_time is None else StartTime.of(start_time)
+    if not isinstance(quantile, Real) or isinstance(quantile, bool) or not 0.0 < float(quantile) <= 1.0:
+        wrong.sentences.append(f"quantile = {quantile!r}: give a share of the starts above 0, at most 1.")
+    if not isinstance(metric, str):
+        wrong.sentences.append(f"metric = {metric!r}: name a figure of a start, as k_dyn.")
+    if metric == MARGIN and not has_margin(drive.limits):
+        wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
+    wrong.raise_if_any()
+    size = {"population": max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))}
+    return TuningProblem(
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), soft=soft,
+        **(size | dict(search)),
+    )  # fmt: skip
+
+
 def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
     """The recipe of a controller; InputError for one whose gains are tuned already."""
-    made = make_controller(controller, parameters)
-    if isinstance(made, Tuned):
+    strategy = make_controller(controller, parameters)
+    if isinstance(strategy, Tuned):
         raise InputError(
-            f"controller = {made.name}: its gains are tuned already; tune the controller itself."
+            f"controller = {strategy.name}: its gains are already tuned; tune the controller itself."
         )
     return Recipe(controller, dict(parameters or {}))
 
@@ -133,7 +193,7 @@ GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
 INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia
 
 
-def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[float, ...]:
+def gaps_of(drive: Machine, given: object = None, name: str = "gaps") -> tuple[float, ...]:
     """Gaps in rad, rising: numbers, texts with a unit, or multiples of the drive's own as "2x".
 
     Those of a chain are the sum of all its gaps at the motor shaft, widened alike. Of a drive with a gear
@@ -142,45 +202,48 @@ def gaps_of(drive: Machine, given: Any = None, name: str = "gaps") -> tuple[floa
     >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
     (0.5, 0.5235987755982988, 1.0)
     """
-    own, inertia = drive.gap_and_inertia
+    gap, inertia = drive.gap_and_inertia
     if given is None:
-        if not own > 0.0:
-            raise InputError(
-                f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
-            )
+        if not gap > 0.0:
+            raise InputError(f"{name}: the drive has no gap; give the gaps in rad.")
         given = [f"{factor}x" for factor in GAP_MULTIPLES]
-    return _axis(drive, "gap", given, name, {"x": own}, lambda gap: drive.with_gap_and_inertia(gap, inertia))
+    return _axis(drive, "gap", given, name, {"x": gap}, lambda gap: drive.with_gap_and_inertia(gap, inertia))
 
 
-def inertias_of(drive: Machine, given: Any = None, name: str = "inertias") -> tuple[float, ...]:
+def inertias_of(drive: Machine, given: object = None, name: str = "inertias") -> tuple[float, ...]:
     """Load inertias in kg m2, rising; also multiples of the drive's own ("2x") or of the motor's ("5 J1").
 
     >>> [round(inertia, 3) for inertia in inertias_of(Drive.load("crane-4amtkf"), ["2 J1", "1x", 0.1])]
     [0.07, 0.1, 0.175]
     """
-    gap, own = drive.gap_and_inertia
+    gap, inertia = drive.gap_and_inertia
     given = [f"{factor}x" for factor in INERTIA_MULTIPLES] if given is None else given
-    units = {"x": own, "J1": drive.motor_inertia_at_load}
+    units = {"x": inertia, "J1": drive.motor_inertia_at_load}
     return _axis(
         drive, "load_inertia", given, name, units, lambda inertia: drive.with_gap_and_inertia(gap, inertia)
     )
 
 
 def _axis(
-    drive: Machine, key: str, given: Any, name: str, units: dict[str, float], check: Callable[[float], object]
+    drive: Machine,
+    key: str,
+    given: object,
+    name: str,
+    units: dict[str, float],
+    check: Callable[[float], object],
 ) -> tuple[float, ...]:
     """Values of a parameter in SI, each once, rising."""
     listed = listed_of(given, name)
     if not listed:
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
-    found, wrong = set[float](), Mistakes()
-    for one in listed:
+    values, wrong = set[float](), Mistakes()
+    for text in listed:
         with wrong.collect():
-            found.add(value := quantity_of(drive, key, multiplied(one, name, units), name))
+            values.add(value := quantity_of(drive, key, multiplied(text, name, units), name))
             with wrong.collect(f"{name}: "):
                 check(value)
     wrong.raise_if_any()
-    return tuple(sorted(found))
+    return tuple(sorted(values))
 
 
 MOST = 16  # scenarios beside the drive as it is; more combinations are sampled
@@ -192,7 +255,7 @@ class Level(NamedTuple):
     factor: float
     offset: float
 
-    def of(self, value: Any) -> Any:
+    def of(self, value: Vector) -> Vector:
         """The value changed."""
         return self.factor * value + self.offset
 
@@ -246,26 +309,28 @@ def scenarios_drawn(
     >>> scenarios_drawn(crane, machine_table(crane, gap=[0.4, 0.6]), ({},))
     ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
     """
-    own = drive.values()
-    found: list[Scenario] = [{}]
+    nominal = drive.values()
+    combined: list[Scenario] = [{}]
     if isinstance(drawn, Drive):
-        found = [*scenarios]
-        there = {name: np.full(len(scenarios), getattr(drawn, name)) for name in ("stiffness", "damping")}
-        drawn = varied(drive, there)
-    moved = {name: values for name, values in drawn.fields.items() if np.any(values != own[name])}
-    if both := sorted(set(moved) & {name for one in scenarios for name in one}):
+        combined = [*scenarios]
+        soft_end = {name: np.full(len(scenarios), getattr(drawn, name)) for name in ("stiffness", "damping")}
+        drawn = varied(drive, soft_end)
+    varying = {name: values for name, values in drawn.fields.items() if np.any(values != nominal[name])}
+    if both := sorted(set(varying) & {name for one in scenarios for name in one}):
         raise InputError(f"tolerances: {both[0]} has an interval of its own already; leave it out.")
     for k in range(len(drawn)):
-        levels = {name: Level(float(values[k]) / float(own[name]), 0.0) for name, values in moved.items()}
-        found.append({**scenarios[k % len(scenarios)], **levels})
-    return tuple(found)
+        levels = {
+            name: Level(float(values[k]) / float(nominal[name]), 0.0) for name, values in varying.items()
+        }
+        combined.append({**scenarios[k % len(scenarios)], **levels})
+    return tuple(combined)
 
 
 def _knob(drive: Machine, name: str) -> ParameterValue:
     """The quantity of a drive or chain that has a tolerance."""
-    found = drive.parameter_value(name)
-    if found is not None and found.parameter.unit:
-        return found
+    quantity = drive.parameter_value(name)
+    if quantity is not None and quantity.parameter.unit:
+        return quantity
     known = {
         path: one
         for path in drive.parameter_keys()
@@ -276,7 +341,7 @@ def _knob(drive: Machine, name: str) -> ParameterValue:
     raise InputError(f"{name} is not a quantity of a {drive.KIND}; {hint}")
 
 
-def _levels(drive: Machine, knob: ParameterValue, given: Any) -> list[Level]:
+def _levels(drive: Machine, knob: ParameterValue, given: object) -> list[Level]:
     name = knob.name
     if isinstance(given, list | tuple | np.ndarray):
         each = listed_of(given, name)
