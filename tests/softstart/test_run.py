@@ -332,7 +332,8 @@ class Stepped(Sampled):
     """The same, in full."""
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Any:
-        return Command(min(62.0, 620.0 * measured.time), measured.time + 0.001, state)
+        sample = round(measured.time / 0.001)
+        return Command(min(62.0, 620.0 * measured.time), (sample + 1.0) * 0.001, state)
 
 
 def test_a_sampled_controller_may_return_the_torque_alone() -> None:

@@ -292,7 +292,7 @@ class PlainController(Controller, ABC):
 
         Returns
         -------
-        The answer; a torque alone is `Command(torque)`.
+        The answer; of a controller with a `period` a torque alone is `Command(torque)`.
         """
 
 
@@ -307,7 +307,7 @@ def reply_of(controller: PlainController, measured: Measured, state: tuple[float
     (62.0, 0.003, (1.0,), 0.0)
     """
     reply = controller.step(measured, state)
-    if isinstance(reply, Real) and not isinstance(reply, bool):
+    if isinstance(reply, Real) and getattr(controller, "period", None):
         reply = Command(float(reply))
     try:
         torque, instant, kept, slope = Command(*reply)  # type: ignore[misc]  # may be any tuple
@@ -315,8 +315,8 @@ def reply_of(controller: PlainController, measured: Measured, state: tuple[float
         return float(torque), after, state if kept is None else tuple(kept), float(slope)
     except (TypeError, ValueError):
         raise InputError(
-            f"controller {type(controller).__name__}: its step answered {reply!r}; return a torque in N m or "
-            "Command(torque, ask_again, state, slope)."
+            f"controller {type(controller).__name__}: its step returned {reply!r}; return Command(torque, "
+            "ask_again, state, slope), or, of a controller with a `period`, the torque alone."
         ) from None
 
 
