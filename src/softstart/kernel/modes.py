@@ -62,8 +62,9 @@ def engage_spring(s: Record, k: int, side: float) -> None:
     """The spring begins to act, in its damping regime."""
     s.side[k] = side
     s.mode[k] = CONTACT
-    z = side * s.theta[k] - s.half_gap[k]
+    z = side * s.theta[k] - s.half_gap[k]  # overlap of the flanks, and its rate
     v = side * (s.w[k] - s.w[k + 1])
+    # tau_d > tau_c: the damping torque is capped at that of the spring
     if s.law[k] == MODELICA and s.d[k] * v > s.c[k] * z:
         s.mode[k] = DOUBLED
     pulls = s.law[k] == DEAD_ZONE and s.c[k] * z + s.d[k] * v < 0.0
@@ -144,6 +145,7 @@ def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> Non
     v = w_a - w_b
     walled = math.isinf(J_a + J_b)  # one of them stays at rest
     reduced = min(J_a, J_b) if walled else J_a * J_b / (J_a + J_b)
+    # momentum is kept, and restitution = -v(+)/v(-): [R]
     impulse = (1.0 + restitution) * reduced * v
     loss = 0.5 * (1.0 - restitution * restitution) * reduced * v * v
     note(s, time, kind, k, loss, impulse)
@@ -202,7 +204,7 @@ def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
             settle(s, k, rest)
         else:
             strike(s, k, e, IMPACT, s.time)
-    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half_gap[k]:
+    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half_gap[k]:  # overlap v^2/(2 |press|)
         s.events += 1.0
         s.leading_zeros[k] = 2
     else:
@@ -313,7 +315,7 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         s.start_time = s.time
         s.modes_changed = 0.0
         note(s, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
-        if s.t_end == math.inf:
+        if s.t_end == math.inf:  # without `until` a run goes on for one elastic period
             s.t_end = s.time + s.period
     else:
         if event == REJOIN:

@@ -180,7 +180,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     count = s.encoder
     if count > 0.0:
         edge = s.encoder_phase + 0.5
-        angle = (math.floor(angle / count + edge) - math.floor(edge)) * count
+        angle = (math.floor(angle / count + edge) - math.floor(edge)) * count  # counted edges
         if s.asked != 0.0 and s.time > s.sample_time:
             speed = (angle - s.sample_angle) / (s.time - s.sample_time)
     s.sample_angle = angle
@@ -238,7 +238,7 @@ def along_line(s: Record) -> None:
     if s.lag == 0.0:
         s.u = s.u_ref
         return
-    line = s.u_ref - s.slope * s.lag
+    line = s.u_ref - s.slope * s.lag  # what a first-order lag follows a ramp with
     if abs(s.u - line) > DIED_AWAY * (abs(line) + abs(s.u)):
         s.on_line = 0.0
 
@@ -259,7 +259,7 @@ def begin_torque(s: Record) -> None:
             away = demand - s.u_ref
             line = slope
             slope = math.copysign(s.rate, away)
-            if line == 0.0:
+            if line == 0.0:  # a constant demand is met when the distance is covered
                 s.slew_end = away / slope
             elif (slope - line) * away > 0.0:
                 s.slew_end = away / (slope - line)
@@ -281,7 +281,7 @@ def expand_torque(s: Record, h: float, n: int) -> None:
         for o in range(2, n + 1):
             u[o] = 0.0
         return
-    share = h / s.lag
+    share = h / s.lag  # of u' = (u_ref - u)/lag, with u_ref a line
     term = (s.u_ref - s.u) * share
     u[1] = term
     term = 0.5 * (s.slope * h - term) * share

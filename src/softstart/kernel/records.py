@@ -55,7 +55,7 @@ def size(dtype: Any) -> int:
     return int(dtype.itemsize) // 8
 
 
-class Machine:
+class MachineRecord:
     """What is given of motor, encoder and start."""
 
     lag: float  # of the realised torque, s
@@ -342,13 +342,13 @@ def _parts() -> dict[str, Any]:
     return shapes
 
 
-MACHINE, MASS, SHAFT, TONE = record(Machine), record(MassRecord), record(ShaftRecord), record(Tone)
+MACHINE, MASS, SHAFT, TONE = record(MachineRecord), record(MassRecord), record(ShaftRecord), record(Tone)
 CURVE = record(Curve, at=MOST_POINTS, torque=MOST_POINTS)
 NOTES, SHAFT_NOTES, EVENT = record(ResultRecord), record(ShaftNotes), record(EventRow)
 MEASURED, ANSWER = record(Measured), record(Reply)
 WORK = record(
     ResultRecord,
-    Machine,
+    MachineRecord,
     Places,
     MassRecord,
     ShaftRecord,

@@ -157,6 +157,7 @@ def fastest_rate(s: Record) -> float:
         i = j
     springs = max(springs, before_row) + incline_rate
     dampers = max(dampers, before_damping) + ground
+    # the larger root of lambda^2 = dampers lambda + springs
     return 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
 
 
@@ -238,6 +239,7 @@ def orders(reach: float) -> int:
 def add_tone(s: Record, tone: Record, h: float, n: int) -> None:
     """The coefficients of one harmonic of an exciting torque, added to those of its mass."""
     i = int(tone.mass)
+    # cos(phase + turn x) by angle addition: even and odd powers of x apart
     phase = tone.omega * s.time
     cos = math.cos(phase)
     sin = math.sin(phase)
@@ -361,13 +363,13 @@ def expand(s: Record, h: float, n: int) -> None:
             if i + 1 < count:
                 v = w - speed[i + 1, o]
                 z = twist[i, o] - s.spring_zero[i] if o == 0 else twist[i, o]
-                T = s.stiff[i] * z + s.damp[i] * v
+                T = s.stiff[i] * z + s.damp[i] * v  # T = c z + d z'; undamped M12 of [G](7)
                 torque[i, o] = T
                 twist[i, o + 1] = share * v
                 total -= s.share_before[i] * T
                 passed_on = s.share_after[i] * T
             net_torque[i, o] = total
-            speed[i, o + 1] = share * s.inverse_J[i] * total
+            speed[i, o + 1] = share * s.inverse_J[i] * total  # J w' = sum of torques, [G](1), (7)
         if bodies:
             join(s, o, share)
         s.angle_u[o + 1] = share * speed[load, o]

@@ -106,6 +106,7 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
         s.contacts = 1.0
         s.first_contact = 0.0
         s.impact_speed = 0.0
+        # dw12 of [G](10), of the last shaft with a gap
         for k in range(s.path, s.path_end):
             if s.half_gap[k] > 0.0:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
@@ -164,7 +165,7 @@ def approach_acceleration(s: Record, k: int, n: int, x: float, h: float, side: f
     if x == 0.0:
         noise = max(noise, FAINT * (deviation_bound(twist, n) - abs(twist[1]) - abs(twist[2])))
     total = 0.0
-    for o in range(n, 1, -1):
+    for o in range(n, 1, -1):  # Horner's scheme for the second derivative at x
         total = total * x + o * (o - 1.0) * twist[o]
     return side * total / (h * h) if abs(total) > 2.0 * noise else 0.0
 
@@ -262,6 +263,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         if s.period > 0.0 and h > s.period:
             cut = True
             h = s.period
+        # beyond three over the fastest rate the series would need more coefficients than there is room for
         rate = rate_of(s)
         if rate * h > REACH:
             cut = True
@@ -282,13 +284,13 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
             if spans.shape[0] > 0:
                 spans[int(s.n_spans), S_END] = s.time
             s.n_spans += 1.0
-        total = s.u
+        total = s.u  # one sum tells whether any state is no longer finite
         for i in range(s.n):
             total += s.w[i]
         if not math.isfinite(total):
             return NOT_FINITE
         if event == NO_EVENT:
-            if not cut:
+            if not cut:  # exactly, not time + h
                 s.time = until
             continue
         press = 0.0
@@ -296,6 +298,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         if event in (UPPER, LOWER):
             press = approach_acceleration(s, where, n, x, h, 1.0 if event == UPPER else -1.0)
         elif event == SETTLE and s.restitution[where] < 1.0:
+            # impacts at shrinking intervals: their sum is a geometric series in the restitution, as in [R]
             ratio = -s.twist[where, 1] / s.twist[where, 2]
             rest = h * ratio / (1.0 - s.restitution[where])
         if handle(s, event, where, press, rest, h) != 0 and s.ask_on_gap != 0.0:

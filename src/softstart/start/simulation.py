@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from softstart.chain.machines import MachineLike, as_machine
+from softstart.chain.machines import as_machine
 from softstart.controller.base import label_of
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
@@ -19,39 +19,11 @@ from softstart.start.run import Run, worst_run
 from softstart.start.trajectory import StartRecorder
 
 if TYPE_CHECKING:
-    import xarray
-
     from softstart.chain.periodic_torque import PeriodicTorque
 
 DEFAULT_DRIVE = "crane-4amtkf"
 
 
-class Options(TypedDict, total=False):
-    """The other arguments of `simulate`."""
-
-    parameters: Mapping[str, object] | None
-    fitted_to: Any
-    base: Any
-    time_limit: float | str | None
-    max_events: int
-    excitation: Mapping[str | int, PeriodicTorque] | None
-    workers: int | None
-
-
-@overload
-def simulate(
-    drive: MachineLike = ...,
-    controller: ControllerLike | None = ...,
-    until: float | str | None = ...,
-    **options: Unpack[Options],
-) -> Run: ...
-@overload
-def simulate(
-    drive: MachineTable | Sequence[Machine],
-    controller: ControllerLike | None = ...,
-    until: float | str | None = ...,
-    **options: Unpack[Options],
-) -> xarray.Dataset: ...
 def simulate(
     drive: Any = DEFAULT_DRIVE,
     controller: ControllerLike | None = REFERENCE,
