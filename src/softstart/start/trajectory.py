@@ -91,7 +91,8 @@ class StartRecorder:
 
     def finished(self) -> Trajectory:
         """What has been recorded."""
-        spans, events = min(int(self.state.n_spans), len(self.spans)), int(self.state.n_events)
+        now = self.state
+        spans, events = min(int(now.n_spans), len(self.spans)), int(now.n_events)
         states = np.zeros((spans + 1, self.spans.shape[1]))
         states[:spans] = self.spans[:spans]
         start.note_state(self.work, states[spans])
@@ -102,9 +103,9 @@ class StartRecorder:
     @property
     def of_shafts(self) -> NDArray[np.void]:
         """What is noted of each shaft: its largest torque, the time of that, its largest impulse, ..."""
-        noted = np.zeros(self.input.count - 1, rec.SHAFT_NOTES)
+        now, noted = self.state, np.zeros(self.input.count - 1, rec.SHAFT_NOTES)
         for name in rec.SHAFT_NOTES.names:
-            noted[name] = self.state[name][: noted.size]
+            noted[name] = now[name][: noted.size]
         return noted
 
 
