@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 33341, "tests": 21301}
+MOST = {"src, controllers": 32779, "tests": 21492}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 93  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -10,7 +10,8 @@ import pytest
 from softstart import DataSheet, Drive, InputError, compare, simulate, tune
 from softstart.controller import make_controller
 from softstart.drive import library
-from softstart.drive.data_sheet import BAND, UnknownStiffness
+from softstart.drive.data_sheet import UnknownStiffness
+from softstart.drive.data_sheet_words import BAND
 from softstart.reporting import report
 from softstart.start.comparison import SOFT_END
 from softstart.views.starts import both_ends, comparison_sheet

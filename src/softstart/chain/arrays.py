@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.elements import Shaft
+from softstart.chain.elements import ChainParts, Shaft
 from softstart.drive import ContactLaw
-
-if TYPE_CHECKING:
-    from softstart.chain.model import Chain
 
 Flags = NDArray[np.bool_]
 
@@ -120,7 +116,7 @@ class ChainArrays:
         return shares
 
 
-def arrays_at(chain: Chain, index: int) -> ChainArrays:
+def arrays_at(chain: ChainParts, index: int) -> ChainArrays:
     """The chain at the shaft of mass `index`.
 
     With `i` the speed of a shaft over that of the reference: inertias, dampings and stiffnesses times `i^2`,
@@ -183,7 +179,7 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
     return dampings
 
 
-def _twists(chain: Chain, gap: Vector, c: Vector, pulls: Vector) -> Vector:
+def _twists(chain: ChainParts, gap: Vector, c: Vector, pulls: Vector) -> Vector:
     """Twists of the shafts at the chain's position; those of an unknown one are 0, its middle.
 
     The driving flank is that on which the motor drives the masses behind the shaft. Hanging, each shaft is

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from softstart.chain.elements import Mass, Motor, Shaft
+from softstart.chain.elements import ChainParts, Mass, Motor, Shaft
 from softstart.errors import Sentence
 from softstart.hints import nearest
 from softstart.quantities import show
-
-if TYPE_CHECKING:
-    from softstart.chain.model import Chain
 
 BRANCHES = (
     "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
@@ -62,11 +58,11 @@ def mistakes_of(
     return wrong
 
 
-def warnings_of(chain: Chain) -> Iterator[str]:
-    """Sentences on what a chain leaves out that decides its shaft torques."""
+def warnings_of(chain: ChainParts, load_torque: float) -> Iterator[str]:
+    """Sentences on what a chain with this torque of all loads leaves out that decides its shaft torques."""
     for name in (mass.name for mass in chain.masses if math.isinf(mass.inertia)):
         yield f"{name} stays at rest: strategies are set up for the two masses of the chain without it."
-    if chain.motor is not None and chain.motor.starting_torque <= float(chain.at_motor_shaft().Mc.sum()):
+    if chain.motor is not None and chain.motor.starting_torque <= load_torque:
         yield (
             "The starting torque is not above the load torque: K_dyn, which refers to it, says little. "
             "For a motor torque over speed see docs/howto/motor-torque-over-speed.md."

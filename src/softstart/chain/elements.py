@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
-from typing import Any, ClassVar, Literal, Self, get_args
+from typing import Any, ClassVar, Literal, Protocol, Self, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind, Position
 from softstart.input.documents import DocumentTable
@@ -321,3 +321,21 @@ MASS = DocumentTable("mass", tuple(Mass.PARAMETERS.values()), many=True, least=2
 SHAFT = DocumentTable("shaft", tuple(Shaft.PARAMETERS.values()), many=True, least=1)
 MOTOR = DocumentTable("motor", tuple(Motor.PARAMETERS.values()), required=False)
 TABLES = (TOP, MASS, SHAFT, MOTOR, START)
+
+
+class ChainParts(Protocol):
+    """What a `Chain` is made of, for functions on which it depends itself."""
+
+    @property
+    def masses(self) -> tuple[Mass, ...]: ...
+    @property
+    def shafts(self) -> tuple[Shaft, ...]: ...
+    @property
+    def motor(self) -> Motor | None: ...
+    @property
+    def position(self) -> str: ...
+    @property
+    def motor_index(self) -> int: ...
+    @property
+    def load_index(self) -> int: ...
+    def speed_ratios(self, reference: int) -> tuple[float, ...]: ...

@@ -38,8 +38,8 @@ from softstart.chain.elements import (
 from softstart.chain.unreduced import Unreduced
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machine
 from softstart.drive.checks import wrong_units
+from softstart.drive.machine import TwoMasses
 from softstart.drive.model import BY_PATH
-from softstart.drive.plausibility import TwoMasses
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, construct, document_text, read_document
@@ -319,7 +319,7 @@ class Chain(Machine):
         >>> Chain.load("tractor-like").warnings
         ()
         """
-        return tuple(warnings_of(self))
+        return tuple(warnings_of(self, float(self.at_motor_shaft().Mc.sum())))
 
     # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from softstart.chain.elements import Motor
 from softstart.drive import Machine
 from softstart.errors import InputError
-
-if TYPE_CHECKING:
-    from softstart.chain.model import Chain
 
 
 @Machine.register
@@ -33,7 +30,7 @@ class Unreduced:
     softstart.errors.InputError: load = 'table': the node of the first elastic mode ... (fitted_to).
     """
 
-    def __init__(self, chain: Chain, sentences: Iterable[str]) -> None:
+    def __init__(self, chain: Machine, sentences: Iterable[str]) -> None:
         self._chain, self._sentences = chain, sentences
 
     @property

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from softstart.drive.data_sheet_mechanics import slope_sine, stiffnesses
+from softstart.drive.data_sheet_values import SheetValues
 from softstart.drive.data_sheet_words import ABOUT, INSTEAD, NEEDED
 from softstart.input.gear import Gear
-
-if TYPE_CHECKING:
-    from softstart.drive.data_sheet import DataSheet
 
 TWICE = {
     "rope_length": "how stiff the rope is", "radius": "how large the wheel or drum is",
@@ -19,7 +16,7 @@ TWICE = {
 }  # fmt: skip
 
 
-def contradictions(sheet: DataSheet) -> Iterator[str]:
+def contradictions(sheet: SheetValues) -> Iterator[str]:
     """What is missing for this machine, what contradicts something else, and what stands alone."""
     given, of = sheet.given(), sheet.PARAMETERS
     for name in NEEDED[sheet.machine]:
@@ -61,7 +58,7 @@ def contradictions(sheet: DataSheet) -> Iterator[str]:
         )
 
 
-def _load_in_doubt(sheet: DataSheet) -> Iterator[str]:
+def _load_in_doubt(sheet: SheetValues) -> Iterator[str]:
     """What of the load would mean something else than what it says."""
     given, of = sheet.given(), sheet.PARAMETERS
     if sheet.active_torque and sheet.machine != "hoist" and "friction" not in given:
@@ -86,7 +83,7 @@ def _load_in_doubt(sheet: DataSheet) -> Iterator[str]:
         )
 
 
-def _given_twice(sheet: DataSheet) -> Iterator[str]:
+def _given_twice(sheet: SheetValues) -> Iterator[str]:
     """Pairs of values that say the same thing, and not the same value."""
     given, of, rated = sheet.given(), sheet.PARAMETERS, sheet.rated
     for name, other in INSTEAD.items():

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from softstart.drive.data_sheet_mechanics import MotorSide, parts_text, total_stiffness
+from softstart.drive.data_sheet_values import SheetValues
 from softstart.drive.model import Drive
 from softstart.input.documents import literal
 from softstart.quantities import Units, shortest
-
-if TYPE_CHECKING:
-    from softstart.drive.data_sheet import DataSheet
 
 SHOWN_IN = {"kW": 1e3, "ms": 1e-3}  # units of a drive file that are not those of SI
 
@@ -24,8 +22,8 @@ class Entry(NamedTuple):
     source: str
 
 
-def drive_entries(sheet: DataSheet, side: MotorSide) -> dict[str, Entry]:
-    """The lines of the drive file by parameter of a drive."""
+def drive_entries(sheet: SheetValues, side: MotorSide, motion: str) -> dict[str, Entry]:
+    """The lines of the drive file by parameter of a drive; `motion` says how fast the load is."""
     gear, load, mark, given = side.gear, side.load, sheet.mark, sheet.given()
     stiffness, stiffness_from = total_stiffness(sheet, side)
     damping = 2.0 * sheet.damping_ratio * math.sqrt(stiffness * side.J1 * side.J2 / (side.J1 + side.J2))
@@ -59,7 +57,7 @@ def drive_entries(sheet: DataSheet, side: MotorSide) -> dict[str, Entry]:
         "load_inertia": output_entry(sheet, side, side.J2, "kg*m^2",
                                      f"{load.inertia_from}; {through_gear(sheet, side, side.J2)}"),
         **load_entries(sheet, side),
-        "target_speed": entry(sheet.rated_speed, "rad/s", f"rated speed: {sheet.motion}"),
+        "target_speed": entry(sheet.rated_speed, "rad/s", f"rated speed: {motion}"),
     }  # fmt: skip
     limits = sheet.permissible_torque, sheet.permissible_output_torque
     if is_geared(sheet):
@@ -73,7 +71,7 @@ def drive_entries(sheet: DataSheet, side: MotorSide) -> dict[str, Entry]:
     return {name: one for name, one in entries.items() if one.value is not None}
 
 
-def load_entries(sheet: DataSheet, side: MotorSide) -> dict[str, Entry]:
+def load_entries(sheet: SheetValues, side: MotorSide) -> dict[str, Entry]:
     """The torque of the load by its parts, and the start position that they decide."""
     load, active, friction, hoist = side.load, side.active, side.friction, sheet.machine == "hoist"
 
@@ -103,12 +101,12 @@ def load_entries(sheet: DataSheet, side: MotorSide) -> dict[str, Entry]:
     }
 
 
-def is_geared(sheet: DataSheet) -> bool:
+def is_geared(sheet: SheetValues) -> bool:
     """Whether there is a gear, so that values at the output are others than at the motor."""
     return bool({"ratio", "efficiency"} & sheet.given().keys())
 
 
-def through_gear(sheet: DataSheet, side: MotorSide, at_motor: float) -> str:
+def through_gear(sheet: SheetValues, side: MotorSide, at_motor: float) -> str:
     """What a value comes through from the load, and its size at the motor."""
     gear, driven = side.gear, "driving the motor " * side.overhauling
     shared = f", shared by {sheet.motors:.5g} motors" if sheet.motors != 1.0 else ""
@@ -120,7 +118,7 @@ def through_gear(sheet: DataSheet, side: MotorSide, at_motor: float) -> str:
 
 
 def output_entry(
-    sheet: DataSheet, side: MotorSide, value: float, unit: str, source: str, behind: object = True
+    sheet: SheetValues, side: MotorSide, value: float, unit: str, source: str, behind: object = True
 ) -> Entry:
     """An entry that is shown at the output, where it can be known there: as the sheet says it."""
     if not (is_geared(sheet) and behind):

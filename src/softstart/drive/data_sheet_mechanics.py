@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from softstart.drive.checks import GRAVITY
-from softstart.drive.data_sheet_words import RESISTANCE
+from softstart.drive.data_sheet_values import SheetValues
+from softstart.drive.data_sheet_words import BAND, METAL, RESISTANCE
 from softstart.input.gear import Gear
 
-if TYPE_CHECKING:
-    from softstart.drive.data_sheet import DataSheet
-
-# elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
-# K_dyn is the higher one, and results are compared with those of the soft end
-BAND = (3.0, 30.0)
 STEEL = 79.3e9  # N/m^2, shear modulus
-METAL = 0.46  # metallic cross-section of a rope over its diameter squared, EN 12385: class 6x36, steel core
 
 
 class OutputLoad(NamedTuple):
@@ -50,18 +44,29 @@ class MotorSide(NamedTuple):
         return bool(self.gear.load < 0.0)
 
 
-def arm(sheet: DataSheet) -> float:
+def arm(sheet: SheetValues) -> float:
     """Radius on which the load moves with the output, m."""
     radius = sheet.radius if sheet.diameter is None else 0.5 * sheet.diameter
     return (radius or 0.0) / sheet.reeving
 
 
-def slope_sine(sheet: DataSheet) -> float:
+def load_speed(sheet: SheetValues) -> float:
+    """Speed of the load at the rated speed of the motor: m/s, of a rotor rad/s."""
+    return sheet.rated_speed / sheet.ratio * (1.0 if sheet.machine == "rotor" else arm(sheet))
+
+
+def mean_acceleration(sheet: SheetValues, side: MotorSide) -> float:
+    """Mean acceleration of the load under the starting torque, m/s2, of a rotor rad/s2."""
+    accelerating = side.Ms - side.active - side.friction
+    return load_speed(sheet) / sheet.rated_speed * accelerating / (side.J1 + side.J2)
+
+
+def slope_sine(sheet: SheetValues) -> float:
     """Sine of the slope of track or belt."""
     return sheet.rise / sheet.length if sheet.rise and sheet.length else math.sin(sheet.slope)
 
 
-def motor_side(sheet: DataSheet) -> MotorSide:
+def motor_side(sheet: SheetValues) -> MotorSide:
     """The machine at the shaft of one of its motors."""
     load, motors = output_load(sheet), sheet.motors
     efficiency = sheet.efficiency if {"efficiency", "ratio"} & sheet.given().keys() else 1.0
@@ -78,7 +83,7 @@ def motor_side(sheet: DataSheet) -> MotorSide:
     )  # fmt: skip
 
 
-def output_load(sheet: DataSheet) -> OutputLoad:
+def output_load(sheet: SheetValues) -> OutputLoad:
     """The whole load at the output."""
     inertia, friction, active = sheet.output_inertia, sheet.friction, sheet.active_torque
     J = [f"{inertia:.5g} kg m^2 at the output"] if inertia else []
@@ -106,7 +111,7 @@ def output_load(sheet: DataSheet) -> OutputLoad:
     return OutputLoad(inertia, ", ".join(J), active, ", ".join(M), friction, ", ".join(F))
 
 
-def stiffnesses(sheet: DataSheet, gear: Gear) -> dict[str, float]:
+def stiffnesses(sheet: SheetValues, gear: Gear) -> dict[str, float]:
     """By part that is given, N m/rad at the motor shaft."""
     rope, parts = sheet.rope_stiffness, {}
     if sheet.rope_length and sheet.rope_diameter:
@@ -127,7 +132,7 @@ def stiffnesses(sheet: DataSheet, gear: Gear) -> dict[str, float]:
     return parts
 
 
-def gaps(sheet: DataSheet, gear: Gear) -> dict[str, float]:
+def gaps(sheet: SheetValues, gear: Gear) -> dict[str, float]:
     """By part that has one, rad at the motor shaft."""
     parts = {}
     if sheet.coupling_play and sheet.coupling_diameter:
@@ -139,7 +144,7 @@ def gaps(sheet: DataSheet, gear: Gear) -> dict[str, float]:
     return parts
 
 
-def total_stiffness(sheet: DataSheet, side: MotorSide) -> tuple[float, str]:
+def total_stiffness(sheet: SheetValues, side: MotorSide) -> tuple[float, str]:
     """Of all parts in series, N m/rad at the motor shaft, and its source."""
     if side.stiffnesses:
         rigid = "; rope assumed rigid" if "rope" in sheet.assumed else ""

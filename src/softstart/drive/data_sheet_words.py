@@ -10,6 +10,11 @@ from typing import Literal
 from softstart.input.parameters import Parameter, bare, read_value
 from softstart.quantities import RefusedError
 
+# elastic frequencies of most drives with gears, Hz: where no stiffness is known, the stiff end counts, whose
+# K_dyn is the higher one, and results are compared with those of the soft end
+BAND = (3.0, 30.0)
+METAL = 0.46  # metallic cross-section of a rope over its diameter squared, EN 12385: class 6x36, steel core
+
 MachineKind = Literal["hoist", "travel", "belt", "rotor"]
 MACHINES: Mapping[str, str] = {
     "hoist": "a load on ropes",

@@ -4,17 +4,44 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 from softstart.arrays import Vector
 from softstart.drive.limits import Limits
-from softstart.drive.plausibility import TwoMasses
 from softstart.input.gear import Gear
 from softstart.input.parameters import Parameter, ParameterValue
 
-if TYPE_CHECKING:
-    from softstart.chain.elements import Motor
-    from softstart.drive.model import Drive
+
+class TwoMasses(NamedTuple):
+    """A machine as two masses at the motor shaft; NaN for what it does not have.
+
+    `travel` is that through the gap to the driving flank, `speed` what the load is to reach.
+    """
+
+    J1: float  # kg m2
+    J2: float  # kg m2
+    c: float  # N m/rad
+    d: float  # N m s/rad
+    gap: float  # rad
+    travel: float  # rad
+    Ms: float  # N m, less the friction of the motor
+    Mc: float  # N m
+    active: bool  # whether a part of Mc acts always
+    friction: float  # the rest of Mc, N m, Coulomb friction
+    speed: float  # rad/s
+    ratio: float  # turns of the motor for one of the output
+
+    @property
+    def falling(self) -> float:
+        """The torque that moves the load while the gap is open, in size, N m: 0 where friction holds it."""
+        return max(abs(self.Mc - self.friction) - self.friction, 0.0)
+
+    @property
+    def kind(self) -> str:
+        """The parts of the load torque in words: "active", "reactive", or both with their size."""
+        if self.active and self.friction > 0.0:
+            return f"{self.Mc - self.friction:.4g} N m active and {self.friction:.4g} N m friction"
+        return "active" if self.active else "reactive"
 
 
 class Machine(ABC):
@@ -65,7 +92,7 @@ class Machine(ABC):
         @property
         def target_speed(self) -> float | None: ...
         @property
-        def motor(self) -> Drive | Motor | None: ...  # what has the parameters of the motor
+        def motor(self) -> Any: ...  # what has its parameters: a Drive, a Motor, or None
         @property
         def brake(self) -> str: ...
         @property
@@ -187,12 +214,12 @@ class Machine(ABC):
 
     @property
     @abstractmethod
-    def design_drive(self) -> Drive:
+    def design_drive(self) -> Any:  # a Drive, which derives from this
         """The drive for which controllers are set up: of two masses, at one position."""
 
     @property
     @abstractmethod
-    def two_masses(self) -> Drive:
+    def two_masses(self) -> Any:  # a Drive
         """The machine as a drive: itself, or the modal reduction of a chain, whatever its error."""
 
     @property

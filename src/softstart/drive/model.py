@@ -13,8 +13,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
-from softstart.drive.machine import Machine
-from softstart.drive.plausibility import TwoMasses
+from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library

@@ -4,51 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any
 
 from softstart.drive.checks import GRAVITY, elastic_frequency
-
-if TYPE_CHECKING:
-    from softstart.chain.elements import Motor
-    from softstart.drive.machine import Machine
-    from softstart.drive.model import Drive
+from softstart.drive.machine import Machine, TwoMasses
 
 # usual speeds of the load, m/min; lifts, which have a counterweight, are faster
 USUAL_SPEEDS = {"hoist": (0.5, 150.0), "travel": (1.0, 300.0), "belt": (1.0, 480.0)}
 LIFTS = 600.0
 ADHESION = (0.12, 0.2)  # force over weight that steel wheels transmit to rails, damp and dry
-
-
-class TwoMasses(NamedTuple):
-    """A machine as two masses at the motor shaft; NaN for what it does not have.
-
-    `travel` is that through the gap to the driving flank, `speed` what the load is to reach.
-    """
-
-    J1: float  # kg m2
-    J2: float  # kg m2
-    c: float  # N m/rad
-    d: float  # N m s/rad
-    gap: float  # rad
-    travel: float  # rad
-    Ms: float  # N m, less the friction of the motor
-    Mc: float  # N m
-    active: bool  # whether a part of Mc acts always
-    friction: float  # the rest of Mc, N m, Coulomb friction
-    speed: float  # rad/s
-    ratio: float  # turns of the motor for one of the output
-
-    @property
-    def falling(self) -> float:
-        """The torque that moves the load while the gap is open, in size, N m: 0 where friction holds it."""
-        return max(abs(self.Mc - self.friction) - self.friction, 0.0)
-
-    @property
-    def kind(self) -> str:
-        """The parts of the load torque in words: "active", "reactive", or both with their size."""
-        if self.active and self.friction > 0.0:
-            return f"{self.Mc - self.friction:.4g} N m active and {self.friction:.4g} N m friction"
-        return "active" if self.active else "reactive"
 
 
 def plausibility_warnings(machine: Machine) -> list[str]:
@@ -175,7 +139,7 @@ def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
     return 1.0 + decay * math.sqrt(1.0 + of.c * J * 2.0 * a * of.travel / mean**2)
 
 
-def _not_the_rated_torque(motor: Drive | Motor | None) -> Iterator[str]:
+def _not_the_rated_torque(motor: Any) -> Iterator[str]:
     """Of a drive, or of the motor of a chain; None for a chain without one."""
     if motor is None:
         return

@@ -17,8 +17,7 @@ from softstart.controller.parameters import ControllerParameter, declared_parame
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.data_sheet import UnknownStiffness
-from softstart.drive.machine import Machine
-from softstart.drive.plausibility import TwoMasses
+from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
 from softstart.start.batch import prepared

@@ -17,7 +17,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
-from softstart.drive.data_sheet_mechanics import BAND
+from softstart.drive.data_sheet_words import BAND
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.drive.plausibility import plausibility_warnings

@@ -9,7 +9,7 @@ from typing import Any
 
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
-from softstart.drive.data_sheet_mechanics import BAND
+from softstart.drive.data_sheet_words import BAND
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import Sentence
 from softstart.start.comparison import SOFT_END, Comparison

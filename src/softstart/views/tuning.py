@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.drive.data_sheet_mechanics import BAND
+from softstart.drive.data_sheet_words import BAND
 from softstart.errors import Sentence
 from softstart.tuning.problem import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
