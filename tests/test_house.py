@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MOST = {"src, controllers": 32779, "tests": 21492}
 LONGEST_FILE = 560  # statements
-LONGEST_FUNCTION = 93  # statements
+LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
