@@ -202,7 +202,7 @@ class Report(Result):
         """The recommendation, what the steps of the inverter do to it, and what no start can go below.
 
         >>> from softstart import report
-        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-49:]
+        >>> report("crane-4amtkf", controllers=["shaped"], budget=0.0).answer[-46:]
         ' below 0.977; the lowest K_dyn known is 0.978.'
         """
         from softstart.reporting.document import text_answer  # which renders a Report
