@@ -5,9 +5,10 @@ The longest prefix of a module's name counts.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sphinx.application import Sphinx
+if TYPE_CHECKING:  # the table is read by tests too, where Sphinx is not installed
+    from sphinx.application import Sphinx
 
 PAGES = {
     "softstart.balancing": ("paper-b", "theory/balancer"),
