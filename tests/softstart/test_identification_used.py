@@ -176,7 +176,7 @@ def test_limits_are_kept_at_the_upper_end_or_not_at_all(found: Identification) -
 def test_gains_are_tuned_over_the_drives_that_are_left(
     found: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("softstart.tuning.solving.DRAWN", 20)
+    monkeypatch.setattr("softstart.tuning.problem.DRAWN", 20)
     quick: Any = {"certified": False, "workers": 1, "schedule": False, "restarts": 1, "generations": 2}
     tuned = tune(found, "ramp", free=["time"], start_time="1.6x", **quick)
     assert len(tuned.problem.scenarios) == 21

@@ -329,11 +329,11 @@ def _unknown_parameters(estimates: Sequence[Estimate]) -> list[str]:
             reasons.setdefault(estimate.reason, []).append(estimate.name)
     if not reasons:
         return []
-    remedy = "log an experiment that identifies it"
+    remedy, command = "log an experiment that identifies it", "softstart plan"
     if AT_LIMIT in reasons:
-        remedy = f"start from another initial guess of {listed(reasons[AT_LIMIT])}"
+        remedy, command = f"start from another initial guess of {listed(reasons[AT_LIMIT])}", "--set"
     groups = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
-    return [f"Unknown: {groups}. Remedy: {remedy}."]
+    return [Sentence(f"Unknown: {groups}.", f"Remedy: {remedy} ({command}).", page=f"Remedy: {remedy}.")]
 
 
 def _scale_warning(guess: Drive, identified: Drive) -> list[str]:

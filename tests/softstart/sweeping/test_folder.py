@@ -185,11 +185,11 @@ from softstart import sweep
 from softstart.stopping import stop_now
 from softstart.sweeping import store
 
-begin = store.Store._open
+begin = store.FolderStore._open
 def opened(self, folder):
     begin(self, folder)
     {how}
-store.Store._open = opened
+store.FolderStore._open = opened
 sweep("crane-4amtkf", "ramp", {grid}, to={to!r}, workers=1, chunk=2)
 """
 

@@ -227,7 +227,7 @@ def test_what_is_later_than_allowed_is_not_set_beside_an_optimum_in_time():
     assert float(price.schedule) < 0.5 * float(price.schedule_optimum)
     for ratio in ("schedule_over_optimum", "robust_over_optimum", "robust_over_schedule"):
         assert math.isnan(float(price[ratio]))
-    assert "1 of 1 cells not in time" in " ".join(conclusions(tuned))
+    assert "1 of 1 cells late" in " ".join(conclusions(tuned))
 
 
 def test_one_set_is_written_with_few_digits_and_units_and_is_what_was_promised(tmp_path):
