@@ -18,6 +18,7 @@ BRANCHES = (
 
 
 def no_such_mass(place: str, names: list[str]) -> str:
+    """The sentence on a mass that a chain with these masses does not have, and the nearest name."""
     meant = nearest(place, names)
     hint = f"did you mean {show(meant)}?" if meant else f"its masses are {', '.join(map(show, names))}."
     return f"the chain has no mass of this name; {hint}"

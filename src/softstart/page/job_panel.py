@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Hashable
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -59,7 +60,7 @@ def state_of(job: Job, state: JobState) -> str:
     return f"Done in {duration(job.seconds)}." if state is JobState.DONE else state.value
 
 
-class JobPanel:
+class JobPanel(ABC):
     """A form, the one job that it starts, and its result, the same in all tabs of a user.
 
     A subclass builds its fields in `form` and says in `task` what is computed; InputError for a wrong field.
@@ -103,12 +104,12 @@ class JobPanel:
             hidden.set_visibility(False)
         ui.timer(POLL, self.refresh)
 
-    def form(self) -> None:
+    def form(self) -> None:  # noqa: B027  # a panel may have no fields
         """The fields of the panel."""
 
+    @abstractmethod
     def task(self) -> Task:
         """What is computed."""
-        raise NotImplementedError
 
     @property
     def mine(self) -> bool:
