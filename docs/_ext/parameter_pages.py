@@ -8,8 +8,8 @@ from typing import Any
 
 from command_pages import cell, prose
 
-from softstart.balancing.engine import TABLES as ENGINE
-from softstart.chain.elements import TABLES as CHAIN
+from softstart.balancing import Engine
+from softstart.chain import Chain
 from softstart.clutch.model import Clutch
 from softstart.controller import controller_class, controller_names, declared_parameters
 from softstart.controller.base import Sensor
@@ -47,7 +47,7 @@ def drive_file() -> str:
 
 def chain_file() -> str:
     """Every key of a chain file."""
-    return _tables(CHAIN)
+    return _tables(Chain.TABLES)
 
 
 def clutch_file() -> str:
@@ -57,7 +57,7 @@ def clutch_file() -> str:
 
 def engine_file() -> str:
     """Every key of an engine file."""
-    return _tables(ENGINE)
+    return _tables(Engine.TABLES)
 
 
 def _tables(tables: Iterable[DocumentTable]) -> str:

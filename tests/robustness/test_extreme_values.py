@@ -12,8 +12,7 @@ import sys
 import pytest
 from tests.patience import patient
 
-from softstart import Drive
-from softstart.chain.elements import TABLES
+from softstart import Chain, Drive
 
 MEMORY = 3 << 30  # bytes of address space
 SECONDS = 12.0  # of processor time for one start
@@ -59,7 +58,7 @@ def numbers(tables, part: str = "") -> list[str]:
     ]
 
 
-DRIVE, CHAIN = numbers(Drive.TABLES), numbers(TABLES, "[2]")
+DRIVE, CHAIN = numbers(Drive.TABLES), numbers(Chain.TABLES, "[2]")
 GROUPS = [
     (machine, keys[begin::8])
     for machine, keys in (("crane-4amtkf", DRIVE), ("crane-4-mass", CHAIN))

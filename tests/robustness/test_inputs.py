@@ -25,10 +25,10 @@ from pathlib import Path
 import click
 import pytest
 
+from softstart.balancing import Engine
 from softstart.balancing.engine import LIBRARY as ENGINES
-from softstart.balancing.engine import TABLES as ENGINE_TABLES
+from softstart.chain import Chain
 from softstart.chain.elements import LIBRARY as CHAINS
-from softstart.chain.elements import TABLES as CHAIN_TABLES
 from softstart.cli.commands import COMMANDS, cli
 from softstart.cli.main import main
 from softstart.clutch.model import LIBRARY as CLUTCHES
@@ -71,10 +71,10 @@ LEFT_OUT = {
 PATHS = {
     "drive": [p.path for p in PARAMETERS.values()],
     "chain": [
-        p.path.replace(".", "[1].", 1) if t.many else p.path for t in CHAIN_TABLES for p in t.parameters
+        p.path.replace(".", "[1].", 1) if t.many else p.path for t in Chain.TABLES for p in t.parameters
     ],
     "clutch": [p.path for t in Clutch.TABLES for p in t.parameters],
-    "engine": [p.path for t in ENGINE_TABLES for p in t.parameters],
+    "engine": [p.path for t in Engine.TABLES for p in t.parameters],
 }
 KIND = {"simulate": "drive", "reduce": "chain", "clutch": "clutch", "balance": "engine"}
 SHIPPED: dict[str, Callable[[], str]] = {

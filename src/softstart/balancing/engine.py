@@ -13,11 +13,9 @@ with it.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,38 +34,15 @@ from softstart.balancing.parts import (
 from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
 from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
-from softstart.input.documents import DocumentTable, construct, document_text, read_document
+from softstart.input.documents import document_text
 from softstart.input.files import Library
-from softstart.input.parameter_set import ParameterSet
-from softstart.input.parameters import Parameter
+from softstart.input.parameter_file import ParameterFile
+from softstart.input.parameter_set import Rows, component, parameter
 
 TURNS = np.roll(np.arange(-HIGHEST, HIGHEST + 1.0), -HIGHEST)  # of F: 0, 1 .. 24, -24 .. -1
 ORDERS = 0.5 * np.arange(2 * HIGHEST + 1)  # of torques: multiples 0, 0.5, 1 .. of the crank speed
 ROUNDING = 1e-13  # of the sum of the sizes
 LIBRARY = Library("softstart.balancing", "an engine", "engines")
-
-TOP = DocumentTable(
-    "",
-    (
-        Parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine"),
-        Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
-        Parameter("assumed", "", "which values are assumed", '"rod_length, all masses"', default=""),
-    ),
-)
-
-# the parts of an engine that are tables of their own, by the name of their field
-PARTS: dict[str, type[ParameterSet]] = {
-    "cylinders": Cylinders, "masses": Masses, "counterweights": Counterweights, "gas": SimpleCycle,
-    "operation": Operation,
-}  # fmt: skip
-OPTIONAL = "cycle", "balancer"  # tables
-PART_TABLES = {
-    name: [replace(table, required=table.name not in OPTIONAL) for table in part.TABLES]
-    for name, part in PARTS.items()
-}
-SHAFT = replace(BalancerShaft.TABLES[0], many=True)
-TABLES = (TOP, *(table for tables in PART_TABLES.values() for table in tables), SHAFT)
-USUAL = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed", "speeds"), "rpm")
 
 
 def force_at(force: Complex, phi: ArrayLike) -> Complex:
@@ -132,8 +107,7 @@ def shaking_of_shafts(shafts: Sequence[BalancerShaft]) -> tuple[Complex, Complex
     return cleaned(force, scale), couple, moment
 
 
-@dataclass(frozen=True)
-class Engine:
+class Engine(ParameterFile):
     """A four-stroke engine: cylinders in one row, their masses and pressure, counterweights and shafts.
 
     Parameters
@@ -169,66 +143,34 @@ class Engine:
     (749.9, 2)
     """
 
-    cylinders: Cylinders
-    masses: Masses
-    gas: SimpleCycle | None
-    operation: Operation
-    counterweights: Counterweights = field(default_factory=Counterweights)
-    shafts: tuple[BalancerShaft, ...] = ()
-    name: str = "unnamed engine"
-    source: str = ""
-    assumed: str = ""
+    WHAT: ClassVar[str] = "an engine"
+    LIBRARY: ClassVar[Library] = LIBRARY
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "shafts", tuple(self.shafts))
+    # fmt: off
+    cylinders: Cylinders = component(Cylinders, kw_only=False)
+    masses: Masses = component(Masses, kw_only=False)
+    counterweights: Counterweights = component(Counterweights, default=Counterweights())
+    gas: SimpleCycle | None = component(SimpleCycle, default=None)
+    operation: Operation = component(Operation)
+    shafts: Rows[BalancerShaft] = component(BalancerShaft, many=True, default=())
+    name: str = parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine")
+    source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
+    assumed: str = parameter("assumed", "", "which values are assumed", '"rod_length, all masses"',
+        default="")
+    # fmt: on
+
+    def contradictions(self) -> Iterator[str]:
+        """Sentences on pressures below that without heat."""
         for speed in (self.gas.speeds or (0.0,)) if self.gas else ():
-            self._weights(speed, None)  # refuses a pressure below that without heat
-
-    @classmethod
-    def load(cls, engine: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Engine:
-        """An engine from its TOML file, or a shipped one by its name; `also` as in `from_toml`."""
-        text, where = LIBRARY.find(engine)
-        return cls.from_toml(text, where=where, also=also)
-
-    @classmethod
-    def from_toml(cls, text: str, *, where: str = "", also: Mapping[str, object] | None = None) -> Engine:
-        """An engine from TOML text; `also` holds changes as typed, {"masses.reciprocating": "0.7 kg"}.
-
-        >>> engine = Engine.load("vaz-11113")
-        >>> Engine.from_toml(engine.to_toml()) == engine
-        True
-        """
-        document = read_document(text, TABLES, "an engine", where=where, also=also, usual=USUAL)
-        before = f"{where}: " if where else ""
-        wrong: list[str] = []
-        parts: dict[str, Any] = {"gas": None}
-        for key, make in PARTS.items():
-            first, *others = (table.name for table in PART_TABLES[key])
-            if document[first] is not None:
-                values = document[first] | {
-                    k: v for name in others for k, v in (document[name] or {}).items()
-                }
-                parts[key] = construct(make, values, f"{before}[{first}] ", wrong)
-        parts["shafts"] = [
-            construct(BalancerShaft, row, f"{before}[shaft] {i}, ", wrong)
-            for i, row in enumerate(document["shaft"], 1)
-        ]
-        if wrong:
-            raise InputError(wrong)
-        try:
-            return cls(**parts, **document[""])
-        except InputError as error:
-            raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
+            try:
+                self._weights(speed, None)
+            except InputError as error:
+                yield from error.sentences
 
     def to_toml(self) -> str:
         """The engine as TOML text, which `from_toml` reads back to an equal one."""
-        top = {"name": self.name, "source": self.source, "assumed": self.assumed}
-        blocks: list[tuple[DocumentTable, Any]] = [(TOP, top)]
-        for key, tables in PART_TABLES.items():
-            if (part := getattr(self, key)) is not None:
-                blocks += [(table, part.values()) for table in tables]
-        blocks += [(SHAFT, shaft.values()) for shaft in self.shafts]
-        kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
+        blocks = ((table, holder.values().items()) for _, table, holder in self.blocks())
+        kept = ((table, {name: value for name, value in values if value != ""}) for table, values in blocks)
         return document_text(kept, units=False)
 
     # ---- figures -----------------------------------------------------------------------------------------

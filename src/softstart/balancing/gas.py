@@ -83,6 +83,7 @@ class SimpleCycle(ParameterSet, kw_only=False):
     """
 
     WHAT: ClassVar[str] = "a cycle"
+    USUAL: ClassVar[dict[str, str]] = {"speeds": "rpm"}
 
     compression_ratio: Number = parameter(
         "cycle.compression_ratio", "1", "compression ratio", "9.9", "above 0"

@@ -168,6 +168,7 @@ class Operation(ParameterSet, kw_only=False):
     """Speed range in rad/s, load (1 is full, 0 is idling), and the speed at which a balancer is tuned."""
 
     WHAT: ClassVar[str] = "an operation"
+    USUAL: ClassVar[dict[str, str]] = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed"), "rpm")
 
     lowest_speed: Number = parameter(
         "operation.lowest_speed", "rad/s", "lowest speed", '"850 rpm"', "above 0"

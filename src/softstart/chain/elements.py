@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any, ClassVar, Literal, Protocol, Self, get_args
 
-from softstart.drive import ContactLaw, Drive, LoadKind, Position
-from softstart.input.documents import DocumentTable
+from softstart.drive import ContactLaw, Drive, LoadKind
 from softstart.input.files import Library
 from softstart.input.parameter_set import (
     MaybeNumber,
@@ -18,7 +17,6 @@ from softstart.input.parameter_set import (
     like,
     parameter,
 )
-from softstart.input.parameters import Parameter
 
 Quantity = float | str  # a number in SI, or a string with a unit
 Side = Literal["before", "after"]
@@ -291,36 +289,6 @@ class Motor(ParameterSet):
     def keywords(self) -> dict[str, Any]:
         """The motor as keywords of `Drive`, which begins without torque."""
         return {key: v for key, v in self.values().items() if key in Drive.PARAMETERS and v is not None}
-
-
-TOP = DocumentTable(
-    "",
-    (
-        Parameter("name", "", "name of the chain", '"my chain"', default="unnamed chain"),
-        Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
-        Parameter("assumed", "", "list of the values that are assumed", '"all stiffnesses"', default=""),
-        Drive.PARAMETERS["units"],
-    ),
-)
-START = DocumentTable(
-    "start",
-    (
-        Parameter("load", "", "name of the mass that is to reach the target speed", '"drum"', default=""),
-        Parameter(
-            "target_speed", "rad/s", "speed, at the motor shaft, that the load is to reach", '"880 rpm"',
-            "above 0", default=None,
-        ),
-        Parameter(
-            "position", "", "position in all gaps at the start", '"hanging"', default="mid-gap",
-            choices=get_args(Position),
-        ),
-    ),
-    required=False,
-)  # fmt: skip
-MASS = DocumentTable("mass", tuple(Mass.PARAMETERS.values()), many=True, least=2)
-SHAFT = DocumentTable("shaft", tuple(Shaft.PARAMETERS.values()), many=True, least=1)
-MOTOR = DocumentTable("motor", tuple(Motor.PARAMETERS.values()), required=False)
-TABLES = (TOP, MASS, SHAFT, MOTOR, START)
 
 
 class ChainParts(Protocol):

@@ -8,43 +8,39 @@ frequencies work with.
 from __future__ import annotations
 
 import math
-import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
 from operator import attrgetter
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self, get_args
 
 import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.arrays import ChainArrays, arrays_at
 from softstart.chain.checks import BRANCHES, mistakes_of, no_such_mass, warnings_of
-from softstart.chain.elements import (
-    LIBRARY,
-    MASS,
-    MOTOR,
-    SHAFT,
-    START,
-    TABLES,
-    TOP,
-    Mass,
-    Motor,
-    Quantity,
-    Shaft,
-)
+from softstart.chain.elements import LIBRARY, Mass, Motor, Shaft
 from softstart.chain.unreduced import Unreduced
-from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machine
+from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machine, Position
 from softstart.drive.checks import wrong_units
 from softstart.drive.machine import TwoMasses
 from softstart.drive.model import BY_PATH
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
-from softstart.input.documents import DocumentTable, construct, document_text, read_document
+from softstart.input.documents import DocumentTable, document_text
+from softstart.input.files import Library
 from softstart.input.gear import NO_OUTPUT
-from softstart.input.parameters import Parameter, ParameterValue, Wording, read_values, sentences_of
+from softstart.input.parameter_file import ParameterFile
+from softstart.input.parameter_set import (
+    MaybeNumber,
+    ParameterSet,
+    Rows,
+    component,
+    like,
+    parameter,
+)
+from softstart.input.parameters import ParameterValue, Wording
 from softstart.quantities import show
 
 # mass[2].inertia, mass[drum].inertia, or mass_2_inertia
@@ -63,8 +59,7 @@ OWN_LIMITS = (
 BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joins|ends|parent)\b)")
 
 
-@dataclass(frozen=True, init=False)
-class Chain(Machine):
+class Chain(ParameterFile, Machine):
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
     Each quantity is a number in SI or a string with a unit, on its own shaft.
@@ -111,6 +106,7 @@ class Chain(Machine):
     """
 
     WHAT: ClassVar[str] = "a chain"
+    LIBRARY: ClassVar[Library] = LIBRARY
     # as a drive has it
     brake: ClassVar[str] = "none"
     release_time: ClassVar[float] = 0.0
@@ -119,106 +115,51 @@ class Chain(Machine):
     KIND: ClassVar[str] = "chain"
     LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 
-    masses: tuple[Mass, ...]
-    shafts: tuple[Shaft, ...]
-    motor: Motor | None
-    load_mass: str
-    target_speed: float | None
-    position: str
-    name: str
-    source: str
-    assumed: str
-    units: str
+    # fmt: off
+    masses: Rows[Mass] = component(Mass, many=True, least=2, kw_only=False)
+    shafts: Rows[Shaft] = component(Shaft, many=True, least=1, kw_only=False)
+    motor: Motor | None = component(Motor, default=None, kw_only=False)
+    load_mass: str = parameter("start.load", "", "name of the mass that is to reach the target speed",
+        '"drum"', default="")
+    target_speed: MaybeNumber = parameter("start.target_speed", "rad/s",
+        "speed, at the motor shaft, that the load is to reach", '"880 rpm"', "above 0", default=None)
+    position: Position = parameter("start.position", "", "position in all gaps at the start", '"hanging"',
+        default="mid-gap", choices=get_args(Position))
+    name: str = parameter("name", "", "name of the chain", '"my chain"', default="unnamed chain")
+    source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
+    assumed: str = parameter("assumed", "", "list of the values that are assumed", '"all stiffnesses"',
+        default="")
+    units: str = like(Drive, "units")
+    # fmt: on
 
-    def __init__(
-        self,
-        masses: Iterable[Mass],
-        shafts: Iterable[Shaft],
-        motor: Motor | None = None,
-        *,
-        load_mass: str = "",
-        target_speed: Quantity | None = None,
-        position: str = "mid-gap",
-        name: str = "unnamed chain",
-        source: str = "",
-        assumed: str = "",
-        units: str = "",
-    ) -> None:
-        numbered = enumerate(masses, start=1)
-        masses = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in numbered)
-        shafts = tuple(shafts)
-        if target_speed is None and motor is not None:
-            target_speed = motor.rated_speed
-        given = {"target_speed": target_speed, "position": position}
-        start, mistakes = read_values(given, START.by_key, Wording())
-        if masses:
-            moving = [mass.name for mass in masses if not math.isinf(mass.inertia)] or [masses[0].name]
-            load_mass = load_mass or moving[-1]
-            if motor is not None and not motor.mass:
-                motor = motor.replace(mass=moving[0])
-        wrong = sentences_of(mistakes) + mistakes_of(masses, shafts, motor, load_mass)
-        wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
-        if wrong:
-            raise InputError(wrong)
-        parts = {"masses": masses, "shafts": shafts, "motor": motor, "load_mass": load_mass}
-        vars(self).update(parts, name=name, source=source, assumed=assumed, units=units)
-        vars(self).update(target_speed=start["target_speed"], position=start["position"])
+    def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
+        super()._fill(_completed(given), *args, **known)
+
+    def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
+        if {"masses", "shafts", "load_mass"} <= values.keys():
+            parts = values["masses"], values["shafts"], values.get("motor"), values["load_mass"]
+            yield from (wording.before + sentence for sentence in mistakes_of(*parts))
+        yield from wrong_units(values, self.PARAMETERS["units"], wording)
 
     # ---- where chains come from --------------------------------------------------------------------------
 
     @classmethod
-    def load(cls, chain: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
-        """A chain from its TOML file, or a shipped one by its name; `also` as in `from_toml`.
-
-        >>> len(Chain.load("crane-4-mass").masses)
-        4
-        """
-        text, where = LIBRARY.find(chain)
-        return cls.from_toml(text, where=where, also=also)
-
-    @classmethod
-    def from_toml(cls, text: str, *, where: str = "", also: Mapping[str, object] | None = None) -> Self:
-        """A chain from TOML text; `also` holds changes as typed, {"mass[2].inertia": "0.7 kg*m^2"}.
-
-        >>> chain = Chain.load("tractor-like")
-        >>> Chain.from_toml(chain.to_toml()) == chain
-        True
-        """
+    def _from_document(
+        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
+    ) -> Self:
         try:
-            tables = read_document(text, TABLES, "a chain", where=where, also=also)
+            return super()._from_document(document, where, also)
         except InputError as error:
             branched = [BRANCHES] if any(map(BRANCHING.search, error.sentences)) else []
             sentences = [one + OWN_LIMITS * bool(OF_A_DRIVE.search(one)) for one in error.sentences]
             raise InputError([*sentences, *branched]) from None
-        before = f"{where}: " if where else ""
-        wrong: list[str] = []
-        start: dict[str, Any] = tables["start"] or {}
-        parts: dict[str, Any] = {
-            name: [
-                construct(part, row, f"{before}[{table}] {i}, ", wrong)
-                for i, row in enumerate(tables[table], 1)
-            ]
-            for name, table, part in (("masses", "mass", Mass), ("shafts", "shaft", Shaft))
-        }
-        parts["motor"] = tables["motor"] and construct(Motor, tables["motor"], f"{before}[motor], ", wrong)
-        parts |= {"load_mass" if key == "load" else key: value for key, value in start.items()}
-        chain = None if wrong else construct(cls, parts | tables[""], before, wrong)
-        if chain is None:
-            raise InputError(wrong)
-        return chain
 
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
-        rows: list[tuple[DocumentTable, Any]] = [(TOP, vars(self))]
-        for i, mass in enumerate(self.masses):
-            rows += [(MASS, mass.values()), *((SHAFT, shaft.values()) for shaft in self.shafts[i : i + 1])]
-        rows += [] if self.motor is None else [(MOTOR, self.motor.values())]
-        rows.append((START, self._start_values()))
-        return document_text((table, _without_defaults(table, values)) for table, values in rows)
-
-    def _start_values(self) -> dict[str, Any]:
-        """The values of the table [start], by key."""
-        return {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
+        blocks = {path: (table, _without_defaults(table, holder)) for path, table, holder in self.blocks()}
+        numbers = range(1, len(self.masses) + 1)  # masses and shafts alternate, as they are joined
+        joined = [f"{kind}[{i}]" for i in numbers for kind in ("mass", "shaft")]
+        return document_text(blocks[path] for path in ("", *joined, "motor", "start") if path in blocks)
 
     # ---- places ------------------------------------------------------------------------------------------
 
@@ -366,7 +307,7 @@ class Chain(Machine):
         """The chain at each position at which it may start: one, or three if that is unknown."""
         if self.position != "unknown":
             return {self.position: self}
-        return {one: replace(self, position=one) for one in UNKNOWN_POSITIONS}
+        return {one: self.replace(position=one) for one in UNKNOWN_POSITIONS}
 
     @property
     def two_masses(self) -> Drive:
@@ -460,7 +401,7 @@ class Chain(Machine):
             one if one.rigid or d > 0.0 else one.replace(damping=rate * one.stiffness, damping_ratio=None)
             for one, d in shafts
         ]
-        return replace(self, shafts=tuple(damped))
+        return self.replace(shafts=tuple(damped))
 
     @property
     def permissible_torques(self) -> Vector:
@@ -490,8 +431,7 @@ class Chain(Machine):
         kept = [i for i, mass in enumerate(self.masses) if not math.isinf(mass.inertia)]
         if len(kept) == len(self.masses):
             return self
-        return replace(
-            self,
+        return self.replace(
             masses=tuple(self.masses[i] for i in kept),
             shafts=self.shafts[kept[0] : kept[-1]],
         )
@@ -542,7 +482,7 @@ class Chain(Machine):
         chain = self
         if not any(shaft.gap for shaft in self.shafts) and origin is not None:
             shafts = zip(self.shafts, origin.shafts, strict=True)
-            chain = replace(self, shafts=tuple(one.replace(gap=first.gap) for one, first in shafts))
+            chain = self.replace(shafts=tuple(one.replace(gap=first.gap) for one, first in shafts))
         chain = chain.with_gap(gap)
         return chain if inertia == self.gap_and_inertia[1] else chain.with_values({"load_inertia": inertia})
 
@@ -556,25 +496,9 @@ class Chain(Machine):
         """
         masses, load = list(self.masses), self.load_index
         masses[load] = masses[load].replace(inertia=load_inertia * masses[load].inertia)
-        return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
+        return self.replace(masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
     # ---- parameters by their keys ------------------------------------------------------------------------
-
-    def parameters_by_path(self) -> dict[str, tuple[Parameter, Any]]:
-        """All parameters by their paths, each with its value.
-
-        >>> Chain.load("crane-4-mass").parameters_by_path()["shaft[2].gap"][1]
-        0.2
-        """
-        parameters = {p.name: (p, getattr(self, p.name)) for p in TOP.parameters}
-        parts: list[tuple[str, Mass | Shaft | Motor]] = [] if self.motor is None else [("motor", self.motor)]
-        parts += [(f"mass[{i}]", mass) for i, mass in enumerate(self.masses, 1)]
-        parts += [(f"shaft[{i}]", shaft) for i, shaft in enumerate(self.shafts, 1)]
-        for path, part in parts:
-            values = part.values()
-            parameters |= {f"{path}.{name}": (p, values[name]) for name, p in part.PARAMETERS.items()}
-        start = self._start_values()
-        return parameters | {f"start.{p.name}": (p, start[p.name]) for p in START.parameters}
 
     def parameter_keys(self) -> Iterator[str]:
         yield from (PARAMETERS[name].path for name in AGGREGATES)
@@ -603,7 +527,7 @@ class Chain(Machine):
             path = f"{kind}[{index}].{word}"
             return ParameterValue(f"{kind}_{index}_{word}", *values[path]) if path in values else None
         if name in AGGREGATES:
-            p = START.by_key["position"] if name == "start_position" else PARAMETERS[name]
+            p = self.PARAMETERS["position"] if name == "start_position" else PARAMETERS[name]
             return ParameterValue(name, p, AGGREGATES[name].read(self))
         if self.motor is not None and name in self.motor.PARAMETERS and name != "mass":
             return ParameterValue(name, self.motor.PARAMETERS[name], getattr(self.motor, name))
@@ -630,7 +554,7 @@ class Chain(Machine):
             raise InputError(wrong)
         if chain.motor is None or not of_motor:
             return chain
-        return replace(chain, motor=chain.motor.replace(**of_motor))  # at once: one bounds the other
+        return chain.replace(motor=chain.motor.replace(**of_motor))  # at once: one bounds the other
 
     def no_such(self, key: str, value: object) -> str:
         """The sentence on a key that names no parameter."""
@@ -655,7 +579,7 @@ class Chain(Machine):
             more = INSTEAD.get(word, {}) if kind == "shaft" else {}
             parts[index] = parts[index].replace(**{word: value}, **more)
         changed: dict[str, Any] = {"masses" if kind == "mass" else "shafts": tuple(parts)}
-        return replace(self, **changed)
+        return self.replace(**changed)
 
     # ---- the chain at one shaft --------------------------------------------------------------------------
 
@@ -706,8 +630,7 @@ class Chain(Machine):
             for s, c, d, gap, most, theta0 in rows
         ]
         motor_stays = at.speed_ratio[self.motor_index] == 1.0
-        return replace(
-            self,
+        return self.replace(
             masses=tuple(masses),
             shafts=tuple(shafts),
             motor=self.motor if motor_stays else None,
@@ -728,8 +651,26 @@ class Chain(Machine):
         return arrays_at(self, self.motor_index)
 
 
-def _without_defaults(table: DocumentTable, values: Mapping[str, object]) -> dict[str, object]:
-    return {p.name: values[p.name] for p in table.parameters if values.get(p.name) != p.default}
+def _completed(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a chain with names of masses, mass of the motor, load mass and target speed."""
+    masses = enumerate(given.get("masses", ()), start=1)
+    named = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in masses)
+    moving = [mass.name for mass in named if not math.isinf(mass.inertia)] or [
+        mass.name for mass in named[:1]
+    ]
+    completed, motor = dict(given), given.get("motor")
+    if moving:
+        completed |= {"masses": named, "load_mass": given.get("load_mass") or moving[-1]}
+        if motor is not None and not motor.mass:
+            completed["motor"] = motor.replace(mass=moving[0])
+    if motor is not None and given.get("target_speed") is None:
+        completed["target_speed"] = motor.rated_speed
+    return completed
+
+
+def _without_defaults(table: DocumentTable, holder: ParameterSet) -> dict[str, object]:
+    values = holder.values()
+    return {p.name: values[p.name] for p in table.parameters if values[p.name] != p.default}
 
 
 class Aggregate(NamedTuple):
@@ -748,13 +689,13 @@ def _of_mass(place: str, word: str) -> Aggregate:
 
 
 def _own(word: str) -> Aggregate:
-    return Aggregate(attrgetter(word), lambda chain, value: replace(chain, **{word: value}))
+    return Aggregate(attrgetter(word), lambda chain, value: chain.replace(**{word: value}))
 
 
 def _with_stiffness(chain: Chain, value: float) -> Chain:
     factor = ratio_of(value, chain.stiffness)
     shafts = (one if one.rigid else one.replace(stiffness=factor * one.stiffness) for one in chain.shafts)
-    return replace(chain, shafts=tuple(shafts))
+    return chain.replace(shafts=tuple(shafts))
 
 
 AGGREGATES: Mapping[str, Aggregate] = {

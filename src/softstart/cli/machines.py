@@ -7,15 +7,12 @@ from typing import Any
 
 from softstart.balancing import Engine
 from softstart.balancing import balance as compute
-from softstart.balancing.engine import LIBRARY as ENGINES
-from softstart.balancing.engine import TABLES
 from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import command, count, option
 from softstart.cli.running import Output, answers, working
 from softstart.clutch import LAWS, Clutch, engage
 from softstart.clutch.laws import read_law
-from softstart.clutch.model import LIBRARY as CLUTCHES
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.parameters import bare
@@ -40,7 +37,7 @@ def _read_law(text: str, option: str) -> dict[str, Any]:
 @option("--optimal", is_flag=True)
 @option("--points", count(1, 200))
 @option("--nondecreasing", is_flag=True)
-@options.of_file(Clutch, "paper-c", CLUTCHES, Clutch.TABLES)
+@options.of_file(Clutch, "paper-c")
 @answers(out=True)
 def clutch_command(
     *, clutch: Clutch, law: dict[str, Any] | None, until: float | None, optimal: bool, points: int | None,
@@ -103,7 +100,7 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
 
 @command("balance")
 @option("--speed speeds", _read_speeds, multiple=True)
-@options.of_file(Engine, "vaz-11113", ENGINES, TABLES)
+@options.of_file(Engine, "vaz-11113")
 @answers(out=True)
 def balance_command(*, engine: Engine, speeds: list[float] | None) -> Output:
     """Compute forces and moments of a piston engine by order, and design a balancer.

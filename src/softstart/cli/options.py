@@ -49,7 +49,8 @@ from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, parsed
-from softstart.input.files import ABSENT, Library, read_text, refusal_of
+from softstart.input.files import ABSENT, read_text, refusal_of
+from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import read_settings
 from softstart.input.parameters import Wording
 from softstart.plugins import controller_names
@@ -380,13 +381,13 @@ def of_drive(read: Load) -> Decorator:
     return machine_argument("drive", read, drive_names, DEFAULT_DRIVE, Drive.TABLES)
 
 
-def of_file(kind: Any, default: str, library: Library, tables: Iterable[DocumentTable]) -> Decorator:
+def of_file(kind: type[ParameterFile], default: str) -> Decorator:
     """The argument for a file of another kind, with --set for the keys of its tables."""
 
-    def read(name: str, settings: Sequence[str]) -> Any:
+    def read(name: str, settings: Sequence[str]) -> ParameterFile:
         return kind.load(name, also=read_changes(settings))
 
-    return machine_argument(kind.__name__.lower(), read, library.names, default, tables)
+    return machine_argument(kind.__name__.lower(), read, kind.LIBRARY.names, default, kind.TABLES)
 
 
 def controller_option(flag: str, several: bool = False, **settings: Any) -> Decorator:

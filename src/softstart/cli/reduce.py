@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
 from softstart.cli import options
 from softstart.cli.options import command, option
@@ -20,7 +19,7 @@ from softstart.views.terminal import print_json
 @options.controller_option("--verify", several=True)
 @option("--no-starts", is_flag=True)
 @options.param_option
-@options.of_file(Chain, "crane-4-mass", LIBRARY, TABLES)
+@options.of_file(Chain, "crane-4-mass")
 @answers(out=True)
 def reduce_command(
     *, chain: Chain, verify: list[str] | None, no_starts: bool, params: dict[str, str], **arguments: Any

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Self, cast, get_args
 
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
 from softstart.drive import LoadKind
-from softstart.input.documents import document_text, parsed
+from softstart.input.documents import document_text
 from softstart.input.files import Library
-from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, parameter
-from softstart.input.parameters import Wording
+from softstart.input.parameter_file import ParameterFile
+from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, parameter
 
 LIBRARY = Library("softstart.clutch", "a clutch", "clutches")
 
@@ -21,7 +20,7 @@ ABOVE = 1.0 + 1e-9  # a table may exceed MM by rounding
 SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate overflows
 
 
-class Clutch(ParameterSet, kw_only=False):
+class Clutch(ParameterFile, kw_only=False):
     """A slipping clutch with constant driving speed, a shaft and a load: [C] (1).
 
     All values are numbers in SI, or text with a unit.
@@ -51,6 +50,7 @@ class Clutch(ParameterSet, kw_only=False):
     """
 
     WHAT: ClassVar[str] = "a clutch"
+    LIBRARY: ClassVar[Library] = LIBRARY
 
     clutch_inertia: Number = parameter(
         "clutch.inertia", "kg*m^2", "inertia IM of the clutch side", '"0.98 kg*m^2"', "above 0"
@@ -104,31 +104,6 @@ class Clutch(ParameterSet, kw_only=False):
 
     # making one -------------------------------------------------------------------------------------------
 
-    @classmethod
-    def load(cls, clutch: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
-        """A shipped clutch by its name, or the TOML file at this path; `also` as in `from_toml`.
-
-        >>> Clutch.load("paper-d")
-        Traceback (most recent call last):
-        softstart.errors.InputError: "paper-d": there is no such file, and no shipped clutch of this name;
-        did you mean paper-c?
-        """
-        text, where = LIBRARY.find(clutch)
-        return cls.from_toml(text, where=where, also=also)
-
-    @classmethod
-    def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
-        """A clutch from the tables [clutch], [shaft], [load] and [law] of a text.
-
-        `where` is put before each sentence; `also` holds changes by path, as {"load.torque": "100 N*m"}.
-        """
-        document = parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES)
-        return cls._from_document(document, where, also)
-
-    def replace(self, **changes: Any) -> Self:
-        """A clutch with some parameters changed, checked like a new one."""
-        return super().replace(**changes)
-
     def with_table(self, times: Sequence[float], torques: Sequence[float]) -> Self:
         """The clutch with a law of its own: friction torques (N m) at instants (s), joined by lines."""
         return self.replace(law="table", law_times=list(times), law_torques=list(torques))
@@ -172,7 +147,7 @@ class Clutch(ParameterSet, kw_only=False):
         >>> Clutch.from_toml(clutch.to_toml()) == clutch
         True
         """
-        return document_text((table, self.values()) for table in self.TABLES)
+        return document_text((table, holder.values()) for _, table, holder in self.blocks())
 
     # checks -----------------------------------------------------------------------------------------------
 

@@ -23,9 +23,9 @@ from softstart.drive.data_sheet_words import BAND, STIFFNESSES, USUAL, converted
 from softstart.drive.model import OTHER_DOCUMENTS, Drive
 from softstart.drive.plausibility import motion_warnings, plausibility_warnings
 from softstart.errors import InputError
-from softstart.input.documents import document_text, parsed
+from softstart.input.documents import document_text
 from softstart.input.files import file_text
-from softstart.input.parameters import Mistake, Wording, bare, without_unit
+from softstart.input.parameters import Mistake, Wording, bare
 
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
@@ -98,15 +98,13 @@ class DataSheet(SheetValues):
         return cls.from_toml(file_text(path, cls.WHAT), where=os.fspath(path), also=also)
 
     @classmethod
-    def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
-        """A data sheet from the tables of a TOML text: [load], [motor], [coupling], [gear], [output], ..."""
-        wording = Wording(where, style="toml")
-        document = parsed(text, wording, cls.WHAT, cls.TABLES)
+    def _from_document(
+        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
+    ) -> Self:
         if "start" in document and not cls.describes(document):
-            raise InputError(
-                wording.sentence("", "this is the file of a drive already; softstart compare takes it")
-            )
-        return cls._from_document(document, where, also)
+            reason = "this is the file of a drive already; softstart compare takes it"
+            raise InputError(Wording(where).sentence("", reason))
+        return super()._from_document(document, where, also)
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, object]) -> Self:
@@ -145,17 +143,17 @@ class DataSheet(SheetValues):
         self, given: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake], *known: Any
     ) -> None:
         """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
-        toml = wording.style == "toml"
-        wrong = [*mistakes, *(without_unit(given, self.PARAMETERS, USUAL, wording) if toml else ())]
         share = bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
         given = {name: converted(name, value) for name, value in given.items()}
         given |= {"efficiency": f"{share} %"} if per_cent else {}
         try:
-            super()._fill(given, wording, wrong, *known)
+            super()._fill(given, wording, mistakes, *known)
         except InputError as error:
-            raise InputError([_IN_SI.sub("", one) if toml else one for one in error.sentences]) from None
+            if wording.style != "toml":
+                raise
+            raise InputError(_IN_SI.sub("", one) for one in error.sentences) from None
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         given, of = vars(self)["_given"], self.PARAMETERS
@@ -227,8 +225,8 @@ class DataSheet(SheetValues):
         """What can hardly be of the motion of the load, which a drive does not know."""
         if self.machine == "rotor":
             return []
-        a, balanced = self.acceleration, bool(vars(self)["counterweight"])
-        return list(motion_warnings(self.machine, self.speed, a, slope_sine(self), balanced))
+        sine = slope_sine(self)
+        return list(motion_warnings(self.machine, self.speed, self.acceleration, sine, self.balanced))
 
     @property
     def plausibility_warnings(self) -> list[str]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar, get_args
 
-from softstart.drive.data_sheet_words import BAND, METAL, RESISTANCE, ROPE, STIFFNESSES, MachineKind
-from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
+from softstart.drive.data_sheet_words import BAND, METAL, RESISTANCE, ROPE, STIFFNESSES, USUAL, MachineKind
+from softstart.input.parameter_file import ParameterFile
+from softstart.input.parameter_set import MaybeNumber, Number, parameter
 
 
 def _maybe(path: str, unit: str, meaning: str, example: str, **more: Any) -> Any:
@@ -19,10 +21,11 @@ def _nothing(path: str, unit: str, meaning: str, example: str, **more: Any) -> A
     return parameter(path, unit, meaning, example, "0 or more", default=0.0, **more)
 
 
-class SheetValues(ParameterSet):
+class SheetValues(ParameterFile):
     """The parameters of a `DataSheet`, which follow from no other ones."""
 
     WHAT: ClassVar[str] = "a data sheet"
+    USUAL: ClassVar[Mapping[str, str]] = USUAL
 
     # fmt: off
     name: str = parameter("name", "", "name of the drive", '"hoist A"', "one line", default="unnamed drive")
@@ -136,6 +139,11 @@ class SheetValues(ParameterSet):
     def mark(self, name: str) -> str:
         """A mark behind a value that is assumed."""
         return ", assumed" if name in self.assumed else ""
+
+    @property
+    def balanced(self) -> bool:
+        """Whether a counterweight balances the load."""
+        return self.counterweight > 0.0
 
     @property
     def rated(self) -> float | None:

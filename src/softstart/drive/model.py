@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, ClassVar, Final, Literal, Self, get_args
@@ -15,15 +14,14 @@ from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency,
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
-from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
 from softstart.input.gear import NO_GEAR, Gear
+from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import (
     MaybeNumber,
     MaybeSeries,
     Number,
     NumberOrWord,
-    ParameterSet,
     parameter,
     read_settings,
 )  # fmt: skip
@@ -52,7 +50,7 @@ def _rests(values: Mapping[str, Any]) -> Any:
     return values.get("load_kind") == "reactive" or held
 
 
-class Drive(ParameterSet, Machine):
+class Drive(ParameterFile, Machine):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
     Each quantity is a number in SI or a string with a unit; many drives are a `softstart.machine_table`.
@@ -95,6 +93,7 @@ class Drive(ParameterSet, Machine):
     """
 
     WHAT: ClassVar[str] = "a drive"
+    LIBRARY: ClassVar[Library] = library
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
     # as a chain has it
@@ -273,48 +272,22 @@ class Drive(ParameterSet, Machine):
     # ---- where drives come from --------------------------------------------------------------------------
 
     @classmethod
-    def load(cls, drive: str | os.PathLike[str]) -> Self:
-        """A drive from its TOML file, or a shipped one by its name (`softstart.drive.library.names()`).
-
-        Parameters
-        ----------
-        drive : str or path
-            A shipped name, or the path of a TOML file.
-
-        Raises
-        ------
-        InputError
-            With a sentence for every mistake, each with the file, the table and the key.
-
-        Examples
-        --------
-        >>> Drive.load("crane-4amtkf").gap
-        0.5
-        """
-        text, where = library.find(drive)
-        return cls.from_toml(text, where=where)
-
-    @classmethod
-    def from_toml(cls, text: str, *, where: str = "") -> Self:
-        """A drive from TOML text; `where` is put before each sentence of an `InputError`.
-
-        >>> drive = Drive.load("crane-4amtkf")
-        >>> Drive.from_toml(drive.to_toml()) == drive
-        True
-        """
-        return cls.from_tables(parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where=where)
-
-    @classmethod
     def from_tables(cls, document: Mapping[str, Any], *, where: str = "") -> Self:
         """A drive from the tables of a document, {"shaft": {"gap": 0.5}, ...}; `where` as in `from_toml`.
 
         The tables of a data sheet give the drive that follows from it (`softstart.DataSheet`).
         """
+        return cls._from_document(dict(document), where)
+
+    @classmethod
+    def _from_document(
+        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
+    ) -> Self:
         for describes, drive_of in OTHER_DOCUMENTS:
             if describes(document):
-                drive = drive_of(dict(document), where)
+                drive = drive_of(document, where)
                 return cls._made(drive.given(), Wording(where, style="toml"), [])
-        return cls._from_document(dict(document), where)
+        return super()._from_document(document, where, also)
 
     # ---- the drive changed -------------------------------------------------------------------------------
 
@@ -333,15 +306,6 @@ class Drive(ParameterSet, Machine):
         0.07
         """
         return self._changed(*read_settings(settings, PARAMETERS))
-
-    def to_toml(self) -> str:
-        """The drive as TOML text in SI units, which `from_toml` reads back to an equal drive.
-
-        >>> print(Drive.load("crane-4amtkf").to_toml().splitlines()[4])
-        inertia = 0.035  # kg*m^2: inertia of the motor
-        """
-        given = self.given()
-        return document_text((table, given) for table in self.TABLES)
 
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
@@ -539,10 +503,6 @@ class Drive(ParameterSet, Machine):
     def with_gap_and_inertia(self, gap: float, inertia: float, origin: Any = None) -> Self:
         """The drive with another gap, as `with_gap`, and another load inertia; `origin` is for chains."""
         return self.with_gap(gap, load_inertia=inertia)
-
-    def parameters_by_path(self) -> dict[str, tuple[Parameter, Any]]:
-        """All parameters by their paths, each with its value."""
-        return {one.path: (one, getattr(self, name)) for name, one in self.PARAMETERS.items()}
 
     def parameter_value(self, key: str) -> ParameterValue | None:
         """The parameter that a key names, as in a file or in Python; None where there is none.

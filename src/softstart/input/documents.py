@@ -9,26 +9,16 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from softstart.errors import MOST, InputError
 from softstart.hints import did_you_mean, nearest, term
-from softstart.input.parameters import (
-    Mistake,
-    Parameter,
-    Wording,
-    meant_by,
-    read_values,
-    sentences_of,
-    without_unit,
-)
+from softstart.input.parameters import Mistake, Parameter, Wording, meant_by
 from softstart.quantities import doubtful_comma, shortest, show
-
-T = TypeVar("T")
 
 MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer than anyone waits
 # a key with this many dots takes memory by their square, and no table is nested like that
@@ -40,7 +30,7 @@ class DocumentTable:
     """One table of a document: `name` as in [name], "" for the keys above the first table.
 
     With `many` it is a list of tables, [[name]], of at least `least` entries. A single one that is not
-    `required` may be left out as a whole: it is None then.
+    `required` may be left out as a whole.
     """
 
     name: str
@@ -65,70 +55,6 @@ class DocumentTable:
 
 
 # ---- reading --------------------------------------------------------------------------------------------
-
-
-def read_document(
-    text: str,
-    tables: Sequence[DocumentTable],
-    what: str,
-    *,
-    where: str = "",
-    also: Mapping[str, object] | None = None,
-    usual: Mapping[str, str] | None = None,
-) -> dict[str, Any]:
-    """All tables of a TOML text: {table name: {key: value in SI}}, a list of such where there are many.
-
-    `what` names what is described, as "a chain"; `where` is put before each sentence; `also` holds changes as
-    typed at a command line, {"table.key": value}, which go before what the text says; keys in `usual` have
-    units, see `without_unit`. Raises one InputError for everything that is wrong.
-
-    >>> stiffness = Parameter("stiffness", "N*m/rad", "stiffness", '"5 N*m/rad"', "above 0")
-    >>> shaft = DocumentTable("shaft", (stiffness,))
-    >>> read_document("[shaft]\\nstiffness = '2 kN*m/rad'", [shaft], "a test")
-    {'shaft': {'stiffness': 2000.0}}
-    >>> read_document("[shaft]\\nstifness = -1", [shaft], "a test")
-    Traceback (most recent call last):
-    softstart.errors.InputError: [shaft] stifness = -1: [shaft] has no key stifness; did you mean stiffness?
-    """
-    wording = Wording(where, style="toml")
-    document = parsed(text, wording, what, tables)
-    wrong = list(apply_changes(document, also or {}, tables, what))
-    given, mistakes = placed(document, tables, what, wording)
-    found: dict[str, Any] = {}
-    in_rows: list[str] = []
-    for table in tables:
-        content = given.get(table.name)
-        if table.many:
-            found[table.name] = []
-            for i, row in enumerate(content or [], start=1):
-                numbered = replace(wording, row=f"[{table.name}] {i}, ")
-                strays = [
-                    _unknown(numbered.row, key, value, table, tables, what, wording)
-                    for key, value in row.items()
-                    if key not in table.by_key
-                ]
-                values, more = read_values(row, table.by_key, numbered)
-                found[table.name].append(values)
-                in_rows += sentences_of([*strays, *more])
-        elif content is None and not table.required:
-            found[table.name] = None
-        else:
-            found[table.name], more = read_values(content or {}, table.by_key, wording)
-            mistakes += [*more, *without_unit(content or {}, table.by_key, usual or {}, wording)]
-    wrong += [*sentences_of(mistakes), *in_rows]
-    if wrong:
-        bare = " or as a bare number in rad/s" if usual else "\0"  # it would be refused
-        raise InputError(one.replace(bare, "") for one in wrong)
-    return found
-
-
-def construct(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: list[str]) -> T | None:
-    """What `make` returns for the values; where it refuses them, its sentences go to `wrong`."""
-    try:
-        return make(**values)
-    except InputError as error:
-        wrong.extend(place + sentence for sentence in error.sentences)
-        return None
 
 
 def parsed(text: str, wording: Wording, what: str, tables: Sequence[DocumentTable] = ()) -> dict[str, Any]:
@@ -210,10 +136,7 @@ def apply_changes(
 def placed(
     document: Mapping[str, Any], tables: Sequence[DocumentTable], what: str, wording: Wording
 ) -> tuple[dict[str, Any], list[Mistake]]:
-    """What stands in each table, by its name, and every key or table that stands where it should not.
-
-    The keys within the rows of [[tables]] are not looked at.
-    """
+    """What stands in each table, by its name, and every key or table that stands where it should not."""
     named = {"": DocumentTable("", ())} | {table.name: table for table in tables}
     everywhere = [p for table in tables for p in table.parameters]
     given: dict[str, Any] = {}
@@ -229,6 +152,12 @@ def placed(
             given[name] = content if rows else None
             if not rows:
                 note(f"[{name}]", f"there may be several; write {table.bracket} before each")
+            for i, row in enumerate(given[name] or [], start=1):
+                mistakes.extend(
+                    _unknown(f"[{name}] {i}, ", key, value, table, tables, what, wording)
+                    for key, value in row.items()
+                    if key not in table.by_key
+                )
             return
         if not isinstance(content, dict):
             form = "one table, not a list of tables" if isinstance(content, list) else "a table"
@@ -287,7 +216,8 @@ def _unknown(
     remedy = f"did you mean {' or '.join(map(called, meant))}?" if meant else other
     reason = f"{f'[{table.name}]' if table.name else f'{what} file'} has no key {key}; {remedy}"
     sentence = wording.sentence(f"{place}{key} = {wording.show(value)}", reason)
-    return Mistake(sentence, (), tuple(p.path for p in meant) if len(meant) == 1 else ())
+    row = place if table.many else ""
+    return Mistake(sentence, (), tuple(f"{row}{p.path}" for p in meant) if len(meant) == 1 else ())
 
 
 # ---- writing --------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from softstart.errors import InputError
 from softstart.hints import term
-from softstart.input.documents import DocumentTable, apply_changes, placed
+from softstart.input.documents import DocumentTable
 from softstart.input.gear import NO_GEAR, Gear
 from softstart.input.parameters import (
     REQUIRED,
@@ -30,6 +30,7 @@ from softstart.input.parameters import (
     meant_by,
     read_values,
     sentences_of,
+    without_unit,
 )
 from softstart.quantities import show
 
@@ -42,6 +43,14 @@ if TYPE_CHECKING:
         def __get__(self, one: object, cls: object = None) -> Read_co: ...
         def __set__(self, one: object, value: float | str | npt.ArrayLike | None) -> None: ...
 
+    Row = TypeVar("Row", bound="ParameterSet")
+
+    class Rows(Generic[Row]):
+        """A field given as any iterable of parameter sets and read as a tuple."""
+
+        def __get__(self, one: object, cls: object = None) -> tuple[Row, ...]: ...
+        def __set__(self, one: object, value: Iterable[Row]) -> None: ...
+
     Number = Given[float]
     MaybeNumber = Given[float | None]
     NumberOrWord = Given[float | str]
@@ -49,7 +58,7 @@ if TYPE_CHECKING:
     MaybeSeries = Given[tuple[float, ...] | None]
 else:
     Number, MaybeNumber, NumberOrWord = float, float | None, float | str
-    Series, MaybeSeries = tuple[float, ...], tuple[float, ...] | None
+    Series, MaybeSeries, Rows = tuple[float, ...], tuple[float, ...] | None, tuple
 
 
 def parameter(
@@ -73,35 +82,101 @@ def like(cls: type[ParameterSet], name: str) -> Any:
     return cls.PARAMETERS[name]
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
+@dataclass(frozen=True)
+class Component:
+    """A field of a `ParameterSet` that is itself one, of this kind; or `many` of them, as [[mass]]."""
+
+    kind: type[ParameterSet]
+    many: bool
+    least: int
+    default: object
+    positional: bool
+
+    @property
+    def tables(self) -> tuple[DocumentTable, ...]:
+        """Its tables in the file of the whole."""
+        required, tables = self.default is REQUIRED, self.kind.TABLES
+        return tuple(
+            replace(one, many=self.many, least=self.least, required=required and one.required)
+            for one in tables
+        )
+
+    def read(self, content: Mapping[str, Any], wording: Wording) -> tuple[list[ParameterSet], list[Mistake]]:
+        """Those in the tables of a document, by name, and what is wrong with them."""
+        if not self.many:
+            tables = [content[one.name] for one in self.tables if one.name in content]
+            rows = [{key: value for table in tables for key, value in table.items()}]
+            return self._read_rows(rows if tables or self.default is REQUIRED else [], [wording])
+        name = self.tables[0].name
+        rows = content[name] or []
+        return self._read_rows(rows, [replace(wording, row=f"[{name}] {i + 1}, ") for i in range(len(rows))])
+
+    def _read_rows(
+        self, rows: list[dict[str, object]], wordings: list[Wording]
+    ) -> tuple[list[ParameterSet], list[Mistake]]:
+        parts, mistakes, kind = list[ParameterSet](), list[Mistake](), self.kind
+        for row, wording in zip(rows, wordings, strict=False):
+            given = {p.name: row[p.key] for p in kind.PARAMETERS.values() if p.key in row}
+            values, wrong = read_values(given, kind.PARAMETERS, wording)
+            wrong += without_unit(given, kind.PARAMETERS, kind.USUAL, wording)
+            try:
+                parts += [] if wrong else [kind._made(given, Wording(), [], values)]
+            except InputError as error:
+                place = f"{wording.before}{wording.row or f'[{self.tables[0].name}] '}"
+                wrong += [Mistake(place + sentence) for sentence in error.sentences]
+            mistakes += wrong
+        return parts, mistakes
+
+
+def component(
+    kind: type[ParameterSet],
+    *,
+    many: bool = False,
+    least: int = 0,
+    default: Any = REQUIRED,
+    kw_only: bool = True,
+) -> Any:
+    """A field that is a parameter set of this kind, or a tuple of at least so many."""
+    return Component(kind, many, least, default, not kw_only)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter, component))
 class ParameterSet:
     """A value made of parameters: frozen, equal by content, hashable, copied and pickled as such.
 
     All mistakes of one input raise a single `InputError`. `WHAT` names it in sentences, as "a drive", and
     `SEVERAL` says what to do with several values for one. With `BATCH` its numbers may be arrays, which are
-    read-only. The fields of a subclass with `kw_only=False` are positional arguments as well.
+    read-only. Bare numbers of parameters in `USUAL` are refused in a file, see `without_unit`. The fields of
+    a subclass with `kw_only=False` are positional arguments as well.
     """
 
     WHAT: ClassVar[str] = "a table"
     SEVERAL: ClassVar[str] = ""
     BATCH: ClassVar[bool] = False
+    USUAL: ClassVar[Mapping[str, str]] = {}
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
+    PARTS: ClassVar[Mapping[str, Component]] = {}
     TABLES: ClassVar[tuple[DocumentTable, ...]] = ()
 
     def __init_subclass__(cls, kw_only: bool = True) -> None:
         declared = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
-        for name, one in declared.items():
-            setattr(cls, name, field() if one.required else field(default=one.default))
+        parts = {name: one for name, one in vars(cls).items() if isinstance(one, Component)}
+        for name, default in {name: one.default for name, one in (declared | parts).items()}.items():
+            setattr(cls, name, field() if default is REQUIRED else field(default=default))
         dataclass(init=False, eq=False, repr=False)(cls)
+        cls.PARTS = dict(cls.PARTS) | parts
         cls.PARAMETERS = dict(cls.PARAMETERS) | {
             name: replace(one, name=name, positional=one.positional or not kw_only)
             for name, one in declared.items()
         }
-        everyone = cls.PARAMETERS.values()
-        tables = sorted({p.table: None for p in everyone}, key=bool)  # "" first
-        cls.TABLES = tuple(DocumentTable(one, tuple(p for p in everyone if p.table == one)) for one in tables)
+        everyone, tables = cls.PARAMETERS.values(), [table for p in cls.PARTS.values() for table in p.tables]
+        for table in dict.fromkeys(p.table for p in everyone):
+            keys = tuple(p for p in everyone if p.table == table)
+            tables.append(DocumentTable(table, keys, required=any(p.required for p in keys)))
+        cls.TABLES = tuple(sorted(tables, key=lambda table: bool(table.name)))  # "" first
         cls.__replace__ = cls.replace  # type: ignore[attr-defined]  # copy.replace of Python 3.13
-        arguments = sorted(map(_argument, everyone), key=lambda one: one.kind)
+        arguments = [_argument(name, one) for name, one in cls._fields().items()]
+        arguments.sort(key=lambda one: one.kind)
         cls.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
         if cls.__doc__:
             cls.__doc__ = cls.__doc__.replace("{parameters}", "\n    ".join(_documented(everyone)))
@@ -109,7 +184,7 @@ class ParameterSet:
     if not TYPE_CHECKING:  # type checkers see the fields as keywords
 
         def __init__(self, *positional: Any, **given: Any) -> None:
-            names = [p.name for p in self.PARAMETERS.values() if p.positional]
+            names = [name for name, one in self._fields().items() if one.positional]
             if len(positional) > len(names):
                 raise TypeError(f"{type(self).__name__} takes {len(names)} positional arguments")
             self._fill(dict(zip(names, positional, strict=False)) | given, Wording(), [])
@@ -130,13 +205,20 @@ class ParameterSet:
             given, parameters, wording, batch=self.BATCH, known=known, several=self.SEVERAL,
             gear=self._gear_in(given),
         )  # fmt: skip
-        wrong = [*mistakes, *found]
-        for name in [one for one in given if one not in parameters]:
+        mistakes = list(mistakes)
+        for name, part in self.PARTS.items():
+            if name in given:
+                values[name] = tuple(given[name]) if part.many else given[name]  # type: ignore[arg-type]
+            elif part.default is not REQUIRED:
+                values[name] = part.default
+            elif not mistakes:  # else it may have been there, and wrong
+                found.append(Mistake(wording.sentence(f"{name} is missing", f"{self.WHAT} needs it")))
+        wrong, names = [*mistakes, *found], self._fields()
+        for name in [one for one in given if one not in names]:
             free = [p for p in parameters.values() if p.name not in given]
             meant = meant_by(name, parameters.values(), free)
-            names = " or ".join(p.name for p in meant)
-            other = term(name) or f"the names are {', '.join(parameters)}"
-            remedy = f"did you mean {names}?" if meant else other
+            other = term(name) or f"the names are {', '.join(names)}"
+            remedy = f"did you mean {' or '.join(p.name for p in meant)}?" if meant else other
             reason = f"{self.WHAT} has no parameter {show(name)}; {remedy}"
             alone = tuple(p.path for p in meant) if len(meant) == 1 else ()
             wrong.append(
@@ -146,16 +228,19 @@ class ParameterSet:
         fields.update(values)
         fields["_given"] = frozenset(
             name
-            for name in given.keys() & parameters.keys()
-            if not (given[name] is None and parameters[name].default is None)
+            for name in given.keys() & names.keys()
+            if not (given[name] is None and names[name].default is None)
         )
         right = {name: values[name] for name in fields["_given"] if name in values} if wrong else values
         sentences = [*sentences_of(wrong), *self._check(right, wording)]
         if not sentences:
-            before = f"{wording.where}: " if wording.where else ""
-            sentences = [before + sentence for sentence in self.contradictions()]
+            sentences = [wording.before + sentence for sentence in self.contradictions()]
         if sentences:
             raise InputError(sentences)
+
+    @classmethod
+    def _fields(cls) -> dict[str, Component | Parameter]:
+        return {**cls.PARTS, **cls.PARAMETERS}
 
     @classmethod
     def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
@@ -176,21 +261,6 @@ class ParameterSet:
         one._fill(*filled)
         return one
 
-    @classmethod
-    def _from_document(
-        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
-    ) -> Self:
-        """From the tables of a TOML document, after the changes of `also` ({path: value})."""
-        wording = Wording(where, style="toml")
-        wrong = [Mistake(one) for one in apply_changes(document, also or {}, cls.TABLES, cls.WHAT)]
-        content, mistakes = placed(document, cls.TABLES, cls.WHAT, wording)
-        given = {
-            p.name: content[p.table][p.key]
-            for p in cls.PARAMETERS.values()
-            if p.key in content.get(p.table, ())
-        }
-        return cls._made(given, wording, [*wrong, *mistakes])
-
     def _derive(self, **values: Any) -> None:
         """Set values that follow from others, as if they had been given; None takes one back."""
         fields = vars(self)
@@ -202,12 +272,12 @@ class ParameterSet:
     def given(self) -> dict[str, Any]:
         """The parameters that were given, in the order of the fields; the others have their defaults."""
         fields, given = vars(self), vars(self)["_given"]
-        return {name: fields[name] for name in self.PARAMETERS if name in given}
+        return {name: fields[name] for name in self._fields() if name in given}
 
     def values(self) -> dict[str, Any]:
         """All parameters by name."""
         fields = vars(self)
-        return {name: fields[name] for name in self.PARAMETERS}
+        return {name: fields[name] for name in self._fields()}
 
     def replace(self, **changes: Any) -> Self:
         """The same with some parameters changed; those that follow another one follow it still."""
@@ -245,10 +315,12 @@ class ParameterSet:
         raise AttributeError(f"{self.WHAT} cannot be changed")
 
 
-def _argument(p: Parameter) -> inspect.Parameter:
-    """The parameter as an argument of the constructor, for editors and the documentation."""
+def _argument(name: str, p: Parameter | Component) -> inspect.Parameter:
+    """The field as an argument of the constructor, for editors and the documentation."""
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if p.positional else inspect.Parameter.KEYWORD_ONLY
-    return inspect.Parameter(p.name, kind, default=inspect.Parameter.empty if p.required else p.default)
+    return inspect.Parameter(
+        name, kind, default=inspect.Parameter.empty if p.default is REQUIRED else p.default
+    )
 
 
 def _documented(parameters: Iterable[Parameter]) -> Iterable[str]:

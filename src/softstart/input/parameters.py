@@ -121,6 +121,11 @@ class Wording:
     written: Mapping[str, str] = field(default_factory=dict)
     row: str = ""
 
+    @property
+    def before(self) -> str:
+        """What stands before a sentence: the file."""
+        return f"{self.where}: " if self.where else ""
+
     def label(self, parameter: Parameter) -> str:
         """The parameter as the writer calls it.
 
@@ -148,7 +153,7 @@ class Wording:
         symbol = f" {p.symbol}" if p.symbol and p.symbol != p.key else ""
         text = f"{p.name}={p.example}" if self.style == "python" else f"{p.key} = {p.example}"
         reason = f"the {p.meaning}{symbol} is needed{instead}; write for example {text}"
-        return Mistake(self.sentence(f"{self.label(p)} is missing", reason), (p.path,))
+        return Mistake(self.sentence(f"{self.label(p)} is missing", reason), (f"{self.row}{p.path}",))
 
     def refused(self, parameter: Parameter, value: object, refusal: RefusedError) -> str:
         """The sentence for a value that was refused; of an array, only the bad element is shown."""

@@ -384,9 +384,9 @@ def _checked_options(
         if resolution is not None:
             steps = resolution if isinstance(resolution, Resolution) else Resolution.read(resolution)
     for source in about.sources:
-        if source["parameter"] not in machine.parameters_by_path():
+        if source.parameter not in machine.parameters_by_path():
             mistakes.sentences.append(
-                f'project: [[source]] "{source["parameter"]}" is a parameter of a drive, and '
+                f'project: [[source]] "{source.parameter}" is a parameter of a drive, and '
                 f'"{machine.name}" has none of this name; leave these tables out, and name assumed values '
                 "in its file."
             )

@@ -51,7 +51,7 @@ def page(made):
 
 
 def test_verdicts_are_the_margins_of_the_rule(made):
-    point = Page(document.document(replace(made, project=replace(made.project, decimal="point"))))
+    point = Page(document.document(replace(made, project=made.project.replace(decimal="point"))))
     (table,) = [rows for rows in point.tables if rows[0][-1] == "verdict" and "margin" in rows[0]]
     wanted = [
         ["fail" if margin.share < 0.0 else "pass", row.name, f"{100.0 * margin.share:.1f} %"]
