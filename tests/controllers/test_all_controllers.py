@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,14 +14,13 @@ from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import CompiledController, declared_parameters, make_controller
+from softstart.controller.finding import controller_class, ready_controller_names
 from softstart.drive import library
 from softstart.kernel.records import NOTES
 
-SAMPLED = (
-    "acceleration-delay", "current-limit-feedback", "ramp", "s-curve", "pulse-coast-hold", "shaped",
-    "state-feedback", "take-up",
-)  # fmt: skip
-ALL = ("direct", "reduced-first-stage", "reduced-two-stage", *SAMPLED)
+ALL = ready_controller_names()  # all but `profile`; a new one is tested as soon as it is registered
+SAMPLED = [name for name in ALL if "period" in declared_parameters(controller_class(name))]
+DOCS = Path(__file__).parents[2] / "docs"
 DRIVES = [Drive.load(name) for name in library.names()]
 
 
@@ -37,6 +38,23 @@ def test_defaults_are_numbers_and_a_twin_in_plain_python_gives_the_same_bits(nam
         assert all(np.array_equal(one.notes[name], two.notes[name], equal_nan=True) for name in NOTES.names)
         assert np.array_equal(one.states, two.states)
         assert np.array_equal(one.events, two.events)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_says_what_it_is_and_where_it_is_described(name: str) -> None:
+    cls = controller_class(name)
+    assert cls.name == name
+    assert cls.summary
+    assert cls.source
+    assert "effort" in {key for base in cls.__mro__[:-1] for key in vars(base)} or cls.sensors
+    if not DOCS.is_dir():
+        pytest.skip("installed without docs/")
+    heading = rf"^## .*\b{re.escape(name)}\b"
+    assert re.search(heading, (DOCS / "controllers.md").read_text("utf-8"), re.M), "add a section"
+    row = rf"^\|.*`{re.escape(name)}`"
+    assert re.search(row, (DOCS / "howto" / "choose-a-strategy.md").read_text("utf-8"), re.M), (
+        "add it to the table"
+    )
 
 
 @pytest.mark.parametrize("name", SAMPLED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import subprocess
@@ -16,7 +17,7 @@ import pytest
 
 import softstart
 from softstart import Command, Drive, InputError, PlainController, SimulationError, plugins, simulate
-from softstart.controller import Measured, make_controller
+from softstart.controller import Measured, controller_class, make_controller
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -173,3 +174,29 @@ def test_the_project_file_of_something_else_registers_nothing(
         table = '[tool.softstart.entry-points."softstart.test-group"]\nown = "math:pi"\n'
         plugins.CHECKOUT.write_text(f'[project]\nname = "{name}"\n{table}')
         assert list(plugins.registered.__wrapped__("softstart.test-group")) == found
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ("    kernel = step", "", "Direct: kernel is missing"),
+        (
+            "PARAMETERS).torque",
+            "PARAMETERS).torqe",
+            "cannot be compiled: no record of the step has a field 'torqe'",
+        ),
+        ("math.inf", "unknown", "cannot be compiled: NameError: name 'unknown' is not defined"),
+        (
+            "    torque: float = ",
+            "    force: float = ",
+            "its step takes torque, which is neither a parameter",
+        ),
+    ],
+)
+def test_a_compiled_controller_with_a_mistake_is_refused_in_a_sentence(tmp_path, right, wrong, said):
+    file = tmp_path / "mine.py"
+    text = Path(str(inspect.getsourcefile(controller_class("direct")))).read_text(encoding="utf-8")
+    assert right in text
+    file.write_text(text.replace(right, wrong), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        simulate(Drive.load("crane-4amtkf"), f"{file}:Direct")

@@ -8,6 +8,7 @@ It keeps nothing in itself, so a start can be replayed, and a hundred thousand s
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -17,6 +18,7 @@ from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numba.core.errors import NumbaError
 
 from softstart.arrays import Matrix, Vector
 from softstart.controller.parameters import ParameterValues, declared_parameters
@@ -375,6 +377,23 @@ class CompiledController(Controller):
         if records := getattr(vars(cls).get("kernel"), "records", None):
             cls.record, cls.state_size = records
 
+    @classmethod
+    def compiled_kernel(cls) -> Any:
+        """The step, compiled here if it has not been; InputError where its code cannot be compiled."""
+        if not hasattr(cls, "kernel"):
+            raise InputError(f"{cls.__name__}: kernel is missing: declare it in the class as the step.")
+        try:
+            getattr(cls.kernel, "dispatcher", None)  # compiles
+        except KeyError as error:  # what numba says of a name that a record lacks
+            reason = f"no record of the step has a field {error}"
+        except NumbaError as error:
+            # the first line and what follows "During" name stages of numba's work, not of the step
+            text = re.split("During:|There are", str(error).partition("\n")[2])[0]
+            reason = " ".join(text.split()) or str(error)
+        else:
+            return cls.kernel
+        raise InputError(f"{cls.__name__}: the step cannot be compiled: {reason}.")
+
     def vector(self, drive: Drive) -> Vector:
         """The numbers the kernel needs; called on a fitted controller.
 
@@ -391,8 +410,13 @@ class CompiledController(Controller):
 
     def _in_order(self, record: Any, numbers: Mapping[str, Any], drive: Drive) -> Iterator[float]:
         for name in record.names or ():
-            sources = (source for source in (self, drive) if hasattr(source, name))
-            value = numbers[name] if name in numbers else getattr(next(sources), name)
+            source = next((source for source in (self, drive) if hasattr(source, name)), None)
+            if source is None and name not in numbers:
+                raise InputError(
+                    f"{type(self).__name__}: its step takes {name}, which is neither a parameter nor a value "
+                    "of the drive; declare it with `parameter`, or return it from `numbers`."
+                )
+            value = numbers[name] if name in numbers else getattr(source, name)
             if isinstance(value, Mapping):  # a record within the record
                 yield from self._in_order(record[name], value, drive)
             else:

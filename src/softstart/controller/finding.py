@@ -71,16 +71,7 @@ def make_controller(
     parameters : mapping, optional
         Values by name, each a number in SI or a text with a unit.
     allow_code : bool
-        Whether a file of gains may name a Python file, which would run. Installed controllers need no leave.
-
-    Parameters
-    ----------
-    name : str or Controller
-        A name, `path/to/file.py:ClassName`, a file of tuned gains, or a finished controller.
-    parameters : mapping, optional
-        Its parameters: SI numbers or strings with a unit.
-    allow_code : bool
-        Whether a file of gains may run a Python file that it names.
+        Whether a file of gains may run a Python file that it names. Installed controllers always run.
 
     Returns
     -------

@@ -105,8 +105,9 @@ def _run_compiled(controller: CompiledController, drive: Any, recorder: StartRec
     numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, as the kernel wants it
     memory = np.zeros(controller.state_size)
     command = np.zeros(NEW_STATE + controller.state_size)
+    step = controller.compiled_kernel()
     with watched(controller):
-        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == rec.BUFFER_FULL:
+        while (reason := recorder.run(step, numbers, memory, command)) == rec.BUFFER_FULL:
             recorder.grow()
     return reason
 

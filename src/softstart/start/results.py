@@ -125,7 +125,7 @@ def run_compiled(
     count = starts.machines.shape[0]
     notes = np.zeros((count, rec.N_NOTES))
     of_shafts = np.zeros((count, starts.count - 1, rec.size(rec.SHAFT_NOTES)))
-    step, sees, size = type(controller).kernel, int(controller.sensors), controller.state_size
+    step, sees, size = controller.compiled_kernel(), int(controller.sensors), controller.state_size
     end = math.inf if until is None else float(until)
 
     def run(part: slice) -> None:

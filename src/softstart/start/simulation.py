@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import as_machine
 from softstart.controller.base import label_of
+from softstart.drive import Drive
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
@@ -114,6 +115,8 @@ def simulate(
     fitted_to, base = _other("fitted_to", fitted_to, drive), _other("base", base, drive)
     if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
+    if excitation and (several or isinstance(drive, Drive)):
+        raise InputError("excitation: it acts on the masses of one chain; start several one at a time.")
     if several:
         if strategy is None:
             raise InputError("controller is missing: many starts need one.")

@@ -241,18 +241,21 @@ TIME_COLUMNS = (
     DataColumn("settled\ns", lambda row: row.run.settled_time),
     DataColumn("later\n%", share_lost, 1),
 )
+START_TIME = DataColumn("start\ntime s", lambda row: row.run.start_time)
+START_LATER = DataColumn("start\nlater s", lambda row: row.time_lost, digits=3)
 TIMES = (
-    DataColumn("start\ntime s", lambda row: row.run.start_time),
-    DataColumn("start\nlater s", lambda row: row.time_lost, digits=3),
+    START_TIME,
+    START_LATER,
     DataColumn("settled\nlater s", lambda row: row.settled_lost, digits=3),
 )
+CONTACTS = DataColumn("contacts", lambda row: row.run.contacts, 0)
 AT_THE_GAP = (
     DataColumn("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
     DataColumn("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
     DataColumn("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
     DataColumn("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
     DataColumn("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
-    DataColumn("contacts", lambda row: row.run.contacts, 0),
+    CONTACTS,
 )
 
 
@@ -268,7 +271,7 @@ def at_details(machine: Machine) -> tuple[DataColumn, ...]:
         return (*AT_THE_GAP, *of_limit)
     headings = ("over mean\n" + name.replace(" - ", " -\n") for name in machine.shaft_names)
     shafts = (DataColumn(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
-    return (*shafts, *of_limit, AT_THE_GAP[-1])
+    return (*shafts, *of_limit, CONTACTS)
 
 
 def comparison_table(

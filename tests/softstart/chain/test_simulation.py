@@ -127,6 +127,8 @@ def two(**shaft) -> Chain:
         (Chain([Mass(1), Mass(1)], [Shaft(1)]), {"controller": None}, "until is missing"),
         (two(), {"controller": "direct", "until": -1.0}, "until = -1.0"),
         (two(), {"controller": "direct", "excitation": {"mas 1": None}}, "mass 1"),
+        ([two(), two()], {"controller": "direct", "excitation": {0: None}}, "the masses of one chain"),
+        (CRANE, {"controller": "direct", "excitation": {0: None}}, "the masses of one chain"),
         (
             Chain([Mass(1, initial_speed=1), Mass(1), Mass(1)], [Shaft("inf"), Shaft(1)]),
             {"controller": None, "until": 1.0},
