@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from softstart import formulas
 from softstart.controller import CompiledController, Effort, Numbers, ParameterValues, parameter
 from softstart.controller.compiled import inner, record
 from softstart.drive import Drive
@@ -85,14 +86,13 @@ def sent(p: Parameters, x: State, torque: float, u: float) -> float:
     return x.sample * p.estimator.period
 
 
-def shaft_torque_under(drive: Drive, torque: Any) -> float:
+def shaft_torque_under(drive: Drive, torque: float) -> float:
     """Mean shaft torque in contact under a motor torque; a load that pushes is not counted.
 
     >>> round(shaft_torque_under(Drive.load("crane-4amtkf"), 62), 2)
     52.86
     """
-    under: float = (torque * drive.J2 + drive.J1 * pulling_load(drive)) / (drive.J1 + drive.J2)
-    return under
+    return float(formulas.mean_shaft_torque(torque, drive.J1, drive.J2, pulling_load(drive)))
 
 
 def low_torque(drive: Drive, p: ParameterValues) -> float:

@@ -10,14 +10,15 @@ Three strategies follow it. What differs is when the torque is raised, and by wh
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from softstart import formulas
-from softstart.controller import compiled_step, parameter
+from softstart.controller import CompiledController, Sensor, compiled_step, parameter
 from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, record
 from softstart.drive import Drive
 from softstart.input.parameters import Limit
-from softstart_controllers.sampled import pulling_load
+from softstart_controllers.sampled import full_torque_parameter, pulling_load
 
 SHARE = 0.15
 INSTANTS = ("peak", "end")  # of stage 2, at which the torque is raised
@@ -73,6 +74,17 @@ def reduced_torque_parameter(meaning: str, limit: Limit = "any") -> Any:
     return parameter(
         "N*m", meaning, lambda drive, p: reduced_torque(drive), text, limit, multiples=(0.3, 4.0)
     )
+
+
+@dataclass(frozen=True)
+class ReducedTorque(CompiledController):
+    """A torque that is low until contact and for a time after it, switched at the events of the gap."""
+
+    sensors = Sensor.STAGE
+    kernel = step_of_gap
+
+    torque: float = reduced_torque_parameter("reduced torque")
+    full_torque: float = full_torque_parameter("torque once it is raised")
 
 
 def raise_parameter() -> Any:
@@ -137,5 +149,4 @@ def swing_duration(drive: Drive, torque: Any, dw12: float) -> float:
 
 def mean_under(drive: Drive, torque: Any) -> float:
     """M12avg in N m, the mean shaft torque under a motor torque, [G](12)."""
-    mean: float = (torque * drive.J2 + drive.J1 * drive.Mc) / (drive.J1 + drive.J2)
-    return mean
+    return float(formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))

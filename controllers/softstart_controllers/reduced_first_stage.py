@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from softstart.controller import CompiledController, Numbers, Sensor
+from softstart.controller import Numbers
 from softstart.drive import Drive
-from softstart_controllers.reduced import reduced_torque_parameter, step_of_gap
-from softstart_controllers.sampled import full_torque_parameter
+from softstart_controllers.reduced import ReducedTorque
 
 
 @dataclass(frozen=True)
-class ReducedFirstStage(CompiledController):
+class ReducedFirstStage(ReducedTorque):
     """Torque reduced in stage 1, then Ms (method 1 of [G]), switched at the very instant of contact.
 
     K_dyn = 1 + sqrt(1 + (c dw12/(Omega M12avg))^2) [G](17): the softer landing lowers dw12, but the step to
@@ -25,11 +24,6 @@ class ReducedFirstStage(CompiledController):
     name = "reduced-first-stage"
     summary = "torque reduced while the gap is first open, Ms from contact on (method 1)"
     source = "[G](17)"
-    sensors = Sensor.STAGE
-    kernel = step_of_gap
-
-    torque: float = reduced_torque_parameter("reduced torque of stage 1")
-    full_torque: float = full_torque_parameter("torque from contact on")
 
     def numbers(self, drive: Drive) -> Numbers:
         """The torque is raised at once."""

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
 
-from softstart.controller import CompiledController, Numbers, Sensor, parameter
+from softstart.controller import Numbers, parameter
 from softstart.drive import Drive
-from softstart_controllers.reduced import (
-    delay_of,
-    raise_parameter,
-    reduced_torque_parameter,
-    step_of_gap,
-)
-from softstart_controllers.sampled import full_torque_parameter
+from softstart_controllers.reduced import ReducedTorque, delay_of, raise_parameter
 
 
 @dataclass(frozen=True)
-class ReducedTwoStage(CompiledController):
+class ReducedTwoStage(ReducedTorque):
     """Torque reduced through stages 1 and 2, then Ms (method 2 of [G]), switched at the gap's own events.
 
     The torque is raised at the peak of stage 2, after the time of [G](14) for the nominal drive (`raise_at`
@@ -39,11 +33,7 @@ class ReducedTwoStage(CompiledController):
     name = "reduced-two-stage"
     summary = "torque reduced through the first gap and the first contact, then Ms (method 2)"
     source = "[G](18)"
-    sensors = Sensor.STAGE
-    kernel = step_of_gap
 
-    torque: float = reduced_torque_parameter("reduced torque of stages 1 and 2")
-    full_torque: float = full_torque_parameter("torque from stage 3 on")
     contact_timeout: float = parameter(
         "s", "longest wait after contact", lambda drive, p: 2.0 * drive.elastic_period,
         "two elastic periods; an undamped stage 2 lasts less than one",
@@ -52,7 +42,5 @@ class ReducedTwoStage(CompiledController):
 
     def numbers(self, drive: Drive) -> Numbers:
         """The wait: until the torque peak, or until the gap opens, at most `contact_timeout`."""
-        wait: Any = self.contact_timeout
-        if self.raise_at == "peak":
-            wait = min(delay_of(drive, self.torque, "peak"), wait)
-        return {"wait": wait}
+        peak = delay_of(drive, self.torque, "peak") if self.raise_at == "peak" else math.inf
+        return {"wait": min(peak, self.contact_timeout)}

@@ -147,8 +147,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
 def delay(drive: Drive, p: ParameterValues) -> float:
     """By how much in s the torque is late: lag, dead time, a sample, a quarter of the slewing time to Ms."""
     slewing = SLEWED_SHARE * drive.Ms / drive.torque_rate
-    late: float = drive.torque_lag + drive.computing_delay + p.period + slewing
-    return late
+    return float(drive.torque_lag + drive.computing_delay + p.period + slewing)
 
 
 def share_left(drive: Drive, p: ParameterValues) -> float:

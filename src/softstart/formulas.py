@@ -43,7 +43,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
-from softstart.drive.checks import elastic_frequency
+from softstart.drive.checks import elastic_frequency, mean_torque_of
 from softstart.errors import InputError
 
 Value = Any  # a float where all arguments are, otherwise an array
@@ -89,7 +89,7 @@ def mean_shaft_torque(M1: ArrayLike, J1: ArrayLike, J2: ArrayLike, Mc: ArrayLike
     52.86
     """
     M1, J1, J2, Mc = _checked(M1=M1, J1=J1, J2=J2, Mc=Mc)
-    return _plain((M1 * J2 + J1 * Mc) / (J1 + J2))
+    return _plain(mean_torque_of(M1, J1, J2, Mc))
 
 
 def dynamic_coefficient(peak: ArrayLike, base: ArrayLike) -> float | Vector:
@@ -172,7 +172,7 @@ def contact_stage(
     M1, J1, J2, Mc, c, dw12 = _checked(M1=M1, J1=J1, J2=J2, Mc=Mc, c=c, dw12=dw12)
     Omega, share = elastic_frequency(J1, J2, c), J2 / (J1 + J2)
     if not _reactive(kind, Mc):
-        mean, B = (M1 * J2 + J1 * Mc) / (J1 + J2), c * dw12 / Omega
+        mean, B = mean_torque_of(M1, J1, J2, Mc), c * dw12 / Omega
         to_peak = np.arctan2(B, -mean)  # pi/2 + psi, accurate also where psi is near -pi/2
         return ContactStage(*_alike(_peak(mean, B), to_peak / Omega, 2 * to_peak / Omega))
     ws, B = np.sqrt(c / J1), dw12 * np.sqrt(c * J1)
@@ -251,7 +251,7 @@ class DirectStarts:
         J1, J2, c, gap, Ms, Mc, theta0 = parts
         self._J1, self._J2, self._c, self._theta0 = J1, J2, c, theta0
         self._flank, self._excess, self._a = gap / 2, Ms - Mc, _approach(Ms, J1, J2, Mc)
-        way, mean = self._flank - theta0, (Ms * J2 + J1 * Mc) / (J1 + J2)
+        way, mean = self._flank - theta0, mean_torque_of(Ms, J1, J2, Mc)
         self._wound = c * np.maximum(-way, 0)  # torque of a shaft that is wound up at the start
         if np.any(self._excess <= 0):
             raise InputError("Ms <= Mc: such a starting torque cannot move the load; raise it.")

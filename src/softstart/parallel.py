@@ -26,7 +26,7 @@ from functools import partial, wraps
 from importlib import import_module
 from itertools import islice
 from queue import Empty, SimpleQueue
-from typing import Any, Literal, NamedTuple, ParamSpec, Self, TypeVar
+from typing import Any, Literal, NamedTuple, ParamSpec, Self, TypeVar, cast
 
 from softstart import __version__
 from softstart.errors import InputError, SimulationError
@@ -166,8 +166,7 @@ class Worker:
             self.kill()
             code = self._process.returncode
             raise DiedError(f"signal {-code}" if code < 0 else f"exit code {code}")
-        found: Message = pickle.loads(message)
-        return found
+        return cast("Message", pickle.loads(message))
 
     def run(self, function: Callable[..., R], *args: Any) -> R:
         """The result of `function(*args)`. Raises what it raised, and DiedError if the process died."""
@@ -178,8 +177,7 @@ class Worker:
             error, text = message.content
             error.add_note(text)
             raise error
-        result: R = message.content
-        return result
+        return cast("R", message.content)
 
     def kill(self) -> None:
         """End the process and all that it has started, at once."""

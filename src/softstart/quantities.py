@@ -293,6 +293,20 @@ def number_in(unit: str, value: object, name: str) -> float:
     raise InputError(f"{name} = {show(value)}: this is a list; give a single value.")
 
 
+def time_above_0(value: object, name: str, advice: str) -> float:
+    """A time above 0 s, as a number or with a unit; `advice` ends the sentence for anything else.
+
+    >>> time_above_0("20 ms", "until", "; leave it out")
+    0.02
+    >>> time_above_0(0.0, "until", "; leave it out")
+    Traceback (most recent call last):
+    softstart.errors.InputError: until = 0.0: give a time above 0 s; leave it out.
+    """
+    if 0.0 < (seconds := number_in("s", value, name)) < math.inf:
+        return seconds
+    raise InputError(f"{name} = {show(value)}: give a time above 0 s{advice}.")
+
+
 def read_multiple(value: object, name: str, endings: Iterable[str] = ("x",)) -> tuple[float, str] | None:
     """The number and the ending of a text as "2x", a multiple of something; None for anything else.
 

@@ -69,8 +69,8 @@ def find(extent: Extent, progress: Progress) -> Findings:
         rows.append(Row(t, best, _two_masses(drive, t)))
     rows.reverse()
     names = ready_controller_names() if extent.strategies is None else extent.strategies
-    start: Any = simulate  # of chains too
-    return Findings(tuple(rows), tuple(start(machine, name) for name in names))
+
+    return Findings(tuple(rows), tuple(simulate(machine, name) for name in names))
 
 
 def _two_masses(drive: Drive, start_time: float) -> Optimum | None:

@@ -107,7 +107,7 @@ def _fixed(tuning: Tuning) -> Controller:
 
 
 def _starts(worn: MachineTable, controller: Controller, fitted_to: Drive | None) -> tuple[Vector, Vector]:
-    found: Any = simulate(worn, controller, fitted_to=fitted_to)
+    found = simulate(worn, controller, fitted_to=fitted_to)
     return np.asarray(found.k_dyn), np.asarray(found.start_time)
 
 

@@ -17,7 +17,9 @@ import pytest
 
 import softstart
 from softstart import Command, Drive, InputError, PlainController, SimulationError, plugins, simulate
+from softstart.chain.two_masses import verify_on_chain
 from softstart.controller import Measured, controller_class, make_controller
+from softstart.tuning.problem import recipe_of
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -200,3 +202,27 @@ def test_a_compiled_controller_with_a_mistake_is_refused_in_a_sentence(tmp_path,
     file.write_text(text.replace(right, wrong), encoding="utf-8")
     with pytest.raises(InputError, match=said):
         simulate(Drive.load("crane-4amtkf"), f"{file}:Direct")
+
+
+def test_every_analysis_takes_a_name_a_class_and_an_object() -> None:
+    """All name the same controller, so their figures are equal to the bit."""
+    cls = type(make_controller("ramp"))
+    given = ("ramp", cls, cls())
+    chain = softstart.Chain.load("crane-4-mass")
+    drive = chain.design_drive
+    doors: tuple[Callable[[Any], float], ...] = (
+        lambda each: simulate(CRANE, each).k_dyn,
+        lambda each: softstart.compare(CRANE, [each]).rows[0].run.k_dyn,
+        lambda each: float(softstart.sweep(CRANE, each, {"controller.time": [0.1]}, workers=1).k_dyn[0]),
+        lambda each: recipe_of(each).make({"time": 0.1}).parameters["time"],
+        lambda each: float(softstart.linear_view(CRANE, each).kind == "open loop"),
+        lambda each: verify_on_chain(chain, drive, each).chain_k_dyn,
+    )
+    for door in doors:
+        assert len({door(each) for each in given}) == 1
+    assert make_controller(cls, {"time": "120 ms"}) == make_controller("ramp", {"time": "120 ms"})
+    assert softstart.sweep(CRANE, cls, {"gap": [1.0]}, until="0.3 s", workers=1).k_dyn[0] > 0.0
+    with pytest.raises(InputError, match=r"ramp has no such parameter"):
+        simulate(CRANE, cls, parameters={"tme": 0.1})
+    with pytest.raises(InputError, match=r"is no controller; derive the class"):
+        simulate(CRANE, int)  # type: ignore[arg-type]

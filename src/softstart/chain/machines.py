@@ -29,7 +29,7 @@ SINGLE = "machine_table: all values are single; give a list for one, as gap=[0.5
 Values = dict[str, tuple[Parameter, Any]]  # by path
 
 
-def as_machine(given: MachineLike, name: str = "drive") -> Machine:
+def as_machine(given: object, name: str = "drive") -> Machine:
     """The drive or chain, or that of a name or file; InputError for anything else. `name` is the argument's.
 
     >>> as_machine("crane-4-mass").name == Chain.load("crane-4-mass").name

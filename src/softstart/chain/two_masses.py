@@ -15,12 +15,12 @@ import numpy as np
 from softstart import formulas
 from softstart.chain.machines import as_chain
 from softstart.chain.model import Chain
-from softstart.controller.base import Controller
-from softstart.controller.finding import make_controller, ready_controller_names
+from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.profile import TorqueProfile
 from softstart.results import OneLine
+from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -83,7 +83,7 @@ class Verification(OneLine):
 def verify_on_chain(
     chain: Chain | str,
     drive: Drive,
-    controller: str | Controller,
+    controller: ControllerLike,
     until: float | None = None,
     *,
     parameters: Mapping[str, object] | None = None,
@@ -96,8 +96,8 @@ def verify_on_chain(
         The whole chain, or the name or file of one.
     drive : Drive
         The two-mass drive to which it is reduced, a single one.
-    controller : str or Controller
-        A name, `path/to/file.py:ClassName`, or a Controller object.
+    controller : str, Controller or torque over time
+        As in `simulate`.
     until : float, optional
         End of both runs, s; by default each ends one elastic period after its own start time.
     parameters : mapping, optional
@@ -128,7 +128,7 @@ def verify_on_chain(
     ----------
     What a reduction keeps: [R].
     """
-    chain, made = as_chain(chain), make_controller(controller, parameters)
+    chain, made = as_chain(chain), as_controller(controller, parameters)
     whole = simulate(chain, made, until, fitted_to=drive, base=drive)
     return Verification(simulate(drive, made, until), whole)
 
@@ -182,7 +182,7 @@ class TwoMassError(OneLine):
 
 
 def two_mass_error(
-    chain: Chain | str, drive: Drive | None = None, controllers: Sequence[str | Controller] | None = None
+    chain: Chain | str, drive: Drive | None = None, controllers: Sequence[ControllerLike] | None = None
 ) -> TwoMassError:
     """How far K_dyn of a chain is from that of the two masses that stand for it.
 
@@ -222,7 +222,7 @@ def two_mass_error(
     drive = chain.design_drive if drive is None else drive
     verified, failed = [], {}
     for one in ready_controller_names() if controllers is None else controllers:
-        controller = make_controller(one)
+        controller = as_controller(one)
         try:
             controller.set_up(drive)
         except InputError:

@@ -4,11 +4,15 @@ Options that several commands have alike; the docstring of a command describes i
 
 --allow-code
     Allow a file of tuned gains to name a Python file, which is then executed.
+--controllers A,B,...
+    Strategies, separated by commas. Default: all installed ones that need no parameter.
 --fitted-to DRIVE
     Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check their
     robustness. --set changes DRIVE only.
 --json
     Print the result as one JSON object.
+--param CONTROLLER.KEY=VALUE
+    Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
 --scheduler ADDRESS
     Compute on the dask cluster of this scheduler.
 --set KEY=VALUE

@@ -60,8 +60,6 @@ def report_command(
         PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
     --controllers A,B,...
         Strategies to compare, including files of tuned gains. Default: all that need no parameter.
-    --param CONTROLLER.KEY=VALUE
-        Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.
     --resolution KEY=STEP,...
         Resolution of the inverter parameters, for example
         torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in

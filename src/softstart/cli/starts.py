@@ -42,10 +42,6 @@ def compare_command(
 
     Options
     -------
-    --controllers A,B,...
-        Strategies, separated by commas. Default: all installed ones that need no parameter.
-    --param CONTROLLER.KEY=VALUE
-        Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
     --worst-case A,B,...
         Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. Default:
         both.
@@ -110,7 +106,7 @@ def simulate_command(
     """
     with working("starting the drive ..."), attributed():
         (strategy,) = controllers_from_options([controller], params, several=False)
-        run: Any = softstart.simulate(drive, strategy, until, fitted_to=fitted_to)
+        run = softstart.simulate(drive, strategy, until, fitted_to=fitted_to)
         _ = run.settled_time  # it may ask the controller on
     from softstart.start.recommendation import margins_of
     from softstart.views.starts import run_sheet
@@ -154,10 +150,6 @@ def fatigue_command(
 
     Options
     -------
-    --controllers A,B,...
-        Strategies, separated by commas. Default: all installed ones that need no parameter.
-    --param CONTROLLER.KEY=VALUE
-        Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
     --slope M
         Slope of the S-N curve, instead of limits.fatigue.slope. Default: 6.6, pitting of case-hardened
         gears.

@@ -32,9 +32,9 @@ from softstart.clutch.motion import (
     step_from,
     values,
 )
-from softstart.errors import InputError, SimulationError
+from softstart.errors import SimulationError
 from softstart.input.files import object_of
-from softstart.quantities import number_in
+from softstart.quantities import time_above_0
 from softstart.results import Result
 
 MOST_STEPS = 400_000
@@ -233,11 +233,8 @@ def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None
     ('LOCKED', 4.1527, 1.2123, True)
     """
     clutch = object_of(clutch, Clutch, Clutch.load, "clutch: give one Clutch")
-    end: float | None = None
-    if until is not None:
-        end = number_in("s", until, "until")
-        if not end > 0.0:
-            raise InputError(f"until = {until!r}: the end of the run is a time above 0 s.")
+    advice = "; leave it out to run to the lock-up"
+    end = None if until is None else time_above_0(until, "until", advice)
     law = clutch.friction
     events: list[EngagementEvent] = []
     steps, mode, lost = _steps(clutch, law, end, events)

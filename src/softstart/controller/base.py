@@ -329,9 +329,9 @@ def _next_sample(controller: PlainController, time: float) -> float:
     return (math.floor(time / period + SAME_SAMPLE) + 1.0) * period
 
 
-def label_of(controller: Controller) -> str:
+def label_of(controller: Controller | type[Controller]) -> str:
     """The name under which a controller stands in tables: its own, or that of its class."""
-    return controller.name or type(controller).__name__
+    return controller.name or getattr(controller, "__name__", type(controller).__name__)
 
 
 def effort_of(controller: Controller) -> Effort:

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from softstart.controller.base import Controller
+from softstart.controller.base import Controller, label_of
 from softstart.controller.parameters import declared_parameters
 from softstart.controller.tuned import (
     RobustFile,
@@ -27,6 +27,8 @@ from softstart.hints import did_you_mean
 from softstart.input.files import refusal_of
 from softstart.plugins import CONTROLLERS, controller_names, load
 from softstart.quantities import show
+
+Named = str | Controller | type[Controller]  # a controller, its class, or the name of one
 
 
 def ready_controller_names(given: Collection[str] = ()) -> tuple[str, ...]:
@@ -45,14 +47,16 @@ def _needs_something(name: str) -> bool:
         return False  # that it is broken is told where it is used
 
 
-def controller_class(name: str) -> type[Controller]:
-    """The class behind a name or behind `path/to/file.py:ClassName`.
+def controller_class(name: str | type[Controller]) -> type[Controller]:
+    """The class behind a name or behind `path/to/file.py:ClassName`; a class itself is checked.
 
     Raises InputError in one sentence for an unknown name, a missing file or class.
 
     >>> controller_class("direct").__name__
     'Direct'
     """
+    if isinstance(name, type):
+        return _checked(name, name.__name__)
     if ".py:" in name or name.endswith(".py"):
         return _from_file(name)
     cls = load(CONTROLLERS, "controller", name, "softstart controllers")
@@ -60,16 +64,16 @@ def controller_class(name: str) -> type[Controller]:
 
 
 def make_controller(
-    name: str | Controller, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
+    name: Named, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
 ) -> Controller:
     """A controller from its name and parameters.
 
     Parameters
     ----------
-    name : str or Controller
-        A name, `path/to/file.py:ClassName`, a file of tuned gains (.toml), or a finished controller.
+    name : str, Controller or subclass of Controller
+        A name, `path/to/file.py:ClassName`, a file of tuned gains (.toml), a class, or a finished controller.
     parameters : mapping, optional
-        Values by name, each a number in SI or a text with a unit.
+        Its parameters: SI numbers or strings with a unit.
     allow_code : bool
         Whether a file of gains may run a Python file that it names. Installed controllers always run.
 
@@ -95,14 +99,15 @@ def make_controller(
                 f"{type(name).__name__}; give them to the controller itself."
             )
         return name
-    if not isinstance(name, str):
+    if not isinstance(name, str | type):
         raise InputError(
-            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, "
+            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, a class, "
             "or a Controller object."
         )
-    if is_gain_file(name):
+    if isinstance(name, str) and is_gain_file(name):
         return _tuned(Path(name), parameters, allow_code)
     cls = controller_class(name)
+    name = name if isinstance(name, str) else label_of(cls)
     values, wrong = _values(cls, name, parameters or {})
     missing = [
         f.name

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from softstart.controller.base import Controller, label_of
-from softstart.controller.finding import controller_class, make_controller
+from softstart.controller.finding import Named, controller_class, make_controller
 from softstart.controller.tuned import is_gain_file
 from softstart.drive.machine import Machine
 from softstart.plugins import CONTROLLERS, registered
@@ -18,7 +18,7 @@ from softstart.plugins import CONTROLLERS, registered
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """A controller by name and parameters, or a finished one; "" where several are an axis of a sweep.
+    """A controller by name or class with parameters, or a finished one; "" where names are an axis.
 
     `allow_code` is that of files of tuned gains, see `make_controller`.
 
@@ -27,7 +27,7 @@ class Recipe:
     (0.12, 10.0)
     """
 
-    given: str | Controller = ""
+    given: Named = ""
     values: Mapping[str, object] = field(default_factory=dict)
     allow_code: bool = False
 
@@ -41,21 +41,21 @@ class Recipe:
     def class_of(self, name: str = "") -> type[Controller]:
         """The class of the controller; `name` where it is from an axis."""
         source = name or self.given
-        if isinstance(source, str) and not is_gain_file(source):
-            return controller_class(source)
-        return type(make_controller(source, allow_code=self.allow_code))
+        if isinstance(source, Controller) or (isinstance(source, str) and is_gain_file(source)):
+            return type(make_controller(source, allow_code=self.allow_code))
+        return controller_class(source)
 
     @property
     def label(self) -> str:
         """What the controller is called in a sentence or a title."""
-        return label_of(self.given) if isinstance(self.given, Controller) else self.given
+        return self.given if isinstance(self.given, str) else label_of(self.given)
 
     @property
     def name(self) -> str:
-        """The name under which files find the controller, "" for an object whose class is not installed."""
+        """The name under which files find the controller, "" for one whose class is not installed."""
         if isinstance(self.given, str):
             return self.given
-        cls = type(self.given)
+        cls = self.given if isinstance(self.given, type) else type(self.given)
         point = registered(CONTROLLERS).get(cls.name)
         address = f"{cls.__module__}:{cls.__qualname__}"
         return cls.name if point is not None and point.value == address else ""
@@ -64,7 +64,8 @@ class Recipe:
         """All of it as plain data: equal data make controllers that answer alike."""
         if isinstance(self.given, Controller):
             return _plain(self.given)
-        return {**about_name(self.given), "parameters": _plain(dict(self.values))}
+        about = about_name(self.given) if isinstance(self.given, str) else {"class": _address(self.given)}
+        return {**about, "parameters": _plain(dict(self.values))}
 
 
 def with_whole_path(name: str) -> str:
@@ -107,9 +108,13 @@ def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if is_dataclass(value):
-        kind = f"{type(value).__module__}.{type(value).__qualname__}"
-        return {"class": kind} | {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        values = {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {"class": _address(type(value)), **values}
     return repr(value)
+
+
+def _address(cls: type) -> str:
+    return f"{cls.__module__}.{cls.__qualname__}"
 
 
 def _of_file(path: Path) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.input.parameters import Parameter, Wording
 from softstart.quantities import RefusedError, Units, show
 
@@ -18,6 +19,7 @@ FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_fr
 GRAVITY: Final = 9.80665  # m/s^2
 
 Values = Mapping[str, Any]
+Numeric = TypeVar("Numeric", float, Vector)
 
 
 def elastic_frequency(J1: Any, J2: Any, c: Any) -> Any:
@@ -31,6 +33,15 @@ def elastic_frequency(J1: Any, J2: Any, c: Any) -> Any:
     with np.errstate(over="ignore"):
         Omega = np.sqrt(np.divide(c, J1) + np.divide(c, J2))
     return float(Omega) if np.ndim(Omega) == 0 else Omega
+
+
+def mean_torque_of(M1: Numeric, J1: Numeric, J2: Numeric, Mc: Numeric) -> Numeric:
+    """`M12avg = (M1 J2 + J1 Mc)/(J1 + J2)`, N m, [G](11): it accelerates both masses alike.
+
+    >>> round(mean_torque_of(62.0, 0.035, 0.175, 7.16), 6)
+    52.86
+    """
+    return (M1 * J2 + J1 * Mc) / (J1 + J2)
 
 
 def wrong_units(values: Values, parameter: Parameter, wording: Wording) -> Iterator[str]:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final, Literal, Self, get_args
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
+from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, mean_torque_of, wrong_units
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
@@ -535,8 +535,7 @@ class Drive(ParameterFile, Machine):
         >>> round(crane.mean_torque, 2), round(crane.replace(motor_friction=6.0).mean_torque, 2)
         (52.86, 47.86)
         """
-        push = self.Ms - self.motor_friction
-        return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
+        return mean_torque_of(self.Ms - self.motor_friction, self.J1, self.J2, self.Mc)
 
     @property
     def lever_rule_model(self) -> TwoMasses:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from softstart.drive.checks import GRAVITY, elastic_frequency
+from softstart.drive.checks import GRAVITY, elastic_frequency, mean_torque_of
 from softstart.drive.machine import Machine, TwoMasses
 
 # usual speeds of the load, m/min; lifts, which have a counterweight, are faster
@@ -131,7 +131,7 @@ def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
     An active load turns back in the gap; the flanks meet at sqrt(2 a travel).
     """
     J = of.J1 * of.J2 / (of.J1 + of.J2)
-    mean = (of.Ms * of.J2 + of.J1 * of.Mc) / (of.J1 + of.J2)
+    mean = mean_torque_of(of.Ms, of.J1, of.J2, of.Mc)
     if not mean > 0.0:
         return math.nan
     a = of.Ms / of.J1 + math.copysign(of.falling, of.Mc - of.friction) / of.J2

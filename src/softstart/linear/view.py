@@ -20,7 +20,6 @@ from typing import Any
 
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
-from softstart.controller.finding import make_controller
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
@@ -29,6 +28,7 @@ from softstart.linear.loop import Loop, Margins
 from softstart.linear.plant import at_one_position, plant_scales
 from softstart.linear.systems import Mode
 from softstart.results import Result
+from softstart.start.demand import ControllerLike, as_controller
 
 VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1)))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
@@ -177,10 +177,10 @@ class LinearView(Result, view="linear.linear_sheet"):
 
 def linear_view(
     drive: MachineLike,
-    controller: str | Controller,
+    controller: ControllerLike,
     parameters: Mapping[str, object] | None = None,
     *,
-    fitted_to: Machine | None = None,
+    fitted_to: MachineLike | None = None,
 ) -> LinearView:
     """Linearise a controller as it runs, in contact, and analyse its loop: margins, modes, limit cycles.
 
@@ -191,8 +191,8 @@ def linear_view(
     ----------
     drive : Drive, Chain, str or path
         A drive or chain, or the name or file of one.
-    controller : str or Controller
-        A name, `path/to/file.py:ClassName`, or a Controller object, built in or not.
+    controller : str, Controller or torque over time
+        As in `simulate`.
     parameters : mapping, optional
         Parameters of a controller given by name; numbers in SI, or text with units.
     fitted_to : Drive or Chain, optional
@@ -218,7 +218,7 @@ def linear_view(
     >>> linear_view("crane-4amtkf", "ramp").kind
     'open loop'
     """
-    drive, strategy = as_machine(drive), make_controller(controller, parameters)
+    drive, strategy = as_machine(drive), as_controller(controller, parameters)
     fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
     for machine in (drive, fitted_to or drive):
         if machine.motor is None or machine.target_speed is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from softstart import __version__
 from softstart.chain.machines import MachineLike, as_machine
-from softstart.controller import Controller, make_controller, ready_controller_names
+from softstart.controller import ready_controller_names
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.input.files import write_whole
@@ -26,6 +26,7 @@ from softstart.optimal.torque_speed import Corners
 from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.results import OneLine, Result
+from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.recommendation import SLOW
 from softstart.start.simulation import simulate
 from softstart.store import PartStore, Target
@@ -235,7 +236,7 @@ def pareto(
     start_times: Sequence[float | str | StartTime] | None = None,
     *,
     terminal: Terminal = "reached",
-    controllers: Sequence[str | Controller] | None = None,
+    controllers: Sequence[ControllerLike] | None = None,
     torque_speed: tuple[tuple[float, float], ...] = (),
     smoothness: float = 0.0,
     base: Machine | None = None,
@@ -260,7 +261,7 @@ def pareto(
         ("1.2x"); by default `default_start_times(drive, terminal)`.
     terminal, torque_speed, smoothness, base : optional
         As in `optimize`.
-    controllers : sequence of str or Controller, optional
+    controllers : sequence of str, Controller or torque over time, optional
         What to put beside the curve, each judged by the optimum at its own start time with terminal
         `reached`; by default all installed controllers that run without being given a parameter.
     save_to : str or path, optional
@@ -300,7 +301,7 @@ def pareto(
     tell = progress or (lambda doing: None)
     times = None if start_times is None else _seconds(start_times, drive, torque_speed)
     names = ready_controller_names() if controllers is None else controllers
-    made = [make_controller(one) for one in names]
+    made = [as_controller(one) for one in names]
     inputs = {
         "version of softstart": __version__,
         "drive": drive.to_toml(),

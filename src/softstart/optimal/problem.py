@@ -15,7 +15,7 @@ import numpy as np
 from softstart.chain.machines import as_machine
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
-from softstart.quantities import read_multiple, to_si
+from softstart.quantities import read_multiple, time_above_0
 
 if TYPE_CHECKING:
     from softstart.start.run import Run
@@ -43,16 +43,14 @@ class StartTime:
         """
         if isinstance(given, StartTime):
             return given
-        either = 'or a multiple of the start time of direct, as "1.2x".'
         try:
-            number, ending = read_multiple(given, name) or (given, "")
-            value: Any = to_si(number, "s", name=name) if isinstance(number, str) else number
+            multiple = read_multiple(given, name)
+            value = given if multiple is None else multiple[0]
+            return cls(time_above_0(value, name, ', as 0.3 or "300 ms"'), multiple is not None)
         except InputError as error:
-            raise InputError(f"{one.removesuffix('.')}, {either}" for one in error.sentences) from None
-        if not _number(value) or not 0.0 < float(value) < math.inf:
-            shown = f'"{given}"' if isinstance(given, str) else repr(given)
-            raise InputError(f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", {either}')
-        return cls(float(value), bool(ending))
+            either = 'or a multiple of the start time of direct, as "1.2x".'
+            sentences = [f"{sentence.removesuffix('.')}, {either}" for sentence in error.sentences]
+            raise InputError(sentences) from None
 
     def seconds(self, direct: Callable[[], float]) -> float:
         """The bound in s; `direct` gives the start time of the drive under its constant starting torque."""

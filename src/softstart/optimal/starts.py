@@ -34,7 +34,7 @@ class DemandRun:
 
     def reached(self, target: float, latest: float, load: int) -> float:
         """When the load first has its target speed, s; if not until `latest`, when it comes nearest to it."""
-        time = float(self.trajectory.notes["start_time"])
+        time = float(self.trajectory.notes.start_time)
         if time <= latest:
             return time
         times = np.linspace(0.5 * latest, latest, 257)

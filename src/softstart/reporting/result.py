@@ -37,6 +37,7 @@ from softstart.start.comparison import (
     compared,
     make_controllers,
 )
+from softstart.start.demand import ControllerLike
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
@@ -256,7 +257,7 @@ class Report(Result):
 def report(
     drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
     *,
-    controllers: Sequence[str | Controller] | None = None,
+    controllers: Sequence[ControllerLike] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     resolution: Resolution | Mapping[str, object] | str | None = None,
     budget: float | None = None,
@@ -395,7 +396,7 @@ def _checked_options(
 
 
 def _named_controllers(
-    controllers: Sequence[str | Controller] | None, parameters: Mapping[str, Mapping[str, object]]
+    controllers: Sequence[ControllerLike] | None, parameters: Mapping[str, Mapping[str, object]]
 ) -> list[Controller]:
     """The controllers, each with a name of its own, `direct` among them."""
     made = make_controllers(controllers, parameters)

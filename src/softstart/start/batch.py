@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.arrays import Matrix
+from softstart.arrays import Matrix, Vector
 from softstart.controller.base import Controller, SetUp, numbers_of
 from softstart.drive import PARAMETERS, Drive, Limits
+from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable, each_of
 from softstart.kernel import records as rec
 from softstart.parallel import checked_workers
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import xarray
 
 Indices = NDArray[np.int64]
+Machines = MachineTable | Sequence[Machine]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ class Batch:
     def figures(
         self,
         set_ups: Iterable[SetUp],
-        base: Any,
+        base: Vector | float,
         which: Indices | slice = slice(None),
         *,
         until: float | None = None,
@@ -87,7 +89,7 @@ class Batch:
     def read(
         self,
         results: StartResults,
-        base: Any,
+        base: Vector | float,
         which: Indices | slice = slice(None),
         until: float | None = None,
     ) -> Figures:
@@ -116,14 +118,12 @@ def figure_columns(shaft_names: tuple[str, ...]) -> Figures:
     count, zero = len(shaft_names), np.zeros(1, dtype=np.int64)
     results = StartResults(np.zeros(1, rec.NOTES), np.zeros((1, count), rec.SHAFT_NOTES))
     results.starts["release_time"] = math.nan
-    limits: Any = Limits(shaft_torque=np.ones(1), used_torque=1.0)  # type: ignore[arg-type]
+    limits = Limits(shaft_torque=np.ones(1), used_torque=1.0)  # type: ignore[arg-type]
     starts, permissible = zeros((), count + 1), np.ones((1, count))
     return Batch(shaft_names, zero[None], zero + 1, starts, permissible, limits).read(results, 1.0)
 
 
-def prepared(
-    machines: MachineTable | Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
-) -> Batch:
+def prepared(machines: Machines, time_limit: float | None = None, max_events: int = MAX_EVENTS) -> Batch:
     """Machines that go through one call of the kernel; InputError for machines that do not match.
 
     >>> from softstart.controller import make_controller
@@ -149,7 +149,7 @@ def prepared(
     return Batch(parts[0].shaft_names, places, positions, starts, permissible, _limits_of(parts))
 
 
-def _limits_of(parts: Sequence[Any]) -> Limits:
+def _limits_of(parts: Sequence[Machine]) -> Limits:
     """The limits of each machine; one without a limit may have any figure."""
 
     def every(name: str) -> Any:
@@ -163,11 +163,11 @@ def _limits_of(parts: Sequence[Any]) -> Limits:
 
 
 def simulate_many(
-    machines: MachineTable | Sequence[Any],
+    machines: Machines,
     controller: Controller,
     until: float | None,
-    fitted_to: Any,
-    base: Any,
+    fitted_to: Machine | MachineTable | None,
+    base: Machine | MachineTable | None,
     time_limit: float | None,
     max_events: int,
     workers: int | None = None,
@@ -211,7 +211,7 @@ def simulate_many(
     return _dataset(data, coordinates)
 
 
-def _different(machines: Sequence[Any]) -> Iterator[tuple[str, list[Any]]]:
+def _different(machines: Sequence[Machine]) -> Iterator[tuple[str, list[Any]]]:
     """The parameters in which drives of a list differ; of chains they are not known by name."""
     for name in PARAMETERS if all(isinstance(one, Drive) for one in machines) else ():
         values = [getattr(machine, name) for machine in machines]

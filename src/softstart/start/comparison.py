@@ -62,7 +62,7 @@ class Uncertain(Protocol):
 def intervals(
     run: Run,
     drawn: MachineTable,
-    controller: str | Controller,
+    controller: ControllerLike,
     until: float | str | None = None,
     fitted_to: Machine | None = None,
 ) -> dict[str, tuple[float, float]]:
@@ -71,7 +71,7 @@ def intervals(
     The controller is set up as in `run`; each K_dyn refers to the mean torque of its own drive. Where the
     life of the shaft line is limited, `used_life` in % too.
     """
-    starts: Any = simulate(drawn, controller, until, fitted_to=fitted_to or run.drive)
+    starts = simulate(drawn, controller, until, fitted_to=fitted_to or run.drive)
     every = {name: np.asarray(starts[name]) for name in UNCERTAIN_FIGURES}
     middle = {name: float(getattr(run, name)) for name in UNCERTAIN_FIGURES}
     if checked_limits(run.drive).life is not None:
@@ -182,9 +182,8 @@ def compare(
         an identification each row has `intervals` over 200 drives that its logs leave possible, and limits
         must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
-        Names, `path/to/file.py:ClassName`, files of tuned gains, Controller objects, or torques over time, as
-        `simulate` takes them. By default all
-        installed controllers that need no parameter, and those that are given parameters.
+        Each as in `simulate`. By default all installed controllers that need no parameter, and those that
+        are given parameters.
     parameters : mapping, optional
         A controller's name -> its parameters (SI numbers or strings with a unit).
     until : float or str, optional

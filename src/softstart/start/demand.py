@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from softstart.controller.base import Command, Controller, PlainController
 from softstart.controller.finding import make_controller
 from softstart.controller.parameters import parameter
+from softstart.controller.recipe import Recipe
 from softstart.kernel.records import Measured
 from softstart.profile import TorqueProfile
 
 OverTime = TorqueProfile | tuple[ArrayLike, ArrayLike] | Callable[[float], float]
-ControllerLike = str | os.PathLike[str] | Controller | OverTime
+ControllerLike = str | os.PathLike[str] | Controller | type[Controller] | OverTime
 SAMPLE_PERIOD = 1e-3  # s, of a function of time
 
 
@@ -50,4 +51,18 @@ def as_controller(controller: ControllerLike, parameters: Mapping[str, object] |
         return make_controller("profile", {**(parameters or {}), "profile": controller})
     if callable(controller) and not isinstance(controller, Controller | type):
         controller = TorqueFunction(controller)
-    return make_controller(controller, parameters)  # type: ignore[arg-type]  # which refuses anything else
+    return make_controller(controller, parameters)  # which refuses anything else
+
+
+def as_recipe(
+    controller: ControllerLike, parameters: Mapping[str, object] | None = None, allow_code: bool = False
+) -> Recipe:
+    """The same as data. A name or a class stays one, so that its parameters may be axes of a sweep.
+
+    >>> as_recipe("ramp", {"time": 0.1}).make().parameters["time"]
+    0.1
+    """
+    given = os.fspath(controller) if isinstance(controller, os.PathLike) else controller
+    if isinstance(given, str | type):
+        return Recipe(given, dict(parameters or {}), allow_code)
+    return Recipe(as_controller(given, parameters))

@@ -22,11 +22,12 @@ from softstart.controller.base import (
     label_of,
     reply_of,
 )
+from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.kernel.motor import M_TIME, NEW_STATE
 from softstart.kernel.records import Measured
-from softstart.quantities import number_in, show
+from softstart.quantities import time_above_0
 from softstart.start.status import Status, status_of
 from softstart.start.trajectory import StartRecorder
 
@@ -100,7 +101,7 @@ def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, 
             return reason
 
 
-def _run_compiled(controller: CompiledController, drive: Any, recorder: StartRecorder) -> int:
+def _run_compiled(controller: CompiledController, drive: Drive, recorder: StartRecorder) -> int:
     """The same under a compiled controller: the loop itself runs in the kernel."""
     numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, as the kernel wants it
     memory = np.zeros(controller.state_size)
@@ -132,25 +133,15 @@ def check_limits(
     until: object, time_limit: object, max_events: object, machine: str
 ) -> tuple[float | None, float | None, int]:
     """The end, the time limit and the cap on events of a start of a `machine` (drive or chain)."""
-    until = _time("until", until, "leave it out to run to the start time")
-    time_limit = _time(
-        "time_limit", time_limit, f"leave it out for a hundred times a stiff {machine}'s start"
-    )
+    end = None if until is None else time_above_0(until, "until", "; leave it out to run to the start time")
+    default = f"; leave it out for a hundred times a stiff {machine}'s start"
+    latest = None if time_limit is None else time_above_0(time_limit, "time_limit", default)
     if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
         raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
-    return until, time_limit, int(max_events)
+    return end, latest, int(max_events)
 
 
-def _time(name: str, value: object, remedy: str) -> float | None:
-    """A time above 0 s, as a number or with a unit, or None."""
-    if value is None:
-        return None
-    if 0.0 < (seconds := number_in("s", value, name)) < math.inf:
-        return seconds
-    raise InputError(f"{name} = {show(value)}: give a time above 0 s; {remedy}.")
-
-
-def ended(notes: Any, reason: int, until: float | None, max_events: int, start: str) -> Status:
+def ended(notes: rec.ResultRecord, reason: int, until: float | None, max_events: int, start: str) -> Status:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
     status = status_of(reason, not math.isnan(notes.start_time), until is not None, notes.braked == 1.0)
     if status.finished:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import quantity_of
-from softstart.drive import SNCurve
+from softstart.drive import Machine, SNCurve
 from softstart.errors import InputError, Sentence
 from softstart.kernel import records as rec
 from softstart.quantities import number_in
@@ -20,6 +20,7 @@ from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
+AnyMachine = TypeVar("AnyMachine", bound=Machine)
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
 DEFAULT_SLOPE = 6.6
 # reversals by no more than this share of the peak are rounding
@@ -163,7 +164,7 @@ class Fatigue(Result, view="fatigue.fatigue_sheet"):
     Rainflow counting: ASTM E1049.
     """
 
-    drive: Any
+    drive: Any  # a Machine
     curve: SNCurve
     rows: tuple[Life, ...]
     slope_given: bool
@@ -363,7 +364,7 @@ def estimated_ratio(gears: int, couplings: int) -> float:
     return min(RATIO_OF_A_GEAR * gears + RATIO_OF_A_COUPLING * couplings, LARGEST_RATIO)
 
 
-def damped(machine: Any, estimate: Mapping[str, int], factor: float = 1.0) -> Any:
+def damped(machine: AnyMachine, estimate: Mapping[str, int], factor: float = 1.0) -> AnyMachine:
     """The machine with `factor` times the damping ratio that is estimated, in its shafts without damping.
 
     Raises `InputError` if each has one of its own.
@@ -378,7 +379,7 @@ def damped(machine: Any, estimate: Mapping[str, int], factor: float = 1.0) -> An
     return machine.with_damping_ratio(ratio)
 
 
-def undamped(machine: Any) -> list[str]:
+def undamped(machine: Machine) -> list[str]:
     """The elastic shafts without damping, by their names.
 
     >>> from softstart import Drive
@@ -449,7 +450,7 @@ def life_ratio(reference: float, damage: float) -> float:
     return reference / damage if damage > 0.0 else math.inf
 
 
-def _again(run: Run, machine: Any) -> Run:
+def _again(run: Run, machine: Machine) -> Run:
     """The same start of a changed machine, its controller as it was set up."""
     until = max(one.end_time for one in run.each) if math.isnan(run.start_time) else None
     return simulate(machine, run.controller, until, fitted_to=run.design_drive, base=run.base)
@@ -509,7 +510,7 @@ def _runs(runs: object) -> list[Run]:
     return found
 
 
-def _check_shafts(machine: Any) -> None:
+def _check_shafts(machine: Machine) -> None:
     columns = zip(machine.shaft_names, machine.stiffnesses, machine.gaps, strict=True)
     if rigid := [name for name, c, gap in columns if math.isinf(c) and gap > 0.0]:
         raise InputError(
@@ -532,7 +533,7 @@ def _check_shafts(machine: Any) -> None:
         )
 
 
-def _curve(machine: Any, slope: float | None) -> tuple[SNCurve, bool]:
+def _curve(machine: Machine, slope: float | None) -> tuple[SNCurve, bool]:
     """The S-N curve asked for, and whether it was."""
     own = machine.limits.fatigue
     if slope is None:
@@ -545,7 +546,7 @@ def _curve(machine: Any, slope: float | None) -> tuple[SNCurve, bool]:
     return SNCurve(m, own.points if own is not None else ()), True
 
 
-def _read_gap(worn_gap: float | str | None, machine: Any) -> float:
+def _read_gap(worn_gap: float | str | None, machine: Machine) -> float:
     if worn_gap is None:
         return math.nan
     gap, own = quantity_of(machine, "gap", worn_gap, "worn_gap"), float(machine.gaps.sum())

@@ -21,6 +21,7 @@ from softstart.kernel.motor import encoder_count
 if TYPE_CHECKING:
     from softstart.chain.arrays import ChainArrays
     from softstart.chain.model import Chain
+    from softstart.chain.periodic_torque import PeriodicTorque
 
 LAWS: Final = {"no-pull": rec.NO_PULL, "dead-zone": rec.DEAD_ZONE, "modelica": rec.MODELICA}
 LONGEST: Final = 100_000  # elastic periods of one start
@@ -39,7 +40,7 @@ class KernelInput:
     tones: Matrix  # harmonics of exciting torques, the same for all starts
 
     @property
-    def machine(self) -> Any:
+    def machine(self) -> rec.MachineRecord:
         """The first row of `machines`, by names."""
         return self.machines[0].view(rec.MACHINE)[0]
 
@@ -59,7 +60,7 @@ class KernelInput:
         motor, load = int(self.machine.motor), int(self.machine.load)
         return motor if load > motor or motor == 0 else motor - 1
 
-    def take(self, which: Any) -> KernelInput:
+    def take(self, which: NDArray[np.int64] | slice) -> KernelInput:
         """Some of the starts."""
         machines, masses, shafts = self.machines[which], self.masses[which], self.shafts[which]
         return KernelInput(machines, masses, shafts, self.curves[which], self.tones)
@@ -99,7 +100,7 @@ def kernel_input(
     machine: Machine,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
-    excitation: Mapping[str | int, Any] | None = None,
+    excitation: Mapping[str | int, PeriodicTorque] | None = None,
 ) -> KernelInput:
     """A machine as a row of the kernel; columns of drives as many.
 
@@ -171,7 +172,7 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     friction, b1, b2 = map(column, drive.frictions)
     w1, w2 = column(drive.initial_motor_speed), column(drive.initial_load_speed)
     target = column(drive.target_speed)
-    named["period"] = 2.0 * math.pi / np.sqrt(c * (1.0 / J1 + 1.0 / J2))
+    named["period"] = column(drive.elastic_period)
     _motor(named, drive, column)
     named["target"], named["release_at"] = target, column(drive.release_time)
     named["load"] = 1.0
@@ -186,7 +187,7 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     return made, np.atleast_1d((J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net)
 
 
-def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[KernelInput, Vector]:
+def _of_chain(chain: Chain, excitation: Mapping[str | int, PeriodicTorque]) -> tuple[KernelInput, Vector]:
     """The row of a chain, and how long a stiff one takes: infinite where that is not known."""
     arrays = chain.at_motor_shaft()
     _refuse(chain, arrays)
@@ -263,8 +264,7 @@ def _driven_by_curves(made: KernelInput, left: float, heavier: Vector, speeds: f
 
 def _welded(arrays: ChainArrays) -> NDArray[np.bool_]:
     """Which shafts join their masses rigidly, without a gap."""
-    welded: NDArray[np.bool_] = arrays.rigid & (arrays.gap == 0.0)
-    return welded
+    return arrays.rigid & (arrays.gap == 0.0)
 
 
 def _refuse(chain: Chain, arrays: ChainArrays) -> None:

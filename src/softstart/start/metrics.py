@@ -37,7 +37,7 @@ def settled_time(trajectory: Trajectory, target_speed: float, band: float = SETT
     (`Run.settling_time` is for damped drives), and its size is what K_dyn judges. The crossing is located in
     the polynomials of the spans.
     """
-    start = float(trajectory.notes["start_time"])
+    start = float(trajectory.notes.start_time)
     if math.isnan(start):
         return math.nan
     return trajectory.load_settles(start, (1.0 - band) * target_speed)

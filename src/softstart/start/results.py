@@ -54,8 +54,7 @@ class StartResults:
 
     def __getitem__(self, name: str) -> Vector:
         """A column of what is noted of the start."""
-        column: Vector = self.starts[name]
-        return column
+        return self.starts[name]
 
     @property
     def peaks(self) -> Matrix:
@@ -119,7 +118,11 @@ def run_set_ups(starts: KernelInput, ready: Ready, until: float | None, workers:
 
 
 def run_compiled(
-    starts: KernelInput, controller: Any, numbers: Matrix, until: float | None = None, workers: int = 1
+    starts: KernelInput,
+    controller: CompiledController,
+    numbers: Matrix,
+    until: float | None = None,
+    workers: int = 1,
 ) -> StartResults:
     """The same under a compiled controller: `numbers` has a row for each start, or one for all."""
     count = starts.machines.shape[0]
@@ -159,7 +162,7 @@ def _parts(count: int) -> Iterator[slice]:
         room = max(1, int(room * min(share, 4.0)))
 
 
-def figures(results: StartResults, base: Any, until: float | None = None) -> Figures:
+def figures(results: StartResults, base: Vector | float, until: float | None = None) -> Figures:
     """The figures of many starts as name -> (values, unit, meaning).
 
     `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
@@ -170,7 +173,7 @@ def figures(results: StartResults, base: Any, until: float | None = None) -> Fig
     kinds = [status_of(c // 4, bool(c % 2), until is not None, bool(c & 2)) for c in reasons.tolist()]
     finished = np.array([kind.finished for kind in kinds])[which]
 
-    def valid(values: Any) -> Any:
+    def valid(values: Vector | float) -> Vector:
         return np.where(finished, values, np.nan)
 
     starts, worst = np.arange(finished.size), results.peaks.argmax(axis=1)
@@ -208,7 +211,7 @@ def limit_margins(values: Figures, limits: Limits) -> Figures:
     if not has_margin(limits):
         return {}
     judged = ("peak_torque", "used_torque", "start_time")
-    limited: dict[str, Any] = {name: values[name][0] for name in judged if name in values}
+    limited = {name: values[name][0] for name in judged if name in values}
     margin = np.where(np.isnan(limited["start_time"]), np.nan, limits.margin(limited))
     return {
         "margin": (margin, "1", "smallest remaining share of the limits of shaft torque and start time"),

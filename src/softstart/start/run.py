@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from softstart import formulas
 from softstart.arrays import Matrix, Vector
-from softstart.controller.base import Controller
-from softstart.drive import Drive
+from softstart.controller.base import Controller, label_of
+from softstart.drive import Drive, Machine
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.kernel import records as rec
@@ -138,9 +138,9 @@ class Run(Result, view="starts.run_sheet"):
     [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); everything at one shaft: [R].
     """
 
-    drive: Any
+    drive: Any  # a Machine; what only drives or only chains have is asked for too
     controller: Controller | None
-    base: Any
+    base: Machine | None
     status: Status
     trajectory: Trajectory
     design_drive: Drive | None = None
@@ -154,21 +154,14 @@ class Run(Result, view="starts.run_sheet"):
         <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
         """
         known = f"K_dyn {self.k_dyn:.3f}" if self._has_base else f"peak torque {self.peak_torque:.4g} N m"
-        return f"<Run: {self.controller_name} on {self.drive.name}, {known}, {self._outcome}>"
+        reached = not math.isnan(self.start_time)
+        outcome = f"start time {self.start_time:.4f} s" if reached else self.status.value
+        return f"<Run: {self.controller_name} on {self.drive.name}, {known}, {outcome}>"
 
     @property
     def controller_name(self) -> str:
         """Name of the controller."""
-        if self.controller is None:
-            return "no motor torque"
-        return self.controller.name or type(self.controller).__name__
-
-    @property
-    def _outcome(self) -> str:
-        """The start time in words, or why there is none."""
-        if math.isnan(self.start_time):
-            return self.status.value
-        return f"start time {self.start_time:.4f} s"
+        return "no motor torque" if self.controller is None else label_of(self.controller)
 
     @property
     def position(self) -> str:
@@ -187,7 +180,7 @@ class Run(Result, view="starts.run_sheet"):
         """The start to which traces, events and stages belong: of an unknown position that of `position`."""
         return self.positions[self.position] if self.positions else self
 
-    def _worst(self, figure: Callable[[Run], float], worst: Any = np.maximum) -> float:
+    def _worst(self, figure: Callable[[Run], float], worst: np.ufunc = np.maximum) -> float:
         """A figure of this start, or the largest of those from each position."""
         return float(worst.reduce([figure(run) for run in self.each]))
 
@@ -198,7 +191,7 @@ class Run(Result, view="starts.run_sheet"):
     # figures -------------------------------------------------------------------------------------------
 
     @property
-    def _notes(self) -> Any:
+    def _notes(self) -> rec.ResultRecord:
         return self.trajectory.notes
 
     @property
@@ -273,7 +266,7 @@ class Run(Result, view="starts.run_sheet"):
         """
 
         def of_stage_2(run: Run) -> float:
-            if math.isnan(run.trajectory.notes["stage_2_end"]):
+            if math.isnan(run.trajectory.notes.stage_2_end):
                 return math.nan
             peak = float(np.abs(run.trajectory.shafts["first_peak"]).max())
             return float(formulas.dynamic_coefficient(peak, self.base_torque))
@@ -289,8 +282,7 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def utilisation(self) -> Vector:
         """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
-        utilisation: Vector = self.peak_torques / self.drive.permissible_torques
-        return utilisation
+        return self.peak_torques / self.drive.permissible_torques
 
     @property
     def permissible_torque(self) -> float:
@@ -308,7 +300,7 @@ class Run(Result, view="starts.run_sheet"):
 
         Counted from the command of the start, so that it includes what the torque takes to release a brake.
         """
-        return self._worst(lambda run: float(run.trajectory.notes["start_time"]))
+        return self._worst(lambda run: float(run.trajectory.notes.start_time))
 
     @cached_property
     def settled_time(self) -> float:
@@ -354,43 +346,43 @@ class Run(Result, view="starts.run_sheet"):
     @property
     def elastic_period(self) -> float:
         """The period of the first natural frequency with all gaps closed, 2 pi/Omega, s."""
-        return float(self.trajectory.input.machine["period"])
+        return float(self.trajectory.input.machine.period)
 
     @property
     def end_time(self) -> float:
         """End of the run, s."""
-        return float(self._notes["time"])
+        return float(self._notes.time)
 
     @property
     def release_time(self) -> float:
         """When the brake was released, s; NaN without a brake, or if it was not."""
-        return float(self._notes["release_time"])
+        return float(self._notes.release_time)
 
     @property
     def first_contact(self) -> float:
         """Instant of the first contact, s: the length of stage 1. Of a chain, when the last gap closes."""
-        return float(self._notes["first_contact"])
+        return float(self._notes.first_contact)
 
     @property
     def impact_speed(self) -> float:
         """Speed at which the flanks first meet, rad/s: dw12 of [G](10)."""
-        return self._worst(lambda run: float(run.trajectory.notes["impact_speed"]), np.fmax)
+        return self._worst(lambda run: float(run.trajectory.notes.impact_speed), np.fmax)
 
     @property
     def torque_at_contact(self) -> float:
         """Motor torque at the first contact, N m."""
-        return float(self._notes["contact_torque"])
+        return float(self._notes.contact_torque)
 
     @property
     def contacts(self) -> int:
         """How often the gaps between motor and load came to be closed; a start in contact counts as one."""
-        return int(self._notes["contacts"])
+        return int(self._notes.contacts)
 
     @property
     def clipped(self) -> Clipped:
         """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
-        excess = self._worst(lambda run: float(run.trajectory.notes["excess"]))
-        return Clipped(excess, self._worst(lambda run: float(run.trajectory.notes["excess_time"])))
+        excess = self._worst(lambda run: float(run.trajectory.notes.excess))
+        return Clipped(excess, self._worst(lambda run: float(run.trajectory.notes.excess_time)))
 
     @property
     def stage_durations(self) -> tuple[float, float]:
@@ -402,7 +394,7 @@ class Run(Result, view="starts.run_sheet"):
             first = 0.0
         return first, second
 
-    def _kind(self, event: Any) -> str:
+    def _kind(self, event: np.void) -> str:
         kind, place, machine = int(event["kind"]), int(event["place"]), self.trajectory.input
         if kind in OF_GEAR:
             mass = machine.masses[0, place].view(rec.MASS)[0]
@@ -571,7 +563,7 @@ class Run(Result, view="starts.run_sheet"):
             "torque_at_contact": self.torque_at_contact,
             "stage_1_duration": first,
             "stage_2_duration": second,
-            "stages": int(self._notes["stage"]),
+            "stages": int(self._notes.stage),
             "events": len(self.trajectory.events),
             "settled_time": self.settled_time,
             "torque_settling_time": self.settling_time() if known else None,
@@ -582,7 +574,7 @@ class Run(Result, view="starts.run_sheet"):
         }
 
 
-def worst_run(runs: Mapping[str, Run], machine: Any) -> Run:
+def worst_run(runs: Mapping[str, Run], machine: Machine) -> Run:
     """The start of a machine whose position is unknown, from those of each position."""
     hardest = max(runs.values(), key=lambda run: run.peak_torque)
     statuses = [run.status for run in runs.values()]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack, overload
 
-from softstart.chain.machines import as_machine
+from softstart.chain.machines import MachineLike, as_machine
+from softstart.chain.model import Chain
 from softstart.controller.base import label_of
-from softstart.drive import Drive
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
-from softstart.start.batch import simulate_many
+from softstart.start.batch import Machines, simulate_many
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.engine import check_limits, ended, run_one
 from softstart.start.kernel_input import MAX_EVENTS, KernelInput, kernel_input
@@ -20,24 +20,52 @@ from softstart.start.run import Run, worst_run
 from softstart.start.trajectory import StartRecorder
 
 if TYPE_CHECKING:
+    import xarray
+
     from softstart.chain.periodic_torque import PeriodicTorque
 
 DEFAULT_DRIVE = "crane-4amtkf"
+Time = float | str | None  # s, or with a unit
+
+
+class SimulateOptions(TypedDict, total=False):
+    """The keyword arguments of `simulate`, described there."""
+
+    parameters: Mapping[str, object] | None
+    fitted_to: MachineLike | MachineTable | None
+    base: MachineLike | MachineTable | None
+    time_limit: Time
+    max_events: int
+    excitation: Mapping[str | int, PeriodicTorque] | None
+    workers: int | None
+
+
+@overload
+def simulate(
+    drive: Machines, controller: ControllerLike, until: Time = None, **options: Unpack[SimulateOptions]
+) -> xarray.Dataset: ...
+
+
+@overload
+def simulate(
+    drive: MachineLike = DEFAULT_DRIVE, controller: ControllerLike | None = REFERENCE, until: Time = None,
+    **options: Unpack[SimulateOptions],
+) -> Run: ...  # fmt: skip
 
 
 def simulate(
-    drive: Any = DEFAULT_DRIVE,
+    drive: MachineLike | Machines = DEFAULT_DRIVE,
     controller: ControllerLike | None = REFERENCE,
-    until: float | str | None = None,
+    until: Time = None,
     *,
     parameters: Mapping[str, object] | None = None,
-    fitted_to: Any = None,
-    base: Any = None,
-    time_limit: float | str | None = None,
+    fitted_to: MachineLike | MachineTable | None = None,
+    base: MachineLike | MachineTable | None = None,
+    time_limit: Time = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, PeriodicTorque] | None = None,
     workers: int | None = None,
-) -> Any:
+) -> Run | xarray.Dataset:
     """Simulate the start of a drive under a controller, exactly.
 
     Between two events a machine is linear: its Taylor series are summed to the last digit, and events are
@@ -53,10 +81,10 @@ def simulate(
         A drive, a chain, a table of one (`machine_table`), a list of drives or of chains (with the same
         number of masses, their motors and loads on the same ones), or the name or file of a drive or chain.
         By default the crane travel drive of [G].
-    controller : str, Controller, TorqueProfile, pair of arrays, function or None
-        A name, `path/to/file.py:ClassName`, a file of tuned gains, or a Controller object; a torque over time
-        as a TorqueProfile, as two arrays (t in s, u in N m), or as a function t -> u, which is sampled every
-        1 ms; None leaves the motor off. By default `direct`.
+    controller : str, Controller, subclass of it, TorqueProfile, pair of arrays, function or None
+        A name, `path/to/file.py:ClassName`, a file of tuned gains, a class, or a Controller object; a torque
+        over time as a TorqueProfile, as two arrays (t in s, u in N m), or as a function t -> u, which is
+        sampled every 1 ms; None leaves the motor off. By default `direct`.
     until : float or str, optional
         End of the run, s or with a unit ("300 ms"). By default one elastic period 2 pi/Omega after the start
         time, the instant at which the load first has its target speed.
@@ -108,40 +136,44 @@ def simulate(
     ----------
     K_dyn: [G] (16); everything at one shaft: [R].
     """
-    several = isinstance(drive, list | tuple | MachineTable)
-    drive = drive if several else as_machine(drive)
+    several = (list, tuple, MachineTable)
+    machine: Machine | Machines = drive if isinstance(drive, several) else as_machine(drive)
     strategy = None if controller is None else as_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
-    fitted_to, base = _other("fitted_to", fitted_to, drive), _other("base", base, drive)
-    if isinstance(drive, list | tuple) and not (drive and all(isinstance(one, Machine) for one in drive)):
-        raise InputError("drive: give a list of Drives or of Chains, not empty.")
-    if excitation and (several or isinstance(drive, Drive)):
+    fitted, reference = _beside("fitted_to", fitted_to, machine), _beside("base", base, machine)
+    if not isinstance(machine, Machine):
+        listed = machine.parts if isinstance(machine, MachineTable) else machine
+        if not (listed and all(isinstance(each, Machine) for each in listed)):
+            raise InputError("drive: give a list of Drives or of Chains, not empty.")
+    if excitation and not isinstance(machine, Chain):
         raise InputError("excitation: it acts on the masses of one chain; start several one at a time.")
-    if several:
+    if not isinstance(machine, Machine):
         if strategy is None:
             raise InputError("controller is missing: many starts need one.")
-        return simulate_many(drive, strategy, until, fitted_to, base, time_limit, max_events, workers)
-    positions = drive.positions
-    inputs = {name: kernel_input(one, time_limit, max_events, excitation) for name, one in positions.items()}
-    check_end(drive, strategy, until, next(iter(inputs.values())))
-    ready, design = (None, None) if strategy is None else strategy.set_up((fitted_to or drive).design_drive)
-    start = f"{drive.name}, controller {'no motor torque' if ready is None else label_of(ready)}"
+        return simulate_many(machine, strategy, until, fitted, reference, time_limit, max_events, workers)
+    assert not isinstance(fitted, MachineTable)
+    assert not isinstance(reference, MachineTable)
+    positions = machine.positions
+    inputs = {name: kernel_input(at, time_limit, max_events, excitation) for name, at in positions.items()}
+    check_end(machine, strategy, until, next(iter(inputs.values())))
+    ready, design = (None, None) if strategy is None else strategy.set_up((fitted or machine).design_drive)
+    start = f"{machine.name}, controller {'no motor torque' if ready is None else label_of(ready)}"
     runs = {}
     for name, machine_input in inputs.items():
         recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
         reason = run_one(ready, design, recorder, until)
         status = ended(recorder.state, reason, until, max_events, start)
-        runs[name] = Run(positions[name], ready, base, status, recorder.finished(), design)
-    return worst_run(runs, drive) if len(runs) > 1 else next(iter(runs.values()))
+        runs[name] = Run(positions[name], ready, reference, status, recorder.finished(), design)
+    return worst_run(runs, machine) if len(runs) > 1 else next(iter(runs.values()))
 
 
-def _other(name: str, other: Any, drive: object) -> Any:
-    """A machine given beside the simulated one: a single one, or one for each of several starts."""
+def _beside(name: str, other: object, machines: object) -> Machine | MachineTable | None:
+    """A machine given beside the simulated ones: a single one, or for a table of them another table."""
     if other is None:
         return None
     if isinstance(other, MachineTable):
-        shape = drive.shape if isinstance(drive, MachineTable) else ()
-        if other.shape != shape:
+        shape = machines.shape if isinstance(machines, MachineTable) else ()
+        if other.shape != shape or not isinstance(machines, MachineTable):
             raise InputError(
                 f"{name}: a table of shape {other.shape} does not match starts of shape {shape}; give a "
                 "single machine, or a table of the same shape."
@@ -150,18 +182,19 @@ def _other(name: str, other: Any, drive: object) -> Any:
     return as_machine(other, name)
 
 
-def check_end(machine: Any, controller: object, until: float | None, start: KernelInput) -> None:
+def check_end(machine: Machine, controller: object, until: float | None, start: KernelInput) -> None:
     """A run needs an end, and a controller a motor."""
     if controller is not None and machine.motor is None:
         raise InputError(
             "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
         )
-    if until is not None or start.machine["time_limit"] < float("inf"):
+    if until is not None or start.machine.time_limit < float("inf"):
         return
     if controller is None or machine.target_speed is None:
         raise InputError(
             "until is missing: without motor and target speed nothing else ends the run; give it in s."
         )
+    assert isinstance(machine, Chain)  # a drive whose load holds its motor cannot be made
     arrays = machine.at_motor_shaft()
     load = float((arrays.Mc / arrays.efficiency_from_motor).sum())
     lossy = " and through its gears" if (arrays.efficiency < 1.0).any() else ""

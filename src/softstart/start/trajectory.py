@@ -46,8 +46,7 @@ class StartRecorder:
 
     def advance(self) -> int:
         """To the next control instant, the end, or a full record; returns which."""
-        reason: int = start.advance(self.work, self.input.tones, self.spans, self.events)
-        return reason
+        return int(start.advance(self.work, self.input.tones, self.spans, self.events))
 
     def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
         """To the end, or a full record, under a compiled controller."""
@@ -77,8 +76,7 @@ class StartRecorder:
 
     def answer(self, torque: float, ask_again: float, slope: float) -> int:
         """Take the controller's answer; returns ASK, or why it cannot be taken."""
-        reason: int = start.take_reply(self.work, torque, ask_again, slope)
-        return reason
+        return int(start.take_reply(self.work, torque, ask_again, slope))
 
     def grow(self) -> None:
         """Twice the room for whatever is nearly full; raises SimulationError where memory is not for that."""
@@ -116,7 +114,7 @@ class Trajectory:
     input: KernelInput  # the machine as the kernel has it
     states: Matrix  # a row for each span, and one for the state at the end, laid out as in `kernel.records`
     events: NDArray[np.void]  # time, kind, place, value, impulse
-    notes: Any  # what is noted of the start, by the names of `kernel.records.ResultRecord`
+    notes: rec.ResultRecord  # what is noted of the start, by the names of `kernel.records.ResultRecord`
     shafts: NDArray[np.void]  # and of each shaft, by those of `ShaftNotes`
 
     @property
@@ -191,7 +189,7 @@ class Trajectory:
 
     def stage_peaks(self) -> Matrix:
         """A row for each stage: number, start, end, then largest torque and its instant for each shaft."""
-        rows = np.zeros((int(self.notes["gap_events"]) + 2, 3 + 2 * (self.input.count - 1)))
+        rows = np.zeros((int(self.notes.gap_events) + 2, 3 + 2 * (self.input.count - 1)))
         if replay.stage_peaks(*self._kernel(), rows) != rec.ENDED:
             raise SimulationError("The largest torque of a stage could not be located.")
         return rows[rows[:, 2] > rows[:, 1]]

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import MachineLike, as_machine
-from softstart.controller import Controller, make_controller
 from softstart.controller.recipe import Recipe, with_whole_path
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
@@ -24,6 +23,7 @@ from softstart.hints import nearest
 from softstart.parallel import Pool, checked_workers, usable_workers
 from softstart.quantities import check_whole, show
 from softstart.start.batch import figure_columns
+from softstart.start.demand import ControllerLike, as_recipe
 from softstart.start.engine import check_limits
 from softstart.start.results import has_margin
 from softstart.sweeping.compute import ChunkTask, SweepSettings, check_corners, compute, first_start
@@ -39,12 +39,12 @@ OF_LIMITS = ("margin", "keeps_limits")  # figures of a drive with limits
 
 def sweep(
     drive: MachineLike,
-    controller: str | Controller | None,
+    controller: ControllerLike | None,
     grid: Mapping[str, Any],
     *,
     parameters: Mapping[str, object] | None = None,
-    until: float | None = None,
-    fitted_to: Machine | None = None,
+    until: float | str | None = None,
+    fitted_to: MachineLike | None = None,
     to: str | os.PathLike[str] | None = None,
     figures: tuple[str, ...] | list[str] | None = None,
     chunk: int | None = None,
@@ -59,8 +59,8 @@ def sweep(
     ----------
     drive : Drive, Chain, str or path
         The drive or chain, or its name or file; it has what the grid does not vary.
-    controller : str, Controller or None
-        A name, `path/to/file.py:ClassName` or an object; None where controllers are an axis.
+    controller : str, Controller, torque over time or None
+        As in `simulate`; None where controllers are an axis.
     grid : mapping
         The axes, in order: values by parameter. A parameter of the drive by name (`gap`) or as in a file
         (`shaft.gap`), one of the controller as `controller.NAME`, and `controller` itself with names. Values
@@ -71,8 +71,8 @@ def sweep(
         the coordinate is then called `mass_2_inertia`.
     parameters : mapping, optional
         Parameters of the controller that are the same everywhere.
-    until : float, optional
-        As in `simulate`, s.
+    until : float or str, optional
+        As in `simulate`.
     fitted_to : Drive or Chain, optional
         As in `simulate`.
     to : path, optional
@@ -157,26 +157,26 @@ def sweep(
 
 
 def _settings(
-    given: MachineLike, controller: str | Controller | None, grid: Mapping[str, Any],
-    parameters: Mapping[str, object] | None, until: float | None, fitted_to: Machine | None, figures: Any,
+    given: MachineLike, controller: ControllerLike | None, grid: Mapping[str, Any],
+    parameters: Mapping[str, object] | None, until: object, fitted_to: MachineLike | None, figures: Any,
     *, allow_code: bool,
 ) -> tuple[SweepSettings, Grid]:  # fmt: skip
     """What is the same for all starts, and the axes; or one InputError for all that is wrong with them."""
     drive, recipe, axes, kept, wrong = as_machine(given), Recipe(), Grid(), tuple[str, ...](), Mistakes()
+    fitted: Machine | None = None
+    end: float | None = None
     with wrong.collect():
-        fitted_to = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
+        fitted = None if fitted_to is None else as_machine(fitted_to, "fitted_to")
     with wrong.collect():
-        check_limits(until, None, 1, drive.KIND)
+        end, *_ = check_limits(until, None, 1, drive.KIND)
     with wrong.collect():
-        if isinstance(controller, str | None):
-            recipe = Recipe(with_whole_path(controller or ""), dict(parameters or {}), allow_code)
-        else:
-            recipe = Recipe(make_controller(controller, parameters))
+        controller = with_whole_path(controller) if isinstance(controller, str) else controller
+        recipe = as_recipe("" if controller is None else controller, parameters, allow_code)
         axes = read_grid(grid, recipe, drive)
     with wrong.collect():
         kept = _figures(drive, figures)
     wrong.raise_if_any()
-    return SweepSettings(drive, recipe, kept, until, fitted_to), axes
+    return SweepSettings(drive, recipe, kept, end, fitted), axes
 
 
 def _described(task: ChunkTask) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from softstart import __version__
 from softstart.arrays import Vector
 from softstart.chain.machines import as_machine, listed_of, quantity_of, varied
-from softstart.controller import Controller, make_controller
+from softstart.controller import Controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
@@ -26,6 +26,7 @@ from softstart.input.parameters import ParameterValue
 from softstart.optimal.problem import StartTime
 from softstart.quantities import check_whole, multiplied, to_si
 from softstart.start.comparison import as_far_as_known
+from softstart.start.demand import ControllerLike, as_recipe
 from softstart.start.results import has_margin
 from softstart.tuning.ranges import Free, Range, ranges_of
 from softstart.tuning.search import latin
@@ -121,7 +122,7 @@ LEAST_OF_SEARCH = {"seed": 0, "restarts": 1, "generations": 1, "population": 5}
 
 def tuning_problem(
     machine: Any,
-    controller: str | Controller,
+    controller: ControllerLike,
     gaps: object,
     inertias: object,
     *,
@@ -170,14 +171,14 @@ def tuning_problem(
     )  # fmt: skip
 
 
-def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
+def recipe_of(controller: ControllerLike, parameters: Mapping[str, object] | None = None) -> Recipe:
     """The recipe of a controller; InputError for one whose gains are tuned already."""
-    strategy = make_controller(controller, parameters)
-    if isinstance(strategy, Tuned):
+    recipe = as_recipe(controller, parameters)
+    if isinstance(strategy := recipe.make(), Tuned):
         raise InputError(
             f"controller = {strategy.name}: its gains are already tuned; tune the controller itself."
         )
-    return Recipe(controller, dict(parameters or {}))
+    return recipe
 
 
 def given_to(controller: Controller) -> dict[str, Any]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from softstart.chain.machines import MachineLike
-from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError
 from softstart.parallel import Pool, checked_workers, usable_workers
 from softstart.start.comparison import Uncertain
+from softstart.start.demand import ControllerLike
 from softstart.store import PartStore, Target
 from softstart.tuning.gains import GainSearch, Progress, StartCounter, best_gains
 from softstart.tuning.outcome import Tuning
@@ -33,7 +33,7 @@ GENERATIONS = 60
 
 def tune(
     drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
-    controller: str | Controller,
+    controller: ControllerLike,
     gaps: object = None,
     inertias: object = None,
     *,
@@ -72,7 +72,7 @@ def tune(
         Of a data sheet without any stiffness every candidate is judged at both ends of what is usual, and set
         up for the stiff end.
     controller : str or Controller
-        A name, `path/to/file.py:ClassName`, or an object.
+        A name, `path/to/file.py:ClassName`, a class, or an object.
     gaps, inertias : iterable, optional
         Gaps in rad and load inertias in kg m2: numbers, texts with a unit, multiples of the drive's own as
         "2x", or inertias as multiples of the motor's as "5 J1"; of a drive with a gear also "9 arcmin at

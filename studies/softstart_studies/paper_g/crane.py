@@ -82,7 +82,7 @@ def many(drives: MachineTable, controller: Controller) -> tuple[Vector, Vector]:
     >>> [k.round(4).tolist() for k in many(machine_table(CRANE, gap=[0.5, 2.0]), published("direct"))]
     [[3.1179, 4.8654], [3.1179, 4.8654]]
     """
-    results: Any = simulate(drives, controller, fitted_to=CRANE, base=CRANE)
+    results = simulate(drives, controller, fitted_to=CRANE, base=CRANE)
     return np.asarray(results["k_dyn_first_contact"]), np.asarray(results["k_dyn"])
 
 

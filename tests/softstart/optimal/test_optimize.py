@@ -491,7 +491,7 @@ WEAK = CRANE.replace(starting_torque=10, load_torque=2)
     ("machine", "given", "says"),
     [
         (CRANE, {"start_time": -1.0}, "start_time = -1.0: give a time above 0"),
-        (CRANE, {"start_time": math.nan}, "start_time = nan: give a time"),
+        (CRANE, {"start_time": math.nan}, "start_time = nan: this is not a number"),
         (CRANE, {"terminal": "still"}, "terminal = 'still': choose one of synchronous"),
         (CRANE, {"k_dyn": 1.0}, "k_dyn: it is what is minimised"),
         (CRANE, {"smoothness": -1.0}, "smoothness = -1.0: a weight in s, 0 or more"),
