@@ -57,7 +57,7 @@ class Mass(ParameterSet):
     damping: Number = parameter("mass.damping", "N*m*s/rad", "damping to the ground", '"0.01 N*m*s/rad"',
         "0 or more", default=0.0)
     torque: Number = parameter("mass.torque", "N*m", "load torque on its own shaft", '"7.16 N*m"',
-        default=0.0)
+        default=0.0, label="load torque")
     kind: LoadKind = parameter("mass.kind", "", "kind of the load torque", '"active"', default="active",
         choices=get_args(LoadKind))
     friction: Number = parameter("mass.friction", "N*m",
@@ -140,7 +140,7 @@ class Shaft(ParameterSet):
     damping_ratio: MaybeNumber = parameter("shaft.damping_ratio", "1",
         "damping ratio of its two masses alone, instead of `damping`", "0.02", "0 or more", default=None)
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None,
-        at_output="side")
+        label="total gap", at_output="side")
     backlash: MaybeNumber = parameter("shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"',
         "0 or more", default=None)
     diameter: MaybeNumber = parameter("shaft.diameter", "m", "pitch diameter", '"185 mm"', "above 0",
@@ -157,7 +157,7 @@ class Shaft(ParameterSet):
         default="no-pull", choices=get_args(ContactLaw))
     permissible_torque: MaybeNumber = parameter("shaft.permissible_torque", "N*m",
         "permissible peak torque of shaft, coupling or gear", '"800 N*m"', "above 0", default=None,
-        at_output="side")
+        label="permissible", at_output="side")
     start_position: MaybeNumber = parameter("shaft.start_position", "rad",
         "twist at the start (0 is mid-gap); else by `start.position`", '"0 rad"', default=None,
         at_output="side")

@@ -117,9 +117,10 @@ class Drive(ParameterFile, Machine):
     starting_torque: Number = parameter("motor.starting_torque", "N*m", "starting torque of the motor",
         '"62 N*m"', "above 0", symbol="Ms")
     maximum_torque: Number = parameter("motor.maximum_torque", "N*m", "largest torque of the motor",
-        '"64 N*m"', "above 0", default=None, follows="starting_torque")
+        '"64 N*m"', "above 0", default=None, follows="starting_torque", label="largest torque")
     minimum_torque: Number = parameter("motor.minimum_torque", "N*m",
-        "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less", default=0.0)
+        "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less", default=0.0,
+        label="braking torque")
     motor_friction: Number = parameter("motor.friction", "N*m", "Coulomb friction of the motor", '"1.2 N*m"',
         "0 or more", default=0.0)
     motor_viscous_friction: Number = parameter("motor.viscous_friction", "N*m*s/rad",
@@ -148,7 +149,7 @@ class Drive(ParameterFile, Machine):
         default=0.0)
     computing_delay: Number = parameter("motor.computing_delay", "s",
         "dead time between what a controller measures and the torque demand that follows from it", '"1 ms"',
-        "0 or more", default=0.0)
+        "0 or more", default=0.0, label="dead time")
     gear_ratio: MaybeNumber = parameter("gear.ratio", "1", "turns of the motor for one of the output", "31.5",
         "above 0", default=None)
     gear_efficiency: Number = parameter("gear.efficiency", "1", "efficiency of all gears", "0.94",
@@ -158,7 +159,7 @@ class Drive(ParameterFile, Machine):
     damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"',
         "0 or more", default=0.0, symbol="d", at_output="value")
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap",
-        at_output="value")
+        label="total gap", at_output="value")
     contact_law: ContactLaw = parameter("shaft.contact_law", "", "law of the shaft torque in contact",
         '"no-pull"', default="no-pull", choices=get_args(ContactLaw))
     load_inertia: Number = parameter("load.inertia", "kg*m^2", "inertia of the load at the motor shaft",
@@ -188,7 +189,7 @@ class Drive(ParameterFile, Machine):
         choices=("reversal",), at_output="value")
     initial_load_speed: Number = parameter("start.initial_load_speed", "rad/s",
         "speed of the load at the start", '"0 rad/s"', default=0.0, follows="initial_speed",
-        at_output="value")
+        label="speed before", at_output="value")
     initial_motor_speed: Number = parameter("start.initial_motor_speed", "rad/s",
         "speed of the motor at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
 
@@ -205,12 +206,13 @@ class Drive(ParameterFile, Machine):
     required_life: MaybeNumber = parameter("limits.life", "s",
         "time of operation that the shaft line must last", '"20000 h"', "above 0", default=None)
     fatigue_slope: MaybeNumber = parameter("limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6",
-        "above 0", default=None)
+        "above 0", default=None, label="slope of S-N")
     fatigue_torque: MaybeSeries = parameter("limits.fatigue.torque", "N*m",
         "torque of the points of the S-N curve", '"90 N*m"', "above 0", default=None, many=True,
-        at_output="limit")
+        label="S-N torque", at_output="limit")
     fatigue_cycles: MaybeSeries = parameter("limits.fatigue.cycles", "1",
-        "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True)
+        "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True,
+        label="S-N cycles")
     # fmt: on
 
     def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:

@@ -56,7 +56,7 @@ class Parameter:
     value in SI, or None for "not given"; one that `follows` another parameter takes its value. One with a
     unit and `choices` is a quantity or one of these words. A `many` parameter is a list of numbers, an
     `infinite` one may be infinity. `example` is what to type. `table` is that of the file, "" above the first
-    one; `name` is the keyword in Python, by default the key.
+    one; `name` is the keyword in Python, `label` what stands before its field, both by default the key.
     `at_output` says whether the value may be written "at output" of the gear: as one that losses change
     ("value"), as a limit, which is brought over without losses, or as one that is "here" anyway; one with a
     "side" has the gear beside it.
@@ -72,6 +72,7 @@ class Parameter:
     many: bool = False
     infinite: bool = False
     symbol: str = ""
+    label: str = ""
     follows: str = ""
     table: str = ""
     name: str = ""
@@ -81,6 +82,8 @@ class Parameter:
     def __post_init__(self) -> None:
         if not self.name:
             object.__setattr__(self, "name", self.key)
+        if not self.label:
+            object.__setattr__(self, "label", self.key.replace("_", " "))
 
     @property
     def required(self) -> bool:

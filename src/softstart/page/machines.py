@@ -49,19 +49,6 @@ FIELDS: Mapping[str, str] = {
     "limits": "shaft_torque output_torque start_time starts_per_hour life fatigue.slope fatigue.torque "
     "fatigue.cycles",
 }
-# what stands before a field, where that is not its key
-LABELS = {
-    "motor.maximum_torque": "largest torque",
-    "motor.minimum_torque": "braking torque",
-    "motor.computing_delay": "dead time",
-    "mass.torque": "load torque",
-    "shaft.gap": "total gap",
-    "shaft.permissible_torque": "permissible",
-    "start.initial_load_speed": "speed before",
-    "limits.fatigue.slope": "slope of S-N",
-    "limits.fatigue.torque": "S-N torque",
-    "limits.fatigue.cycles": "S-N cycles",
-}
 SYMBOLS = {
     "motor.starting_torque": "Ms", "motor.inertia": "J1", "motor.torque_lag": "\N{GREEK SMALL LETTER TAU}",
     "mass.inertia": "J", "mass.torque": "M", "load.inertia": "J2", "load.torque": "Mc",
@@ -156,7 +143,7 @@ def parameter_fields(machine: Machine) -> Mapping[str, FormField]:
             choices, si, example = parameter.choices, parameter.unit, parameter.example
             words = UNITS if path == "units" else choices if si else ()
             entries[path] = FormField(
-                path, group, LABELS.get(word, key.replace("_", " ")),
+                path, group, parameter.label,
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), si,
                 f"{parameter.meaning}; write for example {', '.join([*words, example])}", example,
                 () if si else choices, words, parameter.default is None,
