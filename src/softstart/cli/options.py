@@ -119,8 +119,18 @@ def count(least: int = 1, most: int = 10**15) -> Reader:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
-    machine = _drive(name, settings)
-    return machine.drive if isinstance(machine, UnknownStiffness) else machine
+    drive = _drive(name, settings)
+    return _stiff_end(drive) if isinstance(drive, UnknownStiffness) else drive
+
+
+def _stiff_end(ends: UnknownStiffness) -> Drive:
+    """The drive with the stiff end of an unknown stiffness, for commands that take one drive."""
+    print(
+        "softstart: warning: no stiffness is known; this command computes with the stiff end of the usual "
+        "range only (compare, tune and report take both ends).",
+        file=sys.stderr,
+    )
+    return ends.drive
 
 
 def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
@@ -167,7 +177,7 @@ def _data_sheet(name: str) -> str | None:
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
     machine = read_as_known(name, settings)
-    return machine.drive if isinstance(machine, UnknownStiffness) else machine
+    return _stiff_end(machine) if isinstance(machine, UnknownStiffness) else machine
 
 
 def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -82,18 +83,10 @@ def read_log(where: str, columns: Mapping[str, str]) -> tuple[dict[str, Vector],
         text = read_text(Path(where), also="cp1252")
         if "\0" in text:
             raise RefusedError(f"this is not a text file; export the signals as CSV, as {FORM}")
-        sheet, places = _sheet(text, wanted_columns, place)
-        notes: list[str] = []
-        time = _seconds(sheet, places["time"], wanted_columns.get("time"), place, notes)
-        signals = {"time": time}
-        for key in [key for key in places if key != "time"]:
-            _, factor, unit = wanted_columns.get(key, WantedColumn("", 1.0, ""))
-            raw = _numbers(sheet, places[key], key, place)
-            size = _unit_size(sheet, places, key, unit, signals["time"], raw, notes)
-            signals[key] = factor * size * raw
+        reader = LogReader(*_sheet(text, wanted_columns, place), wanted_columns, place)
+        return reader.signals(), reader.notes
     except RefusedError as refusal:
         raise InputError(f"{place}: {refusal.reason}.") from None
-    return signals, notes
 
 
 def asked_columns(columns: Mapping[str, str]) -> dict[str, WantedColumn]:
@@ -279,108 +272,147 @@ def _places(names: Sequence[str], wanted_columns: Mapping[str, WantedColumn]) ->
 # ---- numbers and units ----------------------------------------------------------------------------------
 
 
-def _numbers(sheet: LogTable, place: int, name: str, where: str) -> Vector:
-    """A column as it stands there; NaN where it is empty."""
-    return read_numbers(sheet.table, where, [Wanted((name,), "1")], [place], [""], missing=True).values[0]
+@dataclass(frozen=True)
+class LogReader:
+    """Reads the signals of a table in SI; `notes` says what was taken for granted."""
 
+    sheet: LogTable
+    places: Mapping[str, int]  # of each signal, the index of its column
+    wanted_columns: Mapping[str, WantedColumn]
+    where: str
+    notes: list[str] = field(default_factory=list)
 
-def _seconds(
-    sheet: LogTable, place: int, wanted_columns: WantedColumn | None, where: str, notes: list[str]
-) -> Vector:
-    """The times, of a clock or in a unit, s."""
-    _, factor, unit = wanted_columns or WantedColumn("", 1.0, "")
-    cells = [row[place].strip() if place < len(row) else "" for _, row in sheet.table.rows]
-    clocks = [CLOCK.fullmatch(cell) for cell in cells]
-    if any(clocks):
-        if wrong := [i for i, one in enumerate(clocks) if one is None]:
-            number, cell = sheet.table.rows[wrong[0]][0], show(cells[wrong[0]])
-            raise RefusedError(f"line {number}, time = {cell}: this is no time of day, as 10:00:00.004")
-        return np.array([
-            3600.0 * int(h) + 60.0 * int(m) + int(s) + float(f"0.{rest or 0}")
-            for h, m, s, rest in (one.groups() for one in clocks if one)
-        ])  # fmt: skip
-    ticks = _numbers(sheet, place, "time", where)
-    if unit := unit or sheet.unit(place, "time"):
-        return factor * _in_si(unit, "time", sheet.titled(place)) * ticks
-    steps = np.diff(ticks)
-    period = abs(factor) * float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-    unit = next((one for one, size in sizes.items() if period * size < LONGEST_PERIOD), "us")
-    notes.append(f"{show(sheet.names[place])} has no unit and was taken for a time in {unit}")
-    return factor * sizes[unit] * ticks
+    def signals(self) -> dict[str, Vector]:
+        """Time, torque, and angle or speed."""
+        time = self._seconds()
+        signals = {"time": time}
+        for key in [key for key in self.places if key != "time"]:
+            raw = self._numbers(self.places[key], key)
+            signals[key] = self._wanted(key).factor * self._unit_size(key, time, raw) * raw
+        return signals
 
+    def _wanted(self, key: str) -> WantedColumn:
+        return self.wanted_columns.get(key, WantedColumn("", 1.0, ""))
 
-def _unit_size(
-    sheet: LogTable,
-    places: Mapping[str, int],
-    key: str,
-    unit: str,
-    time: Vector,
-    raw: Vector,
-    notes: list[str],
-) -> float:
-    """One of the unit of a column in SI: as it is asked for, as the file says, or as other columns tell."""
-    place = places[key]
-    if unit:
-        return _in_si(unit, key, sheet.titled(place))
-    name, unit = sheet.names[place], sheet.unit(place, key)
-    if key == "torque" and not unit:
-        notes.append(
-            f"{show(name)} has no unit and was taken for a torque in N m, which no motion can check; if it "
-            f'is in % or a current, set columns to "torque={name}[% of 35 N*m]" or "torque=1.2*{name}[N*m]"'
-        )
-        return 1.0
-    if key == "torque":
-        return _in_si(unit, key, sheet.titled(place))
-    return _motion_unit_size(sheet, places, key, time, raw, notes)
+    def _seconds(self) -> Vector:
+        """The times, of a clock or in a unit, s."""
+        place = self.places["time"]
+        _, factor, unit = self._wanted("time")
+        cells = [row[place].strip() if place < len(row) else "" for _, row in self.sheet.table.rows]
+        clocks = [CLOCK.fullmatch(cell) for cell in cells]
+        if any(clocks):
+            if wrong := [i for i, one in enumerate(clocks) if one is None]:
+                number, cell = self.sheet.table.rows[wrong[0]][0], show(cells[wrong[0]])
+                raise RefusedError(f"line {number}, time = {cell}: this is no time of day, as 10:00:00.004")
+            return np.array([
+                3600.0 * int(h) + 60.0 * int(m) + int(s) + float(f"0.{rest or 0}")
+                for h, m, s, rest in (one.groups() for one in clocks if one)
+            ])  # fmt: skip
+        ticks = self._numbers(place, "time")
+        if unit := unit or self.sheet.unit(place, "time"):
+            return factor * _in_si(unit, "time", self.sheet.titled(place)) * ticks
+        steps = np.diff(ticks)
+        period = abs(factor) * float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+        sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+        unit = next((one for one, size in sizes.items() if period * size < LONGEST_PERIOD), "us")
+        self.notes.append(f"{show(self.sheet.names[place])} has no unit and was taken for a time in {unit}")
+        return factor * sizes[unit] * ticks
 
-
-def _motion_unit_size(
-    sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector, notes: list[str]
-) -> float:
-    """One of the unit of an angle or a speed in SI; a column that is its derivative or integral checks it."""
-    place, other = places[key], "speed" if key == "angle" else "angle"
-    title, si, name = sheet.titled(place), SIGNALS[key].unit, sheet.names[place]
-    unit = sheet.unit(place, key)
-    size = _in_si(unit, key, title) if unit else None
-    hints = []
-    for i, ratio in _derivatives_and_integrals(sheet, places, key, time, raw):
-        beside = show(sheet.titled(i))
-        try:
-            beside_in = sheet.unit(i, other) or sheet.units[i]
-            known = float(parse(f"1 {beside_in}", SIGNALS[other].unit)) if beside_in else None
-        except RefusedError:
-            continue
-        if known is None:
-            pairs = [
-                f"{name} in {one} with {sheet.names[i]} in {two}"
-                for one in MOTIONS[key] for two in MOTIONS[other]
-                if _matches(_unit(two, other) / _unit(one, key), 1.0 / ratio)
-                and not _matches(ratio, 1.0)
-            ]  # fmt: skip
-            hints += [f"the column {beside} beside it fits {pairs[0]}"] if len(pairs) == 1 else []
-            continue
-        right = known * ratio
-        unit = next((one for one in MOTIONS[key] if _matches(_unit(one, key), right)), "")
-        if size is None and unit:
-            notes.append(f"{show(name)} has no unit; it is in {unit}, as the column {beside} tells")
-            return _unit(unit, key)
-        if size is None:
-            hints.append(f"one of it is {right:.5g} {si}, by the column {beside}")
-        elif unit and not _matches(size, right):
-            raise RefusedError(
-                f"{show(title)} and {show(sheet.titled(i))} cannot both be right: by the second the first is "
-                f'in {unit}; set columns to "{key}={name}[{unit}]"'
+    def _unit_size(self, key: str, time: Vector, raw: Vector) -> float:
+        """One of the unit of a column in SI: as asked for, as the file says, or as other columns tell."""
+        place, unit = self.places[key], self._wanted(key).unit
+        if unit:
+            return _in_si(unit, key, self.sheet.titled(place))
+        name, unit = self.sheet.names[place], self.sheet.unit(place, key)
+        if key == "torque" and not unit:
+            self.notes.append(
+                f"{show(name)} has no unit and was taken for a torque in N m, which no motion can check; if "
+                f'it is in % or a current, set columns to "torque={name}[% of 35 N*m]" or '
+                f'"torque=1.2*{name}[N*m]"'
             )
-    if size is not None:
-        return size
-    ways = ", ".join(f'"{key}={name}[{one}]"' for one in MOTIONS[key])
-    counts = f'; of 4096 counts a turn "angle=1/4096*{name}[turn]"' if key == "angle" else ""
-    told = f"; {'; '.join(hints)}" if hints else ""
-    raise RefusedError(
-        f"{show(name)}, the {key}, has no unit, and with another one another drive explains the log as well; "
-        f"set columns to one of {ways}{counts}{told}"
-    )
+            return 1.0
+        if key == "torque":
+            return _in_si(unit, key, self.sheet.titled(place))
+        return self._motion_unit_size(key, time, raw)
+
+    def _motion_unit_size(self, key: str, time: Vector, raw: Vector) -> float:
+        """The unit of an angle or a speed in SI; a column that is its derivative or integral checks it."""
+        place, other = self.places[key], "speed" if key == "angle" else "angle"
+        title, si, name = self.sheet.titled(place), SIGNALS[key].unit, self.sheet.names[place]
+        unit = self.sheet.unit(place, key)
+        size = _in_si(unit, key, title) if unit else None
+        hints = []
+        for i, ratio in self._derivatives_and_integrals(key, time, raw):
+            beside = show(self.sheet.titled(i))
+            try:
+                beside_in = self.sheet.unit(i, other) or self.sheet.units[i]
+                known = float(parse(f"1 {beside_in}", SIGNALS[other].unit)) if beside_in else None
+            except RefusedError:
+                continue
+            if known is None:
+                pairs = [
+                    f"{name} in {one} with {self.sheet.names[i]} in {two}"
+                    for one in MOTIONS[key] for two in MOTIONS[other]
+                    if _matches(_unit(two, other) / _unit(one, key), 1.0 / ratio)
+                    and not _matches(ratio, 1.0)
+                ]  # fmt: skip
+                hints += [f"the column {beside} beside it fits {pairs[0]}"] if len(pairs) == 1 else []
+                continue
+            right = known * ratio
+            unit = next((one for one in MOTIONS[key] if _matches(_unit(one, key), right)), "")
+            if size is None and unit:
+                self.notes.append(f"{show(name)} has no unit; it is in {unit}, as the column {beside} tells")
+                return _unit(unit, key)
+            if size is None:
+                hints.append(f"one of it is {right:.5g} {si}, by the column {beside}")
+            elif unit and not _matches(size, right):
+                raise RefusedError(
+                    f"{show(title)} and {show(self.sheet.titled(i))} cannot both be right: by the second "
+                    f'the first is in {unit}; set columns to "{key}={name}[{unit}]"'
+                )
+        if size is not None:
+            return size
+        ways = ", ".join(f'"{key}={name}[{one}]"' for one in MOTIONS[key])
+        counts = f'; of 4096 counts a turn "angle=1/4096*{name}[turn]"' if key == "angle" else ""
+        hint = f"; {'; '.join(hints)}" if hints else ""
+        raise RefusedError(
+            f"{show(name)}, the {key}, has no unit, and with another one another drive explains the log as "
+            f"well; set columns to one of {ways}{counts}{hint}"
+        )
+
+    def _derivatives_and_integrals(self, key: str, time: Vector, raw: Vector) -> Iterator[tuple[int, float]]:
+        """The columns whose integral or derivative this one is, and by which ratio of the units.
+
+        With the sizes A and W of their units, A d(angle)/dt = W speed: an angle has A/W, a speed W/A.
+        """
+        for i in (
+            i for i in range(self.sheet.table.width) if i not in self.places.values() and self.sheet.names[i]
+        ):
+            try:
+                column = self._numbers(i, self.sheet.names[i])
+            except InputError:
+                continue
+            seen = np.isfinite(raw) & np.isfinite(column)
+            if int(seen.sum()) < 8 or not np.all(np.diff(time) >= 0.0):
+                continue
+            angle, speed = (raw[seen], column[seen]) if key == "angle" else (column[seen], raw[seen])
+            steps = np.diff(angle)
+            jumps = np.abs(steps) > 0.5 * float(np.ptp(angle))  # of a counter that overflows
+            travel = np.where(jumps, 0.0, steps).cumsum()
+            wanted = np.where(
+                jumps, 0.0, np.diff(cumulative_trapezoid(speed, time[seen], initial=0.0))
+            ).cumsum()
+            if not np.ptp(travel) or not np.ptp(wanted):
+                continue
+            ratio = float(travel @ wanted) / float(wanted @ wanted)  # W/A
+            if ratio > 0.0 and float(np.std(travel - ratio * wanted)) < ALIKE * float(np.ptp(travel)):
+                yield i, 1.0 / ratio if key == "angle" else ratio
+
+    def _numbers(self, place: int, name: str) -> Vector:
+        """A column as it stands there; NaN where it is empty."""
+        return read_numbers(
+            self.sheet.table, self.where, [Wanted((name,), "1")], [place], [""], missing=True
+        ).values[0]
 
 
 def _matches(one: float, other: float) -> bool:
@@ -389,33 +421,6 @@ def _matches(one: float, other: float) -> bool:
 
 def _unit(unit: str, key: str) -> float:
     return float(parse(f"1 {unit}", SIGNALS[key].unit))
-
-
-def _derivatives_and_integrals(
-    sheet: LogTable, places: Mapping[str, int], key: str, time: Vector, raw: Vector
-) -> Iterator[tuple[int, float]]:
-    """The columns whose integral or derivative this one is, and by which ratio of the units.
-
-    With the sizes A and W of their units, A d(angle)/dt = W speed: an angle has A/W, a speed W/A.
-    """
-    for i in (i for i in range(sheet.table.width) if i not in places.values() and sheet.names[i]):
-        try:
-            column = _numbers(sheet, i, sheet.names[i], "")
-        except InputError:
-            continue
-        seen = np.isfinite(raw) & np.isfinite(column)
-        if int(seen.sum()) < 8 or not np.all(np.diff(time) >= 0.0):
-            continue
-        angle, speed = (raw[seen], column[seen]) if key == "angle" else (column[seen], raw[seen])
-        steps = np.diff(angle)
-        jumps = np.abs(steps) > 0.5 * float(np.ptp(angle))  # of a counter that overflows
-        travel = np.where(jumps, 0.0, steps).cumsum()
-        wanted = np.where(jumps, 0.0, np.diff(cumulative_trapezoid(speed, time[seen], initial=0.0))).cumsum()
-        if not np.ptp(travel) or not np.ptp(wanted):
-            continue
-        ratio = float(travel @ wanted) / float(wanted @ wanted)  # W/A
-        if ratio > 0.0 and float(np.std(travel - ratio * wanted)) < ALIKE * float(np.ptp(travel)):
-            yield i, 1.0 / ratio if key == "angle" else ratio
 
 
 def _in_si(unit: str, key: str, cell: str) -> float:

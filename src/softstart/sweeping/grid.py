@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.controller.recipe import Recipe
@@ -115,18 +116,29 @@ class Subject:
             raise InputError(f"{key} = {show(values)}: give the values of an axis as a list, [0.5, 1, 2].")
         unit, meaning = "", PREFIX
         if name == PREFIX:
-            read: Any = _texts(key, values)
-        elif name.startswith(f"{PREFIX}_"):
-            read, unit, meaning = self._of_controller(key, name.removeprefix(f"{PREFIX}_"), values)
+            read: NDArray[np.float64] | tuple[str, ...] = _texts(key, values)
         else:
-            read, unit, meaning = self._of_machine(key, name, values)
+            parameter, multiples = self._varied(key, name)
+            read, meaning = self._read(parameter, name, values, multiples), parameter.meaning or name
+            unit = parameter.unit
         array = np.array(read)
         if array.ndim != 1:
             raise InputError(f"{key}: its values have shape {array.shape}; give them in one row.")
         about = {} if array.dtype.kind == "U" else {"units": unit}
         return DataArray(array, dims=name, name=name, attrs=about | {"long_name": meaning})
 
-    def _of_controller(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
+    def _varied(self, key: str, name: str) -> tuple[Parameter, dict[str, float]]:
+        """The parameter that an axis varies, called by its key, and the value that is 1x."""
+        if not name.startswith(f"{PREFIX}_"):
+            current = self.machine.parameter_value(name)
+            assert current is not None
+            parameter, single = current.parameter, isinstance(current.value, float)
+            if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
+                reason = f"the {parameter.meaning} changes no start; sweep another parameter"
+                raise InputError(f"{key}: {reason}.")
+            multiples = {"x": float(current.value)} if single and not parameter.many else {}
+            return replace(parameter, name=key), multiples
+        name = name.removeprefix(f"{PREFIX}_")
         if name not in self.parameters:
             close, several = nearest(name, self.parameters), ", ".join(self.controllers)
             lacking = f"not all of {several} have this" if several else f"{self.recipe.label} has no such"
@@ -134,51 +146,36 @@ class Subject:
             raise InputError(f"{key}: {lacking} parameter; {hint}")
         if name in self.recipe.values:
             raise InputError(f"{key}: the parameter {name} has one value already; leave one of the two out.")
-        declared = self.parameters[name]
-        if declared.python_only:
+        if self.parameters[name].python_only:
             raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
-        listed = list(values)
-        named = replace(declared, name=key)
-        read = _texts(key, listed) if declared.kind == "text" else np.float64(named.read(listed))
-        return read, declared.unit, declared.meaning or name
+        return replace(self.parameters[name], name=key), {}
 
-    def _of_machine(self, key: str, name: str, values: Any) -> tuple[Any, str, str]:
-        current = self.machine.parameter_value(name)
-        assert current is not None
-        parameter: Parameter = current.parameter
-        if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
-            raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
-        typed: Any = values
+    def _read(
+        self, parameter: Parameter, name: str, values: Sequence[object], multiples: Mapping[str, float]
+    ) -> NDArray[np.float64] | tuple[str, ...]:
+        """The values of an axis in SI, or its texts."""
+        typed: object = values
         try:
             if not parameter.unit or any(isinstance(one, str) and one in parameter.choices for one in values):
-                texts = _texts(key, values)
-                for typed in texts:
+                texts = _texts(parameter.name, values)
+                for typed in texts if parameter.choices else ():
                     read_value(parameter, typed)
-                return texts, "", parameter.meaning
-            single = isinstance(current.value, float) and not parameter.many
-            multiples = {"x": float(current.value)} if single else {}
+                return texts
+            if isinstance(parameter, ControllerParameter):
+                return np.asarray(parameter.read(list(values)), dtype=np.float64)
             alike(values)
-            typed = [multiplied(value, key, multiples) for value in values]
-            at_shaft = [
-                at_motor(parameter, one, self.machine.gear_with(**{current.name: one})) for one in typed
-            ]
-            read = np.float64(read_value(parameter, at_shaft, batch=True))
+            typed = numbers = [multiplied(value, parameter.name, multiples) for value in values]
+            at_shaft = [at_motor(parameter, one, self.machine.gear_with(**{name: one})) for one in numbers]
+            return np.asarray(read_value(parameter, at_shaft, batch=True), dtype=np.float64)
         except RefusedError as reason:
-            raise InputError(Wording(written={name: key}).refused(parameter, typed, reason)) from None
-        return read, parameter.unit, parameter.meaning
+            raise InputError(Wording().refused(parameter, typed, reason)) from None
 
 
-def _same_kind(one: ControllerParameter, other: ControllerParameter) -> bool:
-    """Whether the same value may be given to both."""
-    return (one.unit, one.kind) == (other.unit, other.kind)
-
-
-def _texts(key: str, values: Any) -> tuple[str, ...]:
-    listed = tuple(values)
-    bad = [value for value in listed if not isinstance(value, str) or not value]
-    if bad or not listed:
+def _texts(key: str, values: Sequence[object]) -> tuple[str, ...]:
+    bad = [value for value in values if not isinstance(value, str) or not value]
+    if bad or not len(values):
         raise InputError(f"{key} = {show(bad[0] if bad else [])}: this axis takes names, in a list.")
-    return listed
+    return tuple(str(value) for value in values)
 
 
 def read_grid(axes: object, recipe: Recipe, machine: Machine) -> Grid:
