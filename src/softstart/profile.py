@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softstart import profile_files
 from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.results import OneLine
@@ -231,22 +231,16 @@ class TorqueProfile(OneLine):
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and torque as CSV, to the last bit; refused for a profile with `after_contact`."""
-        from softstart import profile_files
-
         profile_files.write_csv(self, Path(path))
 
     def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
         """Write TOML that the `profile` controller follows; `about` says where the profile comes from."""
-        from softstart import profile_files
-
         profile_files.write_toml(self, Path(path), about or {})
 
     def to_c(
         self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
     ) -> None:
         """Write C code with the function `double torque_profile(double time)`; `about` as in `to_toml`."""
-        from softstart import profile_files
-
         profile_files.write_c(self, Path(path), name, about)
 
     @classmethod
@@ -263,10 +257,15 @@ class TorqueProfile(OneLine):
         InputError
             In one sentence that names the file, the place and the value.
         """
-        from softstart import profile_files
-
-        found: TorqueProfile = profile_files.read_profile(Path(path))
-        return found
+        profile = None
+        for where, time, torque in reversed(profile_files.read_knots(Path(path))):
+            try:
+                profile = cls(time, torque, profile)
+            except InputError as error:
+                reasons = [sentence.removeprefix("profile: ") for sentence in error.sentences]
+                raise InputError([f"{where}: {reason}" for reason in reasons]) from None
+        assert profile is not None  # a file without knots was refused
+        return profile
 
     def heat(self, until: float, reference: float) -> float:
         """I2t heat in s: the integral of (torque/reference)^2 from 0 to `until`; torque as demanded."""
@@ -276,7 +275,7 @@ class TorqueProfile(OneLine):
         return float(np.sum(np.diff(edges) * (a * a + a * b + b * b)) / (3.0 * reference**2))
 
 
-def _vector(name: str, values: Any) -> Vector:
+def _vector(name: str, values: object) -> Vector:
     try:
         vector = np.array(values, dtype=np.float64) + 0.0  # in which -0.0 is 0.0
     except (TypeError, ValueError):

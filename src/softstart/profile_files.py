@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,10 @@ from softstart.input.columns import Wanted, read_columns
 from softstart.input.documents import literal, parsed
 from softstart.input.files import read_text, write_whole
 from softstart.input.parameters import Wording
-from softstart.profile import TorqueProfile
 from softstart.quantities import RefusedError, show, to_si
+
+if TYPE_CHECKING:
+    from softstart.profile import TorqueProfile
 
 HEADER = "time [s],torque [N*m]"
 TIME = Wanted(("time", "t"), "s")
@@ -26,8 +28,19 @@ KEYS = ("time", "torque", "time_unit", "torque_unit")
 PER_LINE = 4
 
 
-def read_profile(path: Path) -> TorqueProfile:
-    """The profile in a file, by its suffix. Raises InputError in one sentence that names place and value."""
+class Knots(NamedTuple):
+    """Times (s) and torques (N m) in a file, and `where` they are in it, for errors."""
+
+    where: str
+    time: Vector
+    torque: Vector
+
+
+def read_knots(path: Path) -> list[Knots]:
+    """The knots in a file, by its suffix, and those after the contact if there are any.
+
+    Raises InputError in one sentence that names place and value.
+    """
     where, suffix = f"profile = {path}", path.suffix.lower()
     if suffix not in (".toml", ".csv", ".txt", ".dat"):
         raise InputError(f"{where}: its kind is unknown; give a file whose name ends in .csv or .toml.")
@@ -37,15 +50,7 @@ def read_profile(path: Path) -> TorqueProfile:
         raise InputError(f"{where}: {refusal.reason}.") from None
     if suffix == ".toml":
         return _from_toml(text, where)
-    time, torque = read_columns(text, where, (TIME, TORQUE)).values
-    return _profile(where, time, torque)
-
-
-def _profile(where: str, time: Vector, torque: Vector, after: TorqueProfile | None = None) -> TorqueProfile:
-    try:
-        return TorqueProfile(time, torque, after)
-    except InputError as error:
-        raise InputError([f"{where}: {one.removeprefix('profile: ')}" for one in error.sentences]) from None
+    return [Knots(where, *read_columns(text, where, (TIME, TORQUE)).values)]
 
 
 def write_csv(profile: TorqueProfile, path: Path) -> None:
@@ -56,7 +61,7 @@ def write_csv(profile: TorqueProfile, path: Path) -> None:
             "write this profile as TOML."
         )
 
-    def write(stream: IO[Any]) -> None:
+    def write(stream: IO[str]) -> None:
         table = np.column_stack([profile.time, profile.torque])
         np.savetxt(stream, table, delimiter=",", header=HEADER, comments="", fmt="%.17g")
 
@@ -97,7 +102,7 @@ def _text_literal(value: object) -> str:
     return literal(str(value).encode("utf-8", "replace").decode("utf-8"))
 
 
-def _from_toml(text: str, where: str) -> TorqueProfile:
+def _from_toml(text: str, where: str) -> list[Knots]:
     """From the tables [profile] and, if there, [after_contact]: lists `time` in s and `torque` in N m.
 
     `time_unit` and `torque_unit` name other units.
@@ -114,26 +119,24 @@ def _from_toml(text: str, where: str) -> TorqueProfile:
         )
     if "profile" not in document:
         raise InputError(f"{where}: it has no table [profile]; write one with the lists time and torque.")
-    after = document.get("after_contact")
-    knots = _knots(f"{where}: [profile]", document["profile"])
-    after = None if after is None else _profile(*_knots(f"{where}: [after_contact]", after))
-    return _profile(*knots, after)
+    parts = [part for part in ("profile", "after_contact") if part in document]
+    return [_knots(f"{where}: [{part}]", document[part]) for part in parts]
 
 
-def _knots(where: str, table: object) -> tuple[str, Vector, Vector]:
+def _knots(where: str, table: object) -> Knots:
     if not isinstance(table, dict):
         raise InputError(f"{where} = {show(table)}: write a table with the lists time and torque.")
     if unknown := [key for key in table if key not in KEYS]:
         raise InputError(f"{where} has no key {show(unknown[0])}; it has {', '.join(KEYS)}.")
-    found = []
+    columns = []
     for key, si in (("time", "s"), ("torque", "N*m")):
         values, unit = table.get(key), table.get(f"{key}_unit", si)
         if not isinstance(values, list):
             shown = f"{key} = {show(values)}" if key in table else f"{key} is missing"
             raise InputError(f"{where} {shown}: write a list of numbers, {key} = [0.0, 0.1].")
-        one = to_si([f"1 {unit}"], si, name=f"{where} {key}_unit")
-        found.append(np.atleast_1d(to_si(values, si, name=f"{where} {key}")) * one)
-    return where, found[0], found[1]
+        size = to_si([f"1 {unit}"], si, name=f"{where} {key}_unit")
+        columns.append(np.atleast_1d(to_si(values, si, name=f"{where} {key}")) * size)
+    return Knots(where, *columns)
 
 
 # ---- C ---------------------------------------------------------------------------------------------------
@@ -155,14 +158,13 @@ def write_c(
         raise InputError(f'name = "{name}": a C function is named with letters, digits and single _.')
     after = profile.after_contact
     functions = {name: profile} | ({} if after is None else {f"{name}_after_contact": after})
-    said = [" ".join(f"{key}: {value}".split()).replace("*/", "* /") for key, value in (about or {}).items()]
-    said += [
-        f"double {own}(double time);  {p.time.size} knots to {p.end:g} s" for own, p in functions.items()
-    ]
-    text = C_HEADER % "".join(f"   {line}\n" for line in said)
-    for own, p in functions.items():
+    # */ would end the comment
+    lines = [" ".join(f"{key}: {value}".split()).replace("*/", "* /") for key, value in (about or {}).items()]
+    lines += [f"double {f}(double time);  {p.time.size} knots to {p.end:g} s" for f, p in functions.items()]
+    text = C_HEADER % "".join(f"   {line}\n" for line in lines)
+    for function, p in functions.items():
         time, torque = (_rows(map(repr, values.tolist()), "{", "}") for values in (p.time, p.torque))
-        text += C_FUNCTION % {"name": own, "n": p.time.size, "time": time, "torque": torque}
+        text += C_FUNCTION % {"name": function, "n": p.time.size, "time": time, "torque": torque}
     write_whole(path, lambda stream: stream.write(text))
 
 

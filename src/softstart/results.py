@@ -10,12 +10,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from pandas import DataFrame
+
+    from softstart.views.numbers import TextTable
+    from softstart.views.sheet import Sheet
+
+T_co = TypeVar("T_co", covariant=True)
 
 LONGEST_TEXT = 60  # characters of a text in a repr
 
@@ -31,7 +38,7 @@ class OneLine:
         return f"<{type(self).__name__}: {', '.join(filter(None, parts))}>"
 
 
-def _part(name: str, value: Any) -> str:
+def _part(name: str, value: object) -> str:
     words = name.replace("_", " ").replace("k dyn", "K_dyn")
     if isinstance(value, str):
         text = " ".join(value.split())
@@ -40,23 +47,24 @@ def _part(name: str, value: Any) -> str:
         return f"{words} {text}" if len(text) <= LONGEST_TEXT else f"{words} {text[:LONGEST_TEXT]}..."
     if isinstance(value, int | float):
         return f"{words} {value:.6g}" if isinstance(value, float) else f"{words} {value}"
-    if hasattr(value, "WHAT"):  # a drive or a chain
+    if hasattr(value, "WHAT") and hasattr(value, "name"):  # a drive or a chain
         return str(value.name)
     if isinstance(value, OneLine):
         return repr(value)
     return f"{words} [{len(value)}]" if hasattr(value, "__len__") else ""
 
 
-class _OfView:
+class _OfView(Generic[T_co]):
     """An attribute that a result has from its view, unless it has a field of this name."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, result: Result | None, owner: type) -> Any:
+    def __get__(self, result: Result | None, owner: type) -> T_co:
         if result is None:  # so that a dataclass takes it for no default
             raise AttributeError(self.name)
-        return getattr(result.sheet, self.name)
+        value: T_co = getattr(result.sheet, self.name)
+        return value
 
 
 class Result(OneLine, ABC):
@@ -66,31 +74,29 @@ class Result(OneLine, ABC):
     """
 
     _view: ClassVar[tuple[str, str]]
-    if TYPE_CHECKING:
-        conclusions: Sequence[str]
-        tables: Sequence[Any]
-        notes: Sequence[str]
-        figures: Mapping[str, Callable[..., Any]]
-    else:
-        conclusions, tables, notes, figures = _OfView(), _OfView(), _OfView(), _OfView()
+    conclusions: _OfView[Sequence[str]] = _OfView()
+    tables: _OfView[Sequence[TextTable]] = _OfView()
+    notes: _OfView[Sequence[str]] = _OfView()
+    figures: _OfView[Mapping[str, Callable[..., Figure]]] = _OfView()
 
-    def __init_subclass__(cls, view: str = "", **options: Any) -> None:
+    def __init_subclass__(cls, view: str = "", **options: object) -> None:
         super().__init_subclass__(**options)
         if view:
             module, _, name = view.partition(".")
             cls._view = f"softstart.views.{module}", name
 
     @property
-    def sheet(self) -> Any:
+    def sheet(self) -> Sheet:
         """All that is shown of it: a `softstart.views.sheet.Sheet`."""
         module, name = self._view
-        return getattr(import_module(module), name)(self)
+        sheet: Sheet = getattr(import_module(module), name)(self)
+        return sheet
 
     @abstractmethod
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, in SI, as `--json` prints it."""
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """Its rows as a pandas.DataFrame; InputError for a result that is no table."""
         import pandas  # comes with xarray
 
@@ -98,7 +104,7 @@ class Result(OneLine, ABC):
             raise InputError(f"to_dataframe: {self!r} has no rows; see summary().")
         return pandas.DataFrame(list(records))
 
-    def plot(self, *, ax: Axes | None = None) -> Any:
+    def plot(self, *, ax: Axes | None = None) -> Figure | SubFigure:
         """Its first figure; with `ax` the main panel of it, drawn there."""
         sheet = self.sheet
         if not sheet.figures:

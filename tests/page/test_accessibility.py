@@ -73,7 +73,7 @@ def test_the_page_has_no_serious_violation(visit: Callable[..., Any], axe: str) 
 
 def test_a_report_has_no_serious_violation(browser: Any, axe: str, tmp_path: Path) -> None:
     made = report("hoist-15kw", controllers=["s-curve"], budget=0.0)
-    made.write(tmp_path / "report.html")
+    made.save(tmp_path / "report.html")
     page = browser.new_page()
     page.goto((tmp_path / "report.html").as_uri())
     assert violations(page, axe) == []

@@ -49,7 +49,7 @@ from softstart.chain.machines import is_chain
 from softstart.chain.model import Chain
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet, UnknownStiffness, still_assumed
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, parsed
@@ -160,7 +160,7 @@ def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
         for one in (ends if isinstance(ends, UnknownStiffness) else (ends,))
     ]
     if "assumed" not in drive_settings:
-        drives = [one.replace(assumed=data_sheet.assumed_still(drive_settings)) for one in drives]
+        drives = [one.replace(assumed=still_assumed(one, drive_settings)) for one in drives]
     # a stiffness that is set as one of the drive leaves one end
     return UnknownStiffness(*drives) if drives[0].stiffness != drives[-1].stiffness else drives[0]
 

@@ -10,7 +10,8 @@ from softstart.cli import options
 from softstart.cli.options import command, option
 from softstart.cli.running import working
 from softstart.errors import InputError
-from softstart.page.serve import Address, check_installed, listening, run_server
+from softstart.page.address import Address
+from softstart.page.serve import check_installed, listening, run_server
 
 if TYPE_CHECKING:
     from softstart.page.machines import Loaded

@@ -28,13 +28,29 @@ from softstart.input.files import file_text
 from softstart.input.parameters import Mistake, Wording, bare
 
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
-# the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
+# how an assumption begins, and the parameters of the drive that, where they are set themselves, leave nothing
+# of it; a drive keeps what is assumed as text alone, in its file too
 FORCES = {"load_torque", "load_friction"}
-SETTLE = {
-    "starting_ratio": {"starting_torque"}, "efficiency": {"stiffness", "load_inertia", *FORCES},
-    "backlash": {"gap"}, "rope": {"stiffness"}, "rope_modulus": {"stiffness"}, "resistance": FORCES,
-    "damping_ratio": {"damping"}, "stiffness": {"stiffness"},
+SETTLED_BY = {
+    "starting torque ": {"starting_torque"}, "efficiency ": {"stiffness", "load_inertia", *FORCES},
+    "no backlash": {"gap"}, "rigid rope": {"stiffness"}, "rope ": {"stiffness"}, "resistance ": FORCES,
+    "damping ratio ": {"damping"}, "elastic frequency ": {"stiffness"},
 }  # fmt: skip
+
+
+def still_assumed(drive: Drive, settled: Iterable[str]) -> str:
+    """What is assumed of a drive from a data sheet, less what these parameters, set themselves, settle.
+
+    >>> crane = Drive.load("crane-4amtkf").replace(assumed="no backlash; damping ratio 0.02")
+    >>> still_assumed(crane, ["gap"])
+    'damping ratio 0.02'
+    """
+    settled = {*settled, *([] if drive.load_friction else ["load_friction"])}
+    assumptions = drive.assumed.split("; ")
+    return "; ".join(
+        text for text in assumptions
+        if not any(text.startswith(begin) and names <= settled for begin, names in SETTLED_BY.items())
+    )  # fmt: skip
 
 
 class UnknownStiffness(NamedTuple):
@@ -164,13 +180,6 @@ class DataSheet(SheetValues):
 
     def contradictions(self) -> Iterator[str]:
         return contradictions(self)
-
-    # what is filled in ------------------------------------------------------------------------------------
-
-    def assumed_still(self, settled: Iterable[str]) -> str:
-        """What is assumed, less what no longer counts where these parameters of the drive are set."""
-        settled = {*settled, *({"load_friction"} - self._entries.keys())}
-        return "; ".join(one for name, one in self.assumed.items() if not SETTLE.get(name, {""}) <= settled)
 
     # at the motor shaft -----------------------------------------------------------------------------------
 

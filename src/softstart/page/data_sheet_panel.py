@@ -33,9 +33,9 @@ from softstart.page.panel_parts import (
     save,
     text_field,
 )
-from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
+from softstart.views.numbers import cut
 from softstart.views.numbers import unit as printed
 
 TITLES = {
@@ -108,7 +108,7 @@ class DataSheetPanel:
     def _use(self) -> None:
         if (sheet := self.sheet()) is not None:
             self._session.load(sheet.possible)
-            notify(f"{clipped(sheet.name)} is loaded.")
+            notify(f"{cut(sheet.name)} is loaded.")
 
     def _save(self) -> None:
         if (sheet := self.sheet()) is not None:

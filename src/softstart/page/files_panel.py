@@ -24,20 +24,9 @@ from softstart.page.downloads import (
 )
 from softstart.page.job_panel import JobPanel, Task
 from softstart.page.machines import Loaded, machine_from
-from softstart.page.panel_parts import (
-    POLL,
-    Troubles,
-    action,
-    box,
-    choice,
-    follow,
-    hint,
-    notify,
-    save,
-    upload,
-)
-from softstart.page.sentences import clipped
+from softstart.page.panel_parts import POLL, Troubles, action, box, choice, follow, hint, notify, save, upload
 from softstart.page.session import Session
+from softstart.views.numbers import cut
 
 LARGEST = 64 * 1024  # bytes of a drive file
 LONGEST_LINE = 2000  # characters; a key of thousands of parts is read for many seconds
@@ -80,10 +69,10 @@ class DriveFiles:
     def _take_over(self, machine: Loaded) -> None:
         self._troubles.say(())
         self._session.load(machine)
-        notify(f"{clipped(self._session.inputs.machine.name)} is loaded.")
+        notify(f"{cut(self._session.inputs.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
-        self._troubles.say(error.sentences, f"{clipped(name)} was not loaded; the drive is unchanged.")
+        self._troubles.say(error.sentences, f"{cut(name)} was not loaded; the drive is unchanged.")
 
     def _save(self) -> None:
         save(self._session.inputs.machine.to_toml(), drive_file(self._session.inputs.machine))

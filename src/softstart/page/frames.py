@@ -19,7 +19,7 @@ from softstart.drive.plausibility import plausibility_warnings
 from softstart.kernel import records as rec
 from softstart.page import links, machines
 from softstart.page.machines import STRATEGY, Axes, FormField
-from softstart.page.sentences import differences, sentence_of, written
+from softstart.page.sentences import Value, differences, sentence_of, written
 from softstart.page.session import Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
@@ -323,14 +323,14 @@ def described(entry: FormField, units: Units) -> Frame:
     return vars(entry) | {"unit": unit(units.of(entry.unit)), "scale": entry.scale is not None, "text": text}
 
 
-def field_view(entry: FormField, text: str, value: Any, marks: Iterable[Mark], units: Units) -> Frame:
+def field_view(entry: FormField, text: str, value: Value, marks: Iterable[Mark], units: Units) -> Frame:
     """What a field shows: its text, where its slider is, and marks on that, each with what it means."""
     scale = entry.scale
     if scale is None:
         return {"text": text}
     return {
         "text": text,
-        "position": scale.position(0.0 if value is None else float(value)),
+        "position": scale.position(float(value) if isinstance(value, int | float) else 0.0),
         "marks": [
             (scale.position(float(mark)), f"{of}: {written(float(mark), entry.unit, units)}")
             for of, mark in marks
@@ -339,7 +339,7 @@ def field_view(entry: FormField, text: str, value: Any, marks: Iterable[Mark], u
     }
 
 
-def written_value(value: Any, entry: FormField, units: Units) -> str:
+def written_value(value: Value, entry: FormField, units: Units) -> str:
     """The text of a field; empty for a value that is not given."""
     if value is None or isinstance(value, str):
         return value or ""

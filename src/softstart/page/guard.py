@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from softstart.page import USER
-from softstart.page.serve import LOOPBACK, Address, ip_address
+from softstart.page.address import LOOPBACK, Address, ip_address
 
 POLICY_VIOLATION = 1008
 MOST_BODY = 1 << 20  # bytes of a request: a drive file, or some messages of a browser without sockets

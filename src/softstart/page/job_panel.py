@@ -13,8 +13,9 @@ from nicegui import app, context, ui
 from softstart.errors import InputError
 from softstart.page.jobs import Job, Jobs, JobState
 from softstart.page.panel_parts import POLL, Troubles, action, box, hint, notify, reveal, save
-from softstart.page.sentences import changed_since, clipped
+from softstart.page.sentences import changed_since
 from softstart.page.session import Session
+from softstart.views.numbers import cut
 
 if TYPE_CHECKING:
     from softstart.page.tasks import TaskResult
@@ -223,7 +224,7 @@ class JobPanel(ABC):
     def _use(self) -> None:
         if self._result is not None and self._result.drive is not None:
             self.session.load(self._result.drive)
-            notify(f"{clipped(self._result.drive.name)} is loaded.")
+            notify(f"{cut(self._result.drive.name)} is loaded.")
 
 
 def jobs_of(user: Hashable) -> Jobs:

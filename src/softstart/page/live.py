@@ -15,9 +15,8 @@ from softstart.page.frames import Frame, FrameBuilder
 from softstart.page.sentences import log, sentence_of
 
 WINDOW = 3  # frames sent and not yet drawn
-MAX_QUICK = (
-    60  # quick frames between two that were drawn, a second of a drag: more, and the browser is behind
-)
+# quick frames between two that were drawn, a second of a drag: more, and the browser is behind
+MAX_QUICK = 60
 PATIENCE = 1.0  # s, after which a frame that was never answered is taken as lost
 REST = 0.12  # s without a change, after which what is slow or secondary is computed
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Sentence, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units, shortest
-from softstart.views.numbers import unit, units_of
+from softstart.views.numbers import cut, unit, units_of
 
 log = logging.getLogger("softstart.page")
 LONGEST = 300  # characters of an exception
-LONGEST_NAME = 60  # characters of a name in a sentence
 NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source", "assumed", "units", "gear_ratio", "gear_efficiency")  # they change no result
 
@@ -55,15 +54,6 @@ def page_sentence(sentence: str) -> str:
     return sentence.on_page if isinstance(sentence, Sentence) else sentence
 
 
-def clipped(name: str) -> str:
-    """A name short enough to stand in a sentence.
-
-    >>> clipped("Crane"), len(clipped("Crane " * 100))
-    ('Crane', 60)
-    """
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "\N{HORIZONTAL ELLIPSIS}"
-
-
 def changed_since(computed: Machine, now: Machine) -> str:
     """What a result was computed for, where that is not the drive of now; empty where it is.
 
@@ -93,10 +83,13 @@ def differences(machine: Machine, other: Machine) -> str:
     """
     different = [change for change in changes(machine, other) if change.parameter.name not in WORDS]
     if different and machine.name != other.name:
-        return clipped(machine.name)
+        return cut(machine.name)
     units = units_of(other)
     values = [f"{change.path} {_value(change, units)}" for change in different[:NAMED]]
     return ", ".join(values) + (f" and {len(different) - NAMED} more" if len(different) > NAMED else "")
+
+
+Value = float | str | tuple[float, ...] | None  # of a parameter
 
 
 class Change(NamedTuple):
@@ -104,8 +97,8 @@ class Change(NamedTuple):
 
     path: str
     parameter: Parameter
-    old: Any
-    new: Any
+    old: Value
+    new: Value
 
 
 def changes(old: Machine, new: Machine) -> list[Change]:

@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 from softstart.chain.machines import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
-from softstart.drive.data_sheet import UnknownStiffness
+from softstart.drive.data_sheet import UnknownStiffness, still_assumed
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.hints import nearest
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
-from softstart.page.sentences import FAILED_START, clipped, sentence_of
+from softstart.page.sentences import FAILED_START, sentence_of
 from softstart.quantities import Units
 from softstart.start.comparison import REFERENCE, SOFT_END, as_far_as_known, changed_case
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
-from softstart.views.numbers import units_of
+from softstart.views.numbers import cut, units_of
 from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class Inputs:
 
         A value that has been set since is that of both ends; a stiffness that has been set is known.
 
-        >>> from softstart.drive.data_sheet import UnknownStiffness
+        >>> from softstart.drive.data_sheet import UnknownStiffness, still_assumed
         >>> crane = Session().inputs.machine
         >>> session = Session(UnknownStiffness(crane, crane.replace(stiffness=0.01 * crane.stiffness)))
         >>> session.set("gap", 1.0)
@@ -458,7 +458,7 @@ class Session:
         if not gesture or gesture != last or now - when > PAUSE or not self._past:
             self._past = [*self._past[1 - MAX_UNDO :], self.inputs]
         self._future = []
-        self._go_to(replace(self.inputs, **changes), (gesture, now))
+        self._go_to(_without_settled(replace(self.inputs, **changes)), (gesture, now))
 
     def _go_to(self, inputs: Inputs, gesture: tuple[str, float] = ("", -math.inf)) -> None:
         self.inputs, self._gesture = inputs, gesture
@@ -471,13 +471,24 @@ class Session:
         if label not in labels:
             near = nearest(label, labels)
             hint = f"did you mean {near}?" if near else f"there are {', '.join(labels)}."
-            raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
+            raise InputError(f'strategy "{cut(label)}": there is no strategy of this name; {hint}')
 
 
 def _both_ends(machine: Loaded) -> tuple[Machine, dict[str, float]]:
     """The machine to begin with, and what differs at the soft end of an unknown stiffness."""
     stiff, _, soft = as_far_as_known(machine)
     return startable(stiff), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
+
+
+def _without_settled(inputs: Inputs) -> Inputs:
+    """The inputs without assumptions about values that have been set since the drive was loaded."""
+    drive, origin = inputs.machine, inputs.origin
+    if not (isinstance(drive, Drive) and isinstance(origin, Drive) and origin.assumed):
+        return inputs
+    # compared with the loaded drive, so that a slider that goes back to its place brings them back too
+    values, loaded = drive.given(), origin.given()
+    assumed = still_assumed(origin, [name for name in values if values[name] != loaded.get(name)])
+    return inputs if assumed == drive.assumed else replace(inputs, machine=drive.replace(assumed=assumed))
 
 
 def _first_selected(labels: Iterable[str]) -> str:

@@ -36,12 +36,7 @@ if TYPE_CHECKING:
     from softstart.optimal.result import Optimum
     from softstart.views.sheet import Sheet
 
-TUNING_SHARES = {
-    "starts": (0.0, 0.05),
-    "schedule": (0.05, 0.45),
-    "robust": (0.45, 0.8),
-    "optima": (0.8, 1.0),
-}
+TUNING_SHARES = {"starts": (0.0, 0.05), "schedule": (0.05, 0.45), "robust": (0.45, 0.8), "optima": (0.8, 1.0)}
 COLUMN = 314.0  # pixels of an answer on a screen of 1280
 INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
@@ -298,10 +293,6 @@ def report_task(
     progress(0.0, "starting the drive")
     budget = float(text) if (text := os.environ.get("SOFTSTART_BUDGET")) else None
     report = reporting.report(
-        drive,
-        controllers=controllers,
-        progress=progress,
-        command=command,
-        budget=float(budget) if budget else None,
+        drive, controllers=controllers, progress=progress, command=command, budget=budget or None
     )
-    return TaskResult("", {file: str(report.to_html())})
+    return TaskResult("", {file: report.to_html()})

@@ -6,9 +6,4 @@ from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.result import Report, report
 
-__all__ = [
-    "Project",
-    "Report",
-    "Resolution",
-    "report",
-]
+__all__ = ["Project", "Report", "Resolution", "report"]

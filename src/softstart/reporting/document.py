@@ -6,7 +6,8 @@ import itertools
 import math
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
 from matplotlib.patches import Rectangle
 
-from softstart.drive import Machine, plausibility
+from softstart.drive import Drive, Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
@@ -33,6 +34,7 @@ from softstart.views.numbers import (
     DataColumn,
     TextTable,
     at_output,
+    cut,
     digits,
     fixed,
     gear_in_words,
@@ -42,8 +44,11 @@ from softstart.views.numbers import (
     unit,
     units_of,
 )
+from softstart.views.sheet import html_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softstart.reporting.result import Report
 
 HERE = Path(__file__).parent
@@ -88,8 +93,9 @@ def css_string(text: str) -> Markup:
     >>> print(css_string('a"</style>'))
     "a\\22 \\3c \\2f style\\3e "
     """
-    text = text if len(text) <= LONGEST else text[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    written = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
+    written = (
+        c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in cut(text, LONGEST)
+    )
     return Markup('"{}"').format(Markup("".join(written)))
 
 
@@ -99,11 +105,24 @@ def times(seconds: Iterable[float]) -> str:
     return f"{len(words)} start times" if len(set(words)) > 4 else listed(list(dict.fromkeys(words)))
 
 
-def columns(heads: str | list[Column]) -> list[Column]:
-    """The columns of a table from heads in one text, those of numbers with # before them."""
-    if not isinstance(heads, str):
-        return heads
-    return [Column(head.removeprefix("#"), head.startswith("#")) for head in heads.split("|")]
+def table(
+    comma: bool,
+    title: str,
+    heads: str,
+    rows: Sequence[Sequence[str]],
+    look: str = "",
+    strong: Sequence[str] = (),
+) -> Markup:
+    """A table with its heads in one text, those of numbers with # before them; see `view`."""
+    columns = [Column(head.removeprefix("#"), head.startswith("#")) for head in heads.split("|")]
+    return view(comma, TextTable(title, columns, rows), look, strong)
+
+
+def view(comma: bool, shown: TextTable, look: str = "", strong: Sequence[str] = ()) -> Markup:
+    """A table of a view; rows whose first cell is one of `strong` stand out."""
+    bold = [index for index, row in enumerate(shown.rows) if row[0] in strong]
+    cells = html_table(shown._replace(bold=bold), look, lambda text: typeset(text, comma))
+    return Markup(f'<div class="wide">{cells}</div>')
 
 
 FILTERS = {
@@ -112,7 +131,7 @@ FILTERS = {
     "printed": printed, "fact": fact_of,
     "css_string": css_string,
     "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
-    "short4": lambda value: printed(short(float(f"{value:.4g}"))), "columns": columns,
+    "short4": lambda value: printed(short(float(f"{value:.4g}"))),
 }  # fmt: skip
 
 
@@ -141,12 +160,12 @@ def document(report: Report) -> str:
     plain = templates()
 
     @pass_context  # else constants are escaped before they come here
-    def finalize(_: Any, text: object) -> Markup:
+    def finalize(_: object, text: object) -> Markup:
         return typeset(text, comma)
 
     page = plain.overlay(finalize=finalize)
 
-    def svg(figure: Any, key: str, title: str) -> Markup:
+    def svg(figure: Figure, key: str, title: str) -> Markup:
         return in_page(svg_of(figure, key, title))
 
     def in_page(text: str) -> Markup:
@@ -188,7 +207,9 @@ def document(report: Report) -> str:
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
         "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
-        "inverters": inverters(), "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
+        "inverters": inverters(),
+        "table": partial(table, comma), "view": partial(view, comma),
+        "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
         "maps_figure": maps_figure, "starts": starts,
         "chains": chains, "lives": lives,
@@ -203,7 +224,7 @@ def document(report: Report) -> str:
         return page.get_template("report.html.j2").render(values)
 
 
-def limit_figure(report: Report) -> Any:
+def limit_figure(report: Report) -> Figure:
     """K_dyn against start time: the bound below which no start is possible, optima, every strategy."""
     rows = [row for row in report.comparison.rows if not math.isnan(row.run.start_time)]
     curve = report.limit
@@ -216,7 +237,7 @@ def limit_figure(report: Report) -> Any:
     )
 
 
-def maps_figure(report: Report) -> Any:
+def maps_figure(report: Report) -> Figure:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
     drive, units = report.drive.design_drive, units_of(report.drive)
     maps = {row.name: report.choice.maps[row.name] for row in report.choice.mapped}
@@ -267,9 +288,9 @@ def functions(report: Report) -> list[tuple[str, str]]:
     return [(key, name) for key, name in FUNCTIONS.items() if key not in left_out]
 
 
-def there_of(drive: Any, parameter: Parameter, numbers: list[float]) -> str:
+def there_of(drive: Machine, parameter: Parameter, numbers: list[float]) -> str:
     """Values of a parameter, as they are seen, at the output of the gear; "" where they have none there."""
-    through = drive.gear and drive.gear_of(parameter)
+    through = drive.gear_of(parameter) if isinstance(drive, Drive) and drive.gear else None
     if through is None or through.factor(parameter.unit) is None:
         return ""
     return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)

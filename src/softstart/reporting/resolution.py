@@ -133,8 +133,7 @@ def nearest_step(value: float, step: float, most: float = math.inf) -> float:
     if count * step > most * (1.0 + 1e-12):
         count = max(1, math.floor(most / step * (1.0 + 1e-12)))
     exact, decimals = count * step, decimals_of(step)
-    decimal = round(
-        exact, decimals
-    )  # without the noise of binary fractions, of a step that is a short decimal
+    # without the noise of binary fractions, of a step that is a short decimal
+    decimal = round(exact, decimals)
     noise = decimals < 9 and abs(decimal - exact) <= 1e-12 * exact
     return math.copysign(decimal if noise else exact, value)

@@ -248,7 +248,7 @@ class Report(Result):
 
         return document(self)
 
-    def write(self, path: str | Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write the HTML file, whole or not at all."""
         text = self.to_html()
         write_whole(Path(path), lambda stream: stream.write(text))
@@ -293,7 +293,7 @@ def report(
     Returns
     -------
     Report
-        The data; `write` makes one HTML file of it.
+        The data; `save` writes it as one HTML file.
 
     Raises
     ------

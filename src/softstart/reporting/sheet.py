@@ -36,12 +36,8 @@ _DATA = {
     "torque_rate": "the torque rate", "torque_noise": "the noise of the torque",
     "computing_delay": "the dead time",
 }  # fmt: skip
-_LEFT_OUT_AT_0 = (
-    "damping",
-    "load_friction",
-    "torque_noise",
-    "computing_delay",
-)  # data that such a drive simply has not
+# data that such a drive simply has not
+_LEFT_OUT_AT_0 = ("damping", "load_friction", "torque_noise", "computing_delay")
 _PROBE = 1e-3  # relative
 EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
 GEAR_COUNTS, GEAR_CYCLE = 4000.0, 3.3e-3  # DCS 500B: counts of the nominal torque, cycle at 50 Hz in s

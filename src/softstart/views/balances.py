@@ -22,7 +22,7 @@ from softstart.views.drawing import (
     line_of,
     new_figure,
 )
-from softstart.views.numbers import RPM, TextTable, column_of, number, printable, short
+from softstart.views.numbers import RPM, DataColumn, TextTable, number, printable, short
 from softstart.views.sheet import Sheet, columns_file, records_file
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ def balance_sheet(found: Balance) -> Sheet:
         notes=[
             f"{designs}. At most: over all speeds.",
             "The crank turns at constant speed; the moments are those that alternate, about the crank axis.",
-            *([] if engine.cylinders.couples_known else [unknown]),
-            *([f"Assumed: {assumed}."] if assumed else []),
+            "" if engine.cylinders.couples_known else unknown,
+            f"Assumed: {assumed}." if assumed else "",
         ],
         figures=drawings(found),
         files={
@@ -70,7 +70,7 @@ def balance_sheet(found: Balance) -> Sheet:
     )
 
 
-def drawings(found: Balance) -> dict[str, Callable[[], Any]]:
+def drawings(found: Balance) -> dict[str, Callable[[], Figure]]:
     """What draws each figure, by the stem of its file."""
     figures = {"torque": torque_figure} if found.engine.gas is not None else {}
     figures |= {"residual": residual_figure, "forces": force_figure}
@@ -104,39 +104,47 @@ def _lines(found: Balance) -> list[str]:
     ]
 
 
+ORDERS = (  # of the rows of `Balance.orders`
+    DataColumn("order", lambda row: row["order"], text="{:g}".format),
+    DataColumn("gas\ncos", lambda row: row.get("gas_cosine"), optional=True),
+    DataColumn("gas\nsin", lambda row: row.get("gas_sine"), optional=True),
+    DataColumn("inertia\nsin", lambda row: row["inertia_sine"]),
+    DataColumn("torque\nN m", lambda row: row["torque"]),
+    DataColumn("force\nN", lambda row: row["force"]),
+    DataColumn("couple\nN m", lambda row: row["couple"]),
+)
+DESIGNS = (  # of the rows of `Residual`, with the largest moment over all speeds
+    DataColumn("balancer", lambda row: row["balancer"]),
+    DataColumn("h\nmm", lambda row: _in_mm(row["height"]), 2),
+    DataColumn("e\nmm", lambda row: _in_mm(row["offset"]), 2),
+    DataColumn("moment\nN m", lambda row: row["first_order_moment"]),
+    DataColumn("at most\nN m", lambda row: row["largest_moment"]),
+    DataColumn("all orders\nN m", lambda row: row["moment"]),
+    DataColumn("force\nN", lambda row: row["first_order_force"]),
+    DataColumn("all orders\nN", lambda row: row["force"]),
+    DataColumn("couple\nN m", lambda row: row["first_order_couple"]),
+    DataColumn("couple, all\nN m", lambda row: row["couple"]),
+)
+
+
+def _in_mm(length: float | None) -> float | None:
+    return None if length is None else 1e3 * length
+
+
 def _orders(found: Balance) -> TextTable:
     """The orders at the tuning speed."""
-    rows, gas = found.orders(), ("cosine", "sine") if found.engine.gas else ()
-    cells = {
-        "order": [f"{row['order']:g}" for row in rows],
-        **{f"gas\n{key[:3]}": column_of([row[f"gas_{key}"] for row in rows]) for key in gas},
-        "inertia\nsin": column_of([row["inertia_sine"] for row in rows]),
-        "torque\nN m": column_of([row["torque"] for row in rows]),
-        "force\nN": column_of([row["force"] for row in rows]),
-        "couple\nN m": column_of([row["couple"] for row in rows]),
-    }
     title = f"Orders at {_rpm(found)}: torque on the crank; force without balancer shafts"
-    return TextTable.of(title, cells)
+    return TextTable.of_data(title, ORDERS, found.orders())
 
 
 def _designs(found: Balance) -> TextTable:
     """What each design needs and leaves."""
-    i, all_of = found.tuning_index, found.residuals
-    at_tuning = {
-        "moment\nN m": "first_order_moment", "at most\nN m": "", "all orders\nN m": "moment",
-        "force\nN": "first_order_force", "all orders\nN": "force", "couple\nN m": "first_order_couple",
-        "couple, all\nN m": "couple",
-    }  # fmt: skip
-    cells = {
-        "balancer": [one.name for one in all_of],
-        "h\nmm": [number(None if one.height is None else 1e3 * one.height[i], 2) for one in all_of],
-        "e\nmm": [number(None if one.offset is None else 1e3 * one.offset[i], 2) for one in all_of],
-    }
-    for heading, key in at_tuning.items():
-        values = [float(getattr(one, key)[i] if key else one.first_order_moment.max()) for one in all_of]
-        if "couple" not in key or any(one.couple[i] > 0.0 for one in all_of):
-            cells[heading] = column_of(values)
-    return TextTable.of(f"Left on the housing at {_rpm(found)}, first and all orders", cells, ("balancer",))
+    rows = [
+        {"balancer": one.name, "largest_moment": one.first_order_moment.max(), **one.row(found.tuning_index)}
+        for one in found.residuals
+    ]
+    columns = DESIGNS if any(row["couple"] > 0.0 for row in rows) else DESIGNS[:-2]
+    return TextTable.of_data(f"Left on the housing at {_rpm(found)}, first and all orders", columns, rows)
 
 
 def _speeds(found: Balance) -> list[TextTable]:
@@ -193,7 +201,7 @@ def _cycle(found: Balance) -> dict[str, Any]:
 # figures ---------------------------------------------------------------------------------------------------
 
 
-def _entitle(figure: Any, found: Balance, what: str, more: str = "") -> None:
+def _entitle(figure: Figure, found: Balance, what: str, more: str = "") -> None:
     assumed = "   (with assumed values)" if found.engine.assumed else ""
     entitle(figure, f"{found.engine.name}: {what}{assumed}{more}")
 
@@ -295,5 +303,5 @@ def force_figure(found: Balance) -> Figure:
     return figure
 
 
-def _legend_below(figure: Any, axes: Axes, columns: int) -> None:
+def _legend_below(figure: Figure, axes: Axes, columns: int) -> None:
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)

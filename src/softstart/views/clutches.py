@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softstart.views.drawing import (
-    GREY,
-    drawing,
-    entitle,
-    head,
-    line_of,
-    new_figure,
-)
+from softstart.views.drawing import GREY, drawing, entitle, head, line_of, new_figure
 from softstart.views.numbers import NOTHING, TextTable, column_of, printable, short, with_unit
 from softstart.views.sheet import Sheet, columns_file, rows_file
 
@@ -62,7 +55,7 @@ def engagement_sheet(run: Engagement) -> Sheet:
         ("slip time", with_unit(run.slip_time, "s")),
         ("friction work", f"{short(run.friction_work)} J, {short(run.work_while_engaging)} while engaging"),
         ("work up to the lock-up", f"{short(run.slip_work)} J"),
-        ("heat of the linings", with_unit(run.lining_heat, "J/m2")),
+        ("heat of the linings", with_unit(run.lining_heat, "J/m2").removeprefix(NOTHING)),
         ("work of the drive", f"{short(energy.drive)} J, balance closed to {energy.residual:.0e}"),
     ]
     again, slips = sum(phase.kind == "slip" for phase in run.phases) - 1, ""
@@ -75,7 +68,7 @@ def engagement_sheet(run: Engagement) -> Sheet:
     return Sheet(
         title=f"{run.clutch.name}: {run.law.label}",
         lines=clutch_lines(run.clutch),
-        facts=[(name, text) for name, text in facts if text != NOTHING or name != "heat of the linings"],
+        facts=facts,
         tables=[TextTable.of("Events", cells, ("event",), most=MOST_EVENTS)],
         conclusions=[STATUS[run.status] + slips],
         figures={"engagement": lambda: engagement_figure([run], run.clutch.name)},

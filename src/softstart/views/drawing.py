@@ -14,13 +14,19 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from softstart.arrays import Matrix, Vector
 from softstart.input.files import write_whole
 from softstart.views.numbers import cut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
+    from matplotlib.ticker import Locator
 
     from softstart.start.run import Run
 
@@ -129,12 +135,12 @@ def head(axes: Axes, title: str, up: str, across: str = "") -> None:
         axes.set_xlabel(across)
 
 
-def legend_above(axes: Axes, columns: int, **options: Any) -> None:
+def legend_above(axes: Axes, columns: int, **options: float) -> None:
     """A legend of one row at the right, beside the title of a panel."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, **options)
 
 
-def legend_beside(axes: Axes, columns: int = 1, **options: Any) -> None:
+def legend_beside(axes: Axes, columns: int = 1, **options: float) -> None:
     """A legend at the right of a panel, for names that have no room elsewhere."""
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, **options)
 
@@ -159,7 +165,7 @@ def line_of(index: int, dashed: bool = False) -> dict[str, Any]:
     return {"color": COLOURS[index % len(COLOURS)], "ls": DASHES[rounds % len(DASHES)]}
 
 
-def plain_ticks(axis: Any, locator: Any) -> None:
+def plain_ticks(axis: Axis, locator: Locator) -> None:
     """Numbers as they are, not as powers, on a logarithmic axis."""
     from matplotlib import ticker
 
@@ -198,7 +204,7 @@ def panels(
     return figure, list(axes.flat[:count])
 
 
-def colour_scale(*values: Any) -> Any:
+def colour_scale(*values: Matrix) -> Normalize:
     """Colours from the least to the largest of all finite values, logarithmic beyond a factor of 10."""
     from matplotlib import colors
 
@@ -210,9 +216,9 @@ def colour_scale(*values: Any) -> Any:
 
 
 def heat_map(
-    axes: Axes, x: Any, y: Any, values: Any, scale: Any, *,
-    decimals: int | None = None, struck: Any = None, margins: bool = False,
-) -> Any:  # fmt: skip
+    axes: Axes, x: Vector | Sequence[str], y: Vector | Sequence[str], values: Matrix, scale: Normalize, *,
+    decimals: int | None = None, struck: NDArray[np.bool_] | None = None, margins: bool = False,
+) -> QuadMesh:  # fmt: skip
     """Values in colours over x and y, the first row below; missing ones are grey.
 
     With `decimals` all cells have the same size and hold their number; those that are `struck` are struck
@@ -221,15 +227,17 @@ def heat_map(
     """
     axes.grid(visible=False)
     axes.set_facecolor(MISSING)
-    colours = {"norm": scale, "cmap": COLOUR_MAP, "shading": "nearest", "rasterized": decimals is None}
     if decimals is None:
-        drawn = axes.pcolormesh(x, y, values, **colours)
-        fit_axis(axes, "x", x)
-        fit_axis(axes, "y", y)
-        _contours(axes, np.asarray(x), np.asarray(y), values, margins)
-        return drawn
+        across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        colours = axes.pcolormesh(
+            across, up, values, norm=scale, cmap=COLOUR_MAP, shading="nearest", rasterized=True
+        )
+        fit_axis(axes, "x", across)
+        fit_axis(axes, "y", up)
+        _contours(axes, across, up, values, margins)
+        return colours
     edges = [np.arange(len(one) + 1) - 0.5 for one in (x, y)]
-    drawn = axes.pcolormesh(*edges, values, **(colours | {"shading": "flat"}))
+    colours = axes.pcolormesh(*edges, values, norm=scale, cmap=COLOUR_MAP, shading="flat")
     for (i, j), value in np.ndenumerate(values):
         text, light = (f"{value:.{decimals}f}", scale(value)) if math.isfinite(value) else ("-", 1.0)
         colour = "#000000" if light > LIGHT else "#FFFFFF"
@@ -240,10 +248,10 @@ def heat_map(
     axes.set_yticks(range(len(y)), list(map(str, y)))
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    return drawn
+    return colours
 
 
-def _contours(axes: Axes, x: Any, y: Any, values: Any, margins: bool) -> None:
+def _contours(axes: Axes, x: Vector, y: Vector, values: Matrix, margins: bool) -> None:
     """Contour lines, and a mark at the worst value with its number."""
     finite = np.isfinite(values)
     if min(values.shape) > 2 and finite.all() and float(np.ptp(values)) > 0.0:
@@ -263,7 +271,7 @@ def _contours(axes: Axes, x: Any, y: Any, values: Any, margins: bool) -> None:
         )  # fmt: skip
 
 
-def fit_axis(axes: Axes, name: str, values: Any) -> None:
+def fit_axis(axes: Axes, name: str, values: Vector) -> None:
     """The axis "x" or "y" logarithmic where values rise by a constant factor, over half a decade or more."""
     if len(values) > 2 and values[0] > 0.0 and values[-1] >= 3.0 * values[0]:
         steps = np.diff(np.log(values))
@@ -272,7 +280,7 @@ def fit_axis(axes: Axes, name: str, values: Any) -> None:
             decade_ticks(getattr(axes, f"{name}axis"))
 
 
-def decade_ticks(axis: Any) -> None:
+def decade_ticks(axis: Axis) -> None:
     """Numbers as they are, at 1, 2 and 5 of each decade."""
     from matplotlib import ticker
 

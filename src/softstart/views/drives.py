@@ -48,20 +48,17 @@ def drive_lines(machine: Any) -> list[str]:
             f"{short(inertia)} kg m2, gaps {short(float(machine.gaps.sum()))} rad, load torque {Mc} N m",
             named,
         ]
-    also = list(_also(machine))
-    if len(masses) == 2 and two.d:
-        also.insert(0, f"d = {short(float(two.d))} N m s/rad")
-    return [
+    damping = f"d = {short(float(two.d))} N m s/rad" if len(masses) == 2 and two.d else ""
+    also = ", ".join(filter(None, (damping, *_also(machine))))
+    start = f"  start  to {short(two.speed)} rad/s ({two.speed * RPM:.4g} rpm)"
+    lines = [
         printable(machine.name),
         *parts,
-        *(
-            []
-            if math.isnan(two.speed)
-            else [f"  start  to {short(two.speed)} rad/s ({two.speed * RPM:.4g} rpm)"]
-        ),
-        *(["  also   " + ", ".join(also)] if also else []),
-        *([f"  assumed: {printable(machine.assumed)}"] if machine.assumed else []),
+        "" if math.isnan(two.speed) else start,
+        f"  also   {also}" if also else "",
+        f"  assumed: {printable(machine.assumed)}" if machine.assumed else "",
     ]
+    return list(filter(None, lines))
 
 
 def _there(machine: Machine) -> Iterator[str]:

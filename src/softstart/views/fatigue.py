@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +13,12 @@ from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
 from softstart.views.markdown import file_stem
-from softstart.views.numbers import TextTable, column_of, number, short
+from softstart.views.numbers import DataColumn, TextTable, number, short
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
 from softstart.views.starts import machine_lines
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SPECTRUM = ("range N m", "mean N m", "count")
 EQUIVALENT = (
@@ -41,50 +44,55 @@ def counted(value: float) -> str:
     return f"{value:.3g}" if 1e6 <= value < math.inf else factor(value)
 
 
+STRATEGY = DataColumn("strategy", lambda row: row.run.controller_name)
+FIGURES = (  # of a single shaft
+    DataColumn("K_dyn", lambda row: row.start.k_dyn, 3),
+    DataColumn("start\ntime s", lambda row: row.start.start_time),
+    DataColumn("equivalent\ntorque N m", lambda row: row.equivalent_torque),
+    DataColumn("life over\ndirect", lambda row: row.relative, text=factor),
+    DataColumn("half\ndamping", lambda row: _end_of(row, 0), text=factor, optional=True),
+    DataColumn("twice\ndamping", lambda row: _end_of(row, 1), text=factor, optional=True),
+    DataColumn("starts to\nfailure", lambda row: row.starts, text=counted, optional=True),
+    DataColumn("years", lambda row: row.years, text=counted, optional=True),
+    DataColumn("life over\ndirect, worn", lambda row: row.worn_relative, text=factor, optional=True),
+    DataColumn("years,\nworn", lambda row: row.worn_years, text=counted, optional=True),
+    DataColumn("impacts", lambda row: row.impacts, 0),
+    DataColumn("impact\nenergy J", lambda row: row.impact_energy, digits=3),
+)
+OF_SHAFTS = (  # a table each, with a column for each of several shafts
+    DataColumn("Life over that under direct", lambda row: row.relative, text=factor),
+    DataColumn("Damage-equivalent torque at the motor shaft, N m", lambda row: row.equivalent_torque, 1),
+    DataColumn("Life with half the damping", lambda row: _end_of(row, 0), text=factor, optional=True),
+    DataColumn("Life with twice the damping", lambda row: _end_of(row, 1), text=factor, optional=True),
+    DataColumn("Life over that under direct, worn", lambda row: row.worn_relative, text=factor,
+               optional=True),
+    DataColumn("Largest torque, % of the permissible torque", lambda row: 100.0 * row.utilisation, 1,
+               optional=True),
+)  # fmt: skip
+
+
+def _end_of(row: Life, end: int) -> float:
+    """The relative life with half or twice the damping; NaN where the damping is not estimated."""
+    return row.relative_range[end] if row.relative_range else math.nan
+
+
 def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> list[TextTable]:
     """The strategies with all figures of a single shaft, or with a table a figure of several shafts."""
-    shafts, worn, limits = found.drive.shaft_names, not math.isnan(found.worn_gap), found.drive.limits
-    starts, years = bool(found.curve.points), limits.starts_per_hour is not None
-    worn_years = any(not math.isnan(row.worn_hours) for row in rows)
-    estimated = bool(found.estimate)
-    limited, several = any(not math.isnan(row.utilisation) for row in rows), len(shafts) > 1
-    figures: list[tuple[bool, str, str, Callable[[Life], str]]] = [
-        (True, "life over\ndirect", "Life over that under direct", lambda row: factor(row.relative)),
-        (estimated, "half\ndamping", "Life with half the damping",
-         lambda row: factor(row.relative_range[0])),
-        (estimated, "twice\ndamping", "Life with twice the damping",
-         lambda row: factor(row.relative_range[1])),
-        (starts and not several, "starts to\nfailure", "", lambda row: counted(row.starts)),
-        (starts and years and not several, "years", "", lambda row: counted(row.years)),
-        (worn, "life over\ndirect, worn", "Life over that under direct, worn",
-         lambda row: factor(row.worn_relative)),
-        (worn and worn_years and not several, "years,\nworn", "", lambda row: counted(row.worn_years)),
-        (limited and several, "", "Largest torque, % of the permissible torque",
-         lambda row: number(100.0 * row.utilisation, 1)),
-    ]  # fmt: skip
-    figures = [one for one in figures if one[0]]
-    if several:
-        torque = "Damage-equivalent torque at the motor shaft, N m"
-        figures.insert(1, (True, "", torque, lambda row: number(row.equivalent_torque, 1)))
-        names = {"strategy": [row.run.controller_name for row in rows[:: len(shafts)]]}
-        return [
-            TextTable.of(
-                heading,
-                names | {name: list(map(cell, rows[k :: len(shafts)])) for k, name in enumerate(shafts)},
-                ("strategy",),
-            )
-            for _, _, heading, cell in figures
-        ]
-    cells = {
-        "strategy": [row.run.controller_name for row in rows],
-        "K_dyn": [number(row.start.k_dyn, 3) for row in rows],
-        "start\ntime s": column_of([row.start.start_time for row in rows]),
-        "equivalent\ntorque N m": column_of([row.equivalent_torque for row in rows]),
-        **{heading: list(map(cell, rows)) for _, heading, _, cell in figures},
-        "impacts": [str(row.impacts) for row in rows],
-        "impact\nenergy J": column_of([row.impact_energy for row in rows], 3),
-    }
-    return [TextTable.of(title, cells, ("strategy",))]
+    shafts = found.drive.shaft_names
+    if len(shafts) == 1:
+        return [TextTable.of_data(title, (STRATEGY, *FIGURES), rows)]
+    return [
+        TextTable.of(
+            figure.heading,
+            {
+                "strategy": STRATEGY.cells(rows[:: len(shafts)]),
+                **{name: figure.cells(rows[k :: len(shafts)]) for k, name in enumerate(shafts)},
+            },
+            ("strategy",),
+        )
+        for figure in OF_SHAFTS
+        if figure.is_shown(rows)
+    ]
 
 
 def fatigue_conclusion(found: Fatigue) -> str:
@@ -150,7 +158,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     return text
 
 
-def fatigue_figure(found: Fatigue) -> Any:
+def fatigue_figure(found: Fatigue) -> Figure:
     """Ranges of the cycles of a start over their number, of the most damaged shaft; lives of all shafts."""
     runs = sorted(found.by_run, key=lambda rows: -min(row.relative for row in rows))
     names = [rows[0].run.controller_name for rows in runs]

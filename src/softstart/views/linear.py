@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softstart.arrays import Complex, Vector
 from softstart.linear.limit_cycles import SHARES, oscillating
 from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
@@ -42,22 +43,18 @@ def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
     return [
         ("closed loop in contact", "stable" if loop.stable else "unstable"),
         *margin_texts(m).items(),
-        *([("gain reduction margin", f"{m.gain_reduction:.3g}")] if m.gain_reduction > 0.0 else []),
+        ("gain reduction margin", f"{m.gain_reduction:.3g}" if m.gain_reduction > 0.0 else ""),
         ("modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"),
         ("gain crossover", _frequencies(m.gain_crossovers)),
         ("phase crossover", _frequencies(m.phase_crossovers)),
-        *([("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}")]
-          if mode is not None else []),
+        ("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}" if mode else ""),
         ("linearisation error, max.", f"{float(f'{100.0 * loop.point.mismatch:.2g}'):g} %"),
     ]  # fmt: skip
 
 
-def _margin(name: str, scale: float) -> Callable[[Loop], float | str]:
-    def of(loop: Loop) -> float | str:
-        value = scale * getattr(loop.margins, name)
-        return value if math.isfinite(value) else math.nan  # not limited
-
-    return of
+def _limited(margin: float) -> float:
+    """A margin; NaN where there is no limit."""
+    return margin if math.isfinite(margin) else math.nan
 
 
 MODES = (
@@ -68,10 +65,10 @@ MODES = (
 VARIATIONS = (
     DataColumn("drive", lambda loop: loop.name),
     DataColumn("stable", lambda loop: "yes" if loop.stable else "no"),
-    DataColumn("gain\nmargin", _margin("gain_margin", 1.0), 2),
-    DataColumn("phase\nmargin deg", _margin("phase_margin", 180.0 / math.pi), 1),
-    DataColumn("delay\nmargin ms", _margin("delay_margin", 1e3), 2),
-    DataColumn("modulus\nmargin", _margin("modulus_margin", 1.0), 3),
+    DataColumn("gain\nmargin", lambda loop: _limited(loop.margins.gain_margin), 2),
+    DataColumn("phase\nmargin deg", lambda loop: _limited(math.degrees(loop.margins.phase_margin)), 1),
+    DataColumn("delay\nmargin ms", lambda loop: _limited(1e3 * loop.margins.delay_margin), 2),
+    DataColumn("modulus\nmargin", lambda loop: _limited(loop.margins.modulus_margin), 3),
     DataColumn("minimum\ndamping", lambda loop: loop.least_damping, 3),
 )
 CYCLES = (
@@ -172,7 +169,7 @@ def linear_figure(view: LinearView) -> Figure:
     return figure
 
 
-def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+def _magnitude(axes: Axes, w: Vector, L: Complex, m: Margins) -> None:
     """|L|, its distance from 1 where the phase is -180 degrees."""
     axes.loglog(w, np.abs(L), color=COLOURS[0])
     axes.axhline(1.0, color=GREY, lw=0.8)
@@ -185,7 +182,7 @@ def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
     head(axes, f"gain margin {margin_texts(m)['gain margin']}", "|L|")
 
 
-def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+def _phase(axes: Axes, w: Vector, L: Complex, m: Margins) -> None:
     """The phase of L, its distance from 180 degrees where |L| is 1."""
     degrees = np.degrees(np.angle(L))
     jumps = np.abs(np.diff(degrees, prepend=degrees[0])) > 170.0
@@ -200,7 +197,7 @@ def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
     head(axes, title, "phase of L, degrees")
 
 
-def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
+def _nyquist(axes: Axes, L: Complex, m: Margins) -> None:
     """L near -1, and how near it comes."""
     turn, least = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 200)), m.modulus_margin
     near = least * turn - 1.0

@@ -15,8 +15,11 @@ from softstart.drive import Machine
 from softstart.quantities import Units
 
 NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
+MISSING = ("", "nan", "None")  # texts of values that are not there
 RPM = 30.0 / math.pi  # of one rad/s
+LONGEST_NAME = 60  # characters of a name in a sentence
 UNITS = {"kg*m^2": "kg m\N{SUPERSCRIPT TWO}", "1": ""}  # as report and page print them
+MINUS = re.compile(r"(?<!\w)-(?=[\d.]|inf\b)|(?<=\de)-(?=\d)")  # a sign, not the hyphen of a name
 UNIT_BEHIND = r"(?<!,) (?=(N m|N m s|kg m2|rad|rad/s|s|ms|Hz|J|%|deg|mm|N|kN)$)"  # a heading
 
 
@@ -43,18 +46,27 @@ class Column(NamedTuple):
 class DataColumn(NamedTuple):
     """A column as a view declares it: its heading, and the value of a row.
 
-    A number has so many `decimals`, or all of the column as many as the largest one has with `digits`
-    significant ones.
+    A number has so many `decimals`, or is written by `text`, or all of the column have as many decimals as
+    the largest one has with `digits` significant ones. An `optional` column is left out where no row has a
+    value.
     """
 
     heading: str
     of: Callable[[Any], Any]
     decimals: int | None = None
     digits: int = 4
+    text: Callable[[float], str] | None = None
+    optional: bool = False
 
-    def cells(self, rows: Iterable[Any]) -> list[str]:
+    def is_shown(self, rows: Iterable[object]) -> bool:
+        """Whether there is anything to show."""
+        return not self.optional or any(str(self.of(row)) not in MISSING for row in rows)
+
+    def cells(self, rows: Iterable[object]) -> list[str]:
         """The cells of these rows."""
         values = list(map(self.of, rows))
+        if self.text is not None:
+            return list(map(self.text, values))
         if any(isinstance(value, str) for value in values):
             return values
         if self.decimals is None:
@@ -85,7 +97,7 @@ class TextTable(NamedTuple):
 
     @classmethod
     def of_data(
-        cls, title: str, columns: Sequence[DataColumn], rows: Sequence[Any], **options: Any
+        cls, title: str, columns: Sequence[DataColumn], rows: Sequence[object], **options: Any
     ) -> TextTable:
         """From declared columns; numbers to the right, texts to the left.
 
@@ -93,7 +105,9 @@ class TextTable(NamedTuple):
         >>> TextTable.of_data("", columns, ["1", "2.5"]).rows
         [['1', '1.00'], ['2.5', '2.50']]
         """
-        texts = [c.heading for c in columns if any(isinstance(c.of(row), str) for row in rows)]
+        columns = [column for column in columns if column.is_shown(rows)]
+        plain = [column for column in columns if column.text is None]
+        texts = [c.heading for c in plain if any(isinstance(c.of(row), str) for row in rows)]
         return cls.of(title, {c.heading: c.cells(rows) for c in columns}, texts, **options)
 
     @classmethod
@@ -106,7 +120,7 @@ class TextTable(NamedTuple):
     @classmethod
     def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
         """Rows of text, without a title."""
-        return cls("", [Column(heading, False) for heading in headings], rows)
+        return cls.of_rows("", headings, (), rows)
 
 
 def number(value: float | None, decimals: int) -> str:
@@ -190,8 +204,12 @@ def label(name: str, unit: str = "", between: str = ", ") -> str:
 
 
 def printed(text: str) -> str:
-    """One of these numbers as report and page print it: a true minus sign, an en dash for a missing value."""
-    return DASH if text == NOTHING else text.replace("-", "\N{MINUS SIGN}").replace("inf", "infinite")
+    """A cell as report and page print it: a true minus sign, an en dash for a missing value.
+
+    >>> printed("-1.5e-05"), printed("-"), printed("s-curve")
+    ('\N{MINUS SIGN}1.5e\N{MINUS SIGN}05', '\N{EN DASH}', 's-curve')
+    """
+    return DASH if text == NOTHING else re.sub(r"\binf\b", "infinite", MINUS.sub("\N{MINUS SIGN}", text))
 
 
 def fixed(value: float | None, decimals: int) -> str:
@@ -299,7 +317,7 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
-def cut(text: str, most: int) -> str:
+def cut(text: str, most: int = LONGEST_NAME) -> str:
     """A text of at most so many characters.
 
     >>> cut("Crane", 5), cut("Crane drive", 5)
@@ -308,7 +326,7 @@ def cut(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def json_ready(value: Any) -> Any:
+def json_ready(value: object) -> Any:
     """Results as JSON has them: NaN and infinity become null, numpy's numbers and arrays plain ones.
 
     >>> json_ready({"k_dyn": float("nan"), "stages": (1, 2)})

@@ -41,40 +41,39 @@ def controller_summary(run: Run) -> dict[str, Any]:
 
 
 def _facts(best: Optimum) -> list[list[str]]:
-    """The figures of the optimum, as words and numbers."""
+    """The figures of the optimum, as words and numbers; those that it does not have are empty."""
     run, bound, problem, kept = best.run, best.bound, best.problem, best.kept
     bounded, shafts = bound.kind != "none", run.drive.shaft_names
-    known = bounded or kept is not None
-    gap = ["optimality gap", f"{best.optimality_gap_percent:.3g} %" if known else NOTHING]
+    known, heat = bounded or kept is not None, best.heat_at_least
+    gap = f"{best.optimality_gap_percent:.3g} %" if known else NOTHING
+    of_shafts = zip(shafts, best.k_dyns, strict=True) if len(shafts) > 1 else ()
+    known_starts = {} if problem.scenarios else best.alone
+    searches = ", ".join(f"{one.method} {number(one.value, 6).replace('-', 'none')}" for one in best.tried)
 
     def limited(limit: float | None, unit: str = "") -> str:
         return "" if limit is None else f" (limit {short(limit)}{unit})"
 
-    rows = [
+    return [
         ["K_dyn", number(best.k_dyn, 6) + limited(problem.k_dyn)],
         ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
-        *([gap] if problem.minimise == "k_dyn" and kept is None else []),
+        ["optimality gap", gap if problem.minimise == "k_dyn" and kept is None else ""],
         ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
-    ]
-    if len(shafts) > 1:
-        rows += [[f"K_dyn in {name}", number(k, 6)] for name, k in zip(shafts, best.k_dyns, strict=True)]
-    rows += [
+        *([f"K_dyn in {name}", number(k, 6)] for name, k in of_shafts),
         ["start time", f"{short(best.end_time)} s{limited(None if kept else problem.start_time, ' s')}"],
-        *([["lower bound of the start time", f"{short(kept.at_least)} s"], gap] if kept else []),
+        ["lower bound of the start time", f"{short(kept.at_least)} s" if kept else ""],
+        ["optimality gap", gap if kept else ""],
         ["I2t heat", f"{short(best.heat)} s of starting torque{limited(problem.heat, ' s')}"],
-    ]
-    if best.heat_at_least:
-        rows += [["lower bound of the heat", f"{short(best.heat_at_least)} s, momentum"], gap]
-    rows += [
+        ["lower bound of the heat", f"{short(heat)} s, momentum" if heat else ""],
+        ["optimality gap", gap if heat else ""],
         ["first contact", with_unit(run.first_contact, "s")],
         ["contacts", str(run.contacts)],
         ["knots of the profile", str(best.profile.time.size)],
+        *(
+            [f"K_dyn, known start position {name}", number(one.k_dyn, 6)]
+            for name, one in known_starts.items()
+        ),
+        ["results of the searches", searches if len(best.tried) > 1 else ""],
     ]
-    if not problem.scenarios:
-        alone = best.alone.items()
-        rows += [[f"K_dyn, known start position {name}", number(one.k_dyn, 6)] for name, one in alone]
-    searches = ", ".join(f"{one.method} {number(one.value, 6).replace('-', 'none')}" for one in best.tried)
-    return [*rows, ["results of the searches", searches]] if len(best.tried) > 1 else rows
 
 
 def optimum_question(best: Optimum) -> str:
@@ -263,11 +262,7 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
     about = {"drive": drive.name, "k_dyn": best.k_dyn}
     return Sheet(
         f"{drive.name}: {'one profile for all' if several else best_start(drive)}",
-        [
-            *machine_lines(drive),
-            f"  task   {optimum_question(best)}",
-            f"  method {best.method}: {best.why}",
-        ],
+        [*machine_lines(drive), f"  task   {optimum_question(best)}", f"  method {best.method}: {best.why}"],
         facts=_facts(best),
         tables=[
             *([scenario_table(best)] if several else []),

@@ -6,23 +6,25 @@ import html
 import math
 import platform
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softstart import __version__
 from softstart.drive import Machine
 from softstart.views.drawing import save_figure, svg_of
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
-from softstart.views.numbers import Column, TextTable
+from softstart.views.numbers import Column, TextTable, printed
 from softstart.views.terminal import blocks_of, console, print_lines, print_table, sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FITTED_TO = "fitted-to.toml"
+COLUMN_HEAD, ROW_HEAD = 'th scope="col"', 'th scope="row"'
 LETTER, PADDING = 6.5, 8.0  # pixels of a table on the page
 
 Writer = Callable[[Path], object]
@@ -30,7 +32,10 @@ Writer = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Sheet:
-    """What is shown of a result, in the order in which it is shown.
+    """What is shown of a result, in the order in which it is shown; what is empty is left out.
+
+    Not what a user gives (`DataSheet`: the plates of a drive) and not what is set on an inverter
+    (`reporting.ParameterSheet`): it holds only texts, tables and functions that draw.
 
     Attributes
     ----------
@@ -42,8 +47,8 @@ class Sheet:
         How it ended, a sentence.
     facts : sequence of (str, str)
         Figures, each a name and its value.
-    tables : sequence of Table
-        Those without rows are left out.
+    tables : sequence of TextTable
+        The main one first.
     conclusions, notes : sequence of str
         What came out; what the figures mean.
     figures : mapping of str to callable
@@ -75,7 +80,7 @@ class Sheet:
     tables: Sequence[TextTable] = ()
     conclusions: Sequence[str] = ()
     notes: Sequence[str] = ()
-    figures: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    figures: Mapping[str, Callable[..., Figure]] = field(default_factory=dict)
     panel: Callable[[Axes], object] | None = None
     no_figure: str = ""
     records: Sequence[Mapping[str, object]] = ()
@@ -85,6 +90,11 @@ class Sheet:
     varied: bool = False
     behind: Sequence[str] = ()
     commands: Sequence[tuple[str, str]] = ()
+
+    def __post_init__(self) -> None:
+        texts = {name: list(filter(None, vars(self)[name])) for name in ("lines", "conclusions", "notes")}
+        facts, tables = [fact for fact in self.facts if fact[1]], [one for one in self.tables if one.rows]
+        vars(self).update(texts, facts=facts, tables=tables)
 
 
 # terminal --------------------------------------------------------------------------------------------------
@@ -100,7 +110,7 @@ def print_sheet(sheet: Sheet) -> None:
         sentence(to, sheet.status, "bold")
     if sheet.facts:
         print_table(to, TextTable.of_texts(("", ""), sheet.facts), headings=False)
-    for table in (one for one in sheet.tables if one.rows):
+    for table in sheet.tables:
         to.print()
         print_table(to, table)
     if sheet.conclusions or sheet.notes:
@@ -160,7 +170,7 @@ def export(sheet: Sheet, folder: Path, command: str) -> None:
             else ()
         ),
         *(f"![{stem}]({stem}.svg)" for stem in sheet.figures if f"({stem}.svg)" not in behind),
-        *(part for one in sheet.tables if one.rows for part in table_parts(one)),
+        *(part for one in sheet.tables for part in table_parts(one)),
         *map(markdown, sheet.notes),
         f"Files: {links}." if links else "",
         *machine,
@@ -225,8 +235,8 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
     parts += [f"<p>{html.escape(text)}</p>" for text in (sheet.status, *sheet.conclusions) if text]
     tables = [
-        _html(block)
-        for table in (*facts, *sheet.tables) if table.rows
+        html_table(block)
+        for table in (*facts, *sheet.tables)
         for block in blocks_of(table, _pixels(table), width)
     ]  # fmt: skip
     pictures = [
@@ -249,18 +259,26 @@ def _pixels(table: TextTable) -> list[float]:
     return found
 
 
-def _html(table: TextTable) -> str:
-    """A table; numbers are set to the right, line breaks in headings kept."""
+def html_table(table: TextTable, look: str = "", typeset: Callable[[str], str] = html.escape) -> str:
+    """A table as HTML; its first cells name the rows.
 
-    def row(cells: Sequence[str], tag: str) -> str:
-        written = (
-            f'<{tag} style="text-align: {"right" if column.number else "left"}">'
-            f"{html.escape(text).replace(chr(10), '<br>')}</{tag}>"
-            for column, text in zip(table.columns, cells, strict=True)
-        )
-        return f"<tr>{''.join(written)}</tr>"
+    Cells have their alignment themselves, since a notebook knows no classes. `look`: the class of the table;
+    `typeset` makes HTML of a text.
+    """
+    columns = table.columns
 
-    headings = [column.heading for column in table.columns]
-    head = f"<thead>{row(headings, 'th')}</thead>" if any(headings) else ""
-    caption = f"<caption>{html.escape(table.title)}</caption>" if table.title else ""
-    return f"<table>{caption}{head}<tbody>{''.join(row(cells, 'td') for cells in table.rows)}</tbody></table>"
+    def row(cells: Iterable[str], tags: Iterable[str], strong: str = "") -> str:
+        html_cells = ""
+        for column, cell, tag in zip(columns, cells, tags, strict=True):
+            kind, side = ("number", "right") if column.number else ("text", "left")
+            text = typeset(printed(cell) if column.number else cell)
+            html_cells += f'<{tag} class="{kind}" style="text-align: {side}">{text}</{tag[:2]}>'
+        return f"<tr{strong}>{html_cells}</tr>"
+
+    headings = [column.in_a_line for column in columns]
+    head = f"<thead>{row(headings, [COLUMN_HEAD] * len(columns))}</thead>" if any(headings) else ""
+    caption = f"<caption>{typeset(table.title)}</caption>" if table.title else ""
+    tags, strong = [ROW_HEAD, *["td"] * (len(columns) - 1)], ' class="strong" style="font-weight: 700"'
+    rows = (row(cells, tags, strong if i in table.bold else "") for i, cells in enumerate(table.rows))
+    named = f' class="{look}"' if look else ""
+    return f"<table{named}>{caption}{head}<tbody>{''.join(rows)}</tbody></table>"

@@ -18,11 +18,10 @@ from softstart.start.recommendation import Recommendation, Row, checked_limits, 
 from softstart.start.run import SETTLING_PERIODS, Run, Stage
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import DataColumn, TextTable, column_of, label, number, short, with_unit
+from softstart.views.numbers import DataColumn, TextTable, label, number, short, with_unit
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 from softstart.views.traces import comparison_figure, draw_trade_off, run_figure, torques, trade_off_figure
 
-STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
 OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
 SHOWN = 24  # stages and events on a terminal
@@ -37,23 +36,26 @@ def machine_lines(machine: Machine, fitted_to: Machine | None = None) -> list[st
     """The machine in a few lines, what is doubted of it, and for which drive the controllers are set up."""
     return [
         *drive_lines(machine),
-        *(f"  doubt  {one}" for one in plausibility_warnings(machine)),
-        *([f"  {controllers_set_up(machine, fitted_to)}"] if fitted_to else []),
+        *(f"  doubt  {warning}" for warning in plausibility_warnings(machine)),
+        f"  {controllers_set_up(machine, fitted_to)}" if fitted_to else "",
     ]
 
 
 def figure_rows(run: Run) -> list[list[str]]:
-    """The figures of the start, as words and numbers; of an unknown position some are those of one start."""
+    """The figures of the start, as words and numbers; of an unknown position some are those of one start.
+
+    Those that the start does not have are empty.
+    """
     first, second = run.stage_durations
     of_one = f" from {run.position}" if run.positions else ""
-    names, clipped = run.drive.shaft_names, clipped_torque(run)
-    there = with_unit(run.peak_torque_at_output, "N m")
+    names, released = run.drive.shaft_names, not math.isnan(run.release_time)
+    there = with_unit(run.peak_torque_at_output, "N m") if run.drive.gear else ""
     where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)}{where}"],
         ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
         ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
-        *([["the same at the output", there]] if run.drive.gear else []),
+        ["the same at the output", there],
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
         ["shaft torque settled after", with_unit(run.settling_time(), "s")],
@@ -63,13 +65,9 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}{of_one}"],
         ["contacts", f"{run.contacts}{of_one}"],
         ["end of the run", f"{with_unit(run.end_time, 's')}{of_one}"],
-        *([["torque cut off", clipped]] if clipped else []),
-        *([["limits", "; ".join(map(str, margins))]] if (margins := margins_of(run)) else []),
-        *(
-            []
-            if math.isnan(run.release_time)
-            else [["brake released", f"{with_unit(run.release_time, 's')}{of_one}"]]
-        ),
+        ["torque cut off", clipped_torque(run)],
+        ["limits", "; ".join(map(str, margins_of(run)))],
+        ["brake released", f"{with_unit(run.release_time, 's')}{of_one}" if released else ""],
         *(
             [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
             for name, one in run.positions.items()
@@ -91,7 +89,7 @@ def position_notes(runs: Sequence[Run]) -> list[str]:
     return [Sentence(text, "" if runs[0].drive.position_given else advice)]
 
 
-def clipped_torque(run: Any) -> str:
+def clipped_torque(run: Run) -> str:
     """How far and how long the demand lay beyond the torque limits, "" if that need not be said.
 
     It is said of every controller that does not declare that it relies on the limits (`saturates`), and of
@@ -101,7 +99,8 @@ def clipped_torque(run: Any) -> str:
     motor = run.drive.motor
     low, high = float(motor.minimum_torque), float(motor.maximum_torque)
     infinite = math.isinf(excess)
-    if not infinite and (run.controller.saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
+    saturates = run.controller is not None and run.controller.saturates
+    if not infinite and (saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
         return ""
     over = "infinite" if infinite else f"up to {short(excess)} N m"
     return f"the demand is {over} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
@@ -118,9 +117,19 @@ def _gap_in(stage: Stage) -> str:
     return SIDES[stage.side] if stage.side or stage.number % 2 else "closed"
 
 
-def stage_rows(run: Run) -> list[list[Any]]:
-    """The stages, full numbers."""
-    return [[s.number, _gap_in(s), s.start, s.duration, s.peak_torque, s.peak_time] for s in run.stages]
+STAGES = (
+    DataColumn("stage", lambda stage: stage.number, 0),
+    DataColumn("gap", _gap_in),
+    DataColumn("start s", lambda stage: stage.start, digits=5),
+    DataColumn("duration s", lambda stage: stage.duration),
+    DataColumn("peak torque N m", lambda stage: stage.peak_torque, digits=5),
+    DataColumn("at s", lambda stage: stage.peak_time, digits=5),
+)
+EVENTS = (  # of `event_rows`
+    DataColumn("time s", lambda row: row[0], digits=6),
+    DataColumn("event", lambda row: row[1]),
+    DataColumn("at", lambda row: row[2]),
+)
 
 
 def event_rows(run: Run) -> list[list[Any]]:
@@ -134,17 +143,11 @@ def event_rows(run: Run) -> list[list[Any]]:
 
 def _start_tables(run: Run) -> list[TextTable]:
     """The shafts of a chain, the stages, and the events: time, what happened, and where."""
-    several, rows = len(run.drive.shaft_names) > 1, event_rows(run)
-    stages: dict[str, Any] = dict(zip(STAGE_COLUMNS, zip(*stage_rows(run), strict=True), strict=False))
-    for name in stages.keys() - {"stage", "gap"}:
-        stages[name] = column_of(stages[name], 4 if name == "duration s" else 5)
-    stages |= {"stage": list(map(str, stages.get("stage", ())))} if stages else {}
-    events = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
-    events |= {"at": [row[2] for row in rows]} if several else {}
+    events = EVENTS if len(run.drive.shaft_names) > 1 else EVENTS[:-1]
     return [
         *([] if isinstance(run.drive, Drive) else [shaft_table(run)]),
-        TextTable.of("Stages", stages, ("gap",), most=SHOWN),
-        TextTable.of("Events", events, ("event", "at"), most=SHOWN),
+        TextTable.of_data("Stages", STAGES, run.stages, most=SHOWN),
+        TextTable.of_data("Events", events, event_rows(run), most=SHOWN),
     ]
 
 
@@ -183,7 +186,10 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         panel=lambda ax: torques(ax, run),
         files={
             f"trace-{stem}.csv": run.to_csv,
-            "stages.csv": rows_file(STAGE_COLUMNS, stage_rows(run)),
+            "stages.csv": rows_file(
+                [column.heading for column in STAGES],
+                [[column.of(stage) for column in STAGES] for stage in run.stages],
+            ),
             "events.csv": rows_file(EVENT_COLUMNS, event_rows(run)),
             "figures.csv": records_file([summary]),
         },

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.drive import PARAMETERS
 from softstart.start.status import Status
@@ -21,6 +22,7 @@ from softstart.views.starts import machine_lines
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from softstart.drive.machine import Machine
     from softstart.sweeping.entry import SweepProgress
@@ -32,7 +34,7 @@ MOST_SHOWN = 40  # starts in the table on the screen, in report.md and in JSON
 MOST_WRITTEN = 100_000  # starts in the file
 FILE, STATUS = "cells.csv", "status"
 
-Part = tuple[str, Any]  # title, and the values along the axes drawn
+Part = tuple[str, NDArray[np.float64]]  # title, and the values along the axes drawn
 
 
 def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Figure | None:
@@ -42,8 +44,11 @@ def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Figure | None:
     the largest value over them, of a margin the least. One axis of numbers makes curves.
     """
     across = _drawn(results, name)
-    if not across:
-        return None
+    return _figure(results, name, across) if across else None
+
+
+def _figure(results: xarray.Dataset, name: str, across: list[str]) -> Figure:
+    """The figure over these axes."""
     rest = [str(dim) for dim in results[name].dims if results.sizes[dim] > 1 and dim not in across]
     drawn, most = (_curves, MOST_LINES) if len(across) == 1 else (_maps, MOST_PANELS)
     if math.prod(results.sizes[dim] for dim in rest) <= most:
@@ -72,7 +77,7 @@ def _each(results: xarray.Dataset, name: str, across: list[str], rest: list[str]
     return parts
 
 
-def _worst(results: xarray.Dataset, name: str, across: list[str]) -> Any:
+def _worst(results: xarray.Dataset, name: str, across: list[str]) -> NDArray[np.float64]:
     """The largest value over all axes that are not drawn, of a margin the least, read piece by piece."""
     worse = np.fmin if name == "margin" else np.fmax
     field = results[name]
@@ -85,7 +90,7 @@ def _worst(results: xarray.Dataset, name: str, across: list[str]) -> Any:
     return found
 
 
-def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Any:
+def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Figure:
     orders = [np.argsort(results[dim].values) for dim in across]
     y, x = (results[dim].values[order] for dim, order in zip(across, orders, strict=True))
     high, wide = (_axis(results, dim) for dim in across)
@@ -104,10 +109,10 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
     return figure
 
 
-def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Any:
+def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Figure:
     order = np.argsort(results[across[0]].values)
     x = results[across[0]].values[order]
-    marker: Any = {"marker": "o", "ms": 3.5} if len(x) < 30 else {}
+    marker: dict[str, str | float] = {"marker": "o", "ms": 3.5} if len(x) < 30 else {}
     with draw.drawing():
         figure, axes = draw.new_figure(1, 1, (8.0, 4.8))
         for index, (title, values) in enumerate(parts):
@@ -133,11 +138,11 @@ def _axis(results: xarray.Dataset, name: str) -> str:
     return label(f"{name} {symbol}" if symbol not in ("", name) else name, _unit(results, name))
 
 
-def _text(value: Any, digits: int = 4) -> str:
+def _text(value: str | float, digits: int = 4) -> str:
     return value if isinstance(value, str) else f"{value:.{digits}g}"
 
 
-def cells(results: xarray.Dataset) -> Any:
+def cells(results: xarray.Dataset) -> DataFrame:
     """Each start as a row of a pandas.DataFrame: its place on the axes, its figures, the name of its status.
 
     >>> from softstart import sweep
@@ -252,7 +257,7 @@ def sweep_sheet(
         files[FILE] = partial(_write_cells, results)
     return Sheet(
         f"{drive.name}: {plural(summary.starts, 'start')}",
-        [*machine_lines(drive), *([f"  {controllers_set_up(None, fitted_to)}"] if fitted_to else [])],
+        [*machine_lines(drive), f"  {controllers_set_up(None, fitted_to)}" if fitted_to else ""],
         tables=_tables(results, summary),
         conclusions=[sweep_conclusion(results, summary)],
         notes=[
@@ -261,9 +266,10 @@ def sweep_sheet(
             if name != Status.REACHED.name
         ],
         figures={
-            file: partial(sweep_figure, results, name)
+            file: partial(_figure, results, name, across)
             for file, name in drawn.items()
-            if name in summary.spreads and summary.spreads[name]["count"] and _drawn(results, name)
+            if name in summary.spreads and summary.spreads[name]["count"]
+            if (across := _drawn(results, name))
         },
         files=files,
         machine=drive,

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softstart.views.numbers import Column, TextTable, json_ready, printable
 
@@ -33,7 +33,7 @@ def console() -> Console:
     return made
 
 
-def print_json(data: Any) -> None:
+def print_json(data: object) -> None:
     """One JSON object on standard output."""
     print(json.dumps(json_ready(data), indent=2, allow_nan=False))
 

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softstart.drive.data_sheet_words import BAND
 from softstart.errors import Sentence
@@ -29,7 +30,7 @@ from softstart.views.starts import machine_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from xarray import Dataset
+    from xarray import DataArray, Dataset
 
     from softstart.tuning.outcome import RobustSet, Tuning
 
@@ -59,7 +60,7 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
     return _maps(tuning, table, maps | {"start_time": f"start time, {gains}, s"}, gains, alike=2)
 
 
-def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alike: int = 0) -> Any:
+def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alike: int = 0) -> Figure:
     """Maps side by side; the first `alike` share one scale of colours."""
     q = tuning.problem
     gaps, inertias = ([f"{value:.3g}" for value in axis] for axis in (q.gaps, q.load_inertias))
@@ -134,19 +135,18 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
 def _robust_table(tuning: Tuning, robust: RobustSet) -> TextTable:
     """The robust set beside the defaults."""
     units = {one.name: one.unit for one in tuning.problem.ranges}
+
+    def there(name: str) -> str:
+        return at_output(tuning.drive, robust.gains[name], units[name])
+
     columns = [
         DataColumn("parameter", str),
-        DataColumn("default", lambda name: short(robust.defaults[name])),
-        DataColumn("robust", lambda name: short(robust.gains[name])),
+        DataColumn("default", lambda name: robust.defaults[name], text=short),
+        DataColumn("robust", lambda name: robust.gains[name], text=short),
         DataColumn("unit", lambda name: label("", units[name], "")),
-        DataColumn(
-            "robust, at\nthe output", lambda name: at_output(tuning.drive, robust.gains[name], units[name])
-        ),
+        DataColumn("robust, at\nthe output", there, text=str, optional=True),
     ]
-    names = list(robust.gains)
-    shown = columns if any(columns[-1].cells(names)) else columns[:-1]
-    texts = ("parameter", "unit")
-    return TextTable.of("One set for all", {one.heading: one.cells(names) for one in shown}, texts)
+    return TextTable.of_data("One set for all", columns, list(robust.gains))
 
 
 def _tables(tuning: Tuning) -> Iterator[TextTable]:
@@ -161,7 +161,7 @@ def _tables(tuning: Tuning) -> Iterator[TextTable]:
         yield _grid(tuning, title, tuning.price["robust_over_schedule"])
 
 
-def _grid(tuning: Tuning, title: str, values: Any) -> TextTable:
+def _grid(tuning: Tuning, title: str, values: DataArray) -> TextTable:
     """A figure over the grid, one row per gap."""
     q = tuning.problem
     cells = [short(gap) for gap in q.gaps], *(column_of(column) for column in values.to_numpy().T.tolist())
@@ -169,7 +169,7 @@ def _grid(tuning: Tuning, title: str, values: Any) -> TextTable:
     return TextTable(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
 
 
-def _between(values: Any) -> str:
+def _between(values: ArrayLike) -> str:
     """Least to largest value."""
     numbers = np.asarray(values, dtype=np.float64)
     finite = numbers[np.isfinite(numbers)]

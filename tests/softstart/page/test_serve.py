@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from softstart import InputError
-from softstart.page.serve import Address, listening
+from softstart.page.address import Address
+from softstart.page.serve import listening
 
 pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
 guards = importlib.import_module("softstart.page.guard")

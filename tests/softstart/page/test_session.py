@@ -91,6 +91,31 @@ def test_a_drive_without_stiffness_is_shown_at_both_ends_as_compare_does():
     assert session.inputs.both_ends is session.inputs.machine  # of which nothing is unknown
 
 
+def test_an_assumption_is_shown_until_its_value_is_set():
+    """The stiffness that is typed is known; an undo, or a slider back at its place, brings the text back."""
+    session = Session(DataSheet.from_settings(TROLLEY).possible, controllers=["direct"])
+
+    def shown():
+        frames = (frame for frame in FrameBuilder(session).idle_frames() if frame)
+        return next(frame["assumed"] for frame in frames if "assumed" in frame)
+
+    as_loaded, stiffness = shown(), session.inputs.machine.stiffness
+    assert [text for text in as_loaded if text.startswith("elastic frequency 30 Hz")]
+    session.set("stiffness", "40 N*m/rad")
+    assert shown() == [text for text in as_loaded if not text.startswith("elastic frequency")]
+    assert "elastic frequency" not in session.inputs.machine.to_toml()
+    session.set("stiffness", stiffness)
+    assert shown() == as_loaded
+    session.set("shaft.damping", 0.0)
+    assert shown() == [text for text in as_loaded if not text.startswith("damping ratio")]
+    session.undo()
+    assert shown() == as_loaded
+    session.set("load.inertia", "0.1 kg*m^2")
+    assert shown() == as_loaded
+    session.set("load.torque", "2 N*m")  # all that the resistance was for
+    assert shown() == [text for text in as_loaded if not text.startswith("resistance")]
+
+
 def test_a_link_with_an_impossible_soft_end_is_refused():
     content = unpacked(
         link_of(Session(DataSheet.from_settings(TROLLEY).possible, controllers=["direct"]).inputs)

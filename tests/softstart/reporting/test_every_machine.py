@@ -83,7 +83,7 @@ def test_a_load_curve_is_reported(case: int, tmp_path: Path) -> None:
     """The report of a fan is written, says that the load torque follows a curve, and plots the start."""
     fan: Any = dict(variants(FAN))[str(TOGETHER["chain"][case])]
     assert isinstance(fan, Chain)
-    report(fan, controllers=["direct"], budget=0.0).write(tmp_path / "r.html")
+    report(fan, controllers=["direct"], budget=0.0).save(tmp_path / "r.html")
     page = Page((tmp_path / "r.html").read_text("utf-8"))
     assert f"load curve of fan over its {'angle' if case else 'speed'}, 3 points" in page.text
     assert "its torque and inertia are constant during the start" not in page.text
