@@ -1,21 +1,38 @@
-"""A torque over time: the form of an optimum, and what the `profile` controller follows."""
+"""A torque over time: the form of an optimum, what the `profile` controller follows, and its files.
+
+CSV and TOML are read back to the last bit; C code is for a target.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softstart import profile_files
 from softstart.arrays import Vector
 from softstart.errors import InputError
+from softstart.input.columns import Wanted, read_columns
+from softstart.input.documents import literal, parsed
+from softstart.input.files import read_text, write_whole
+from softstart.input.parameters import Wording
+from softstart.quantities import RefusedError, show, to_si
 from softstart.results import OneLine
 
 MOST_SAMPLES = 1_000_000
+HEADER = "time [s],torque [N*m]"
+TIME = Wanted(("time", "t"), "s")
+TORQUE = Wanted(("torque", "u", "demand"), "N*m")
+TABLES = ("controller", "profile", "after_contact", "about")
+KEYS = ("time", "torque", "time_unit", "torque_unit")
+PER_LINE = 4
+
+Knots = tuple[str, Vector, Vector]  # where they are in a file, for errors; times in s, torques in N m
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -230,18 +247,59 @@ class TorqueProfile(OneLine):
         return float(self.torque[i] + share * (self.torque[i + 1] - self.torque[i]))
 
     def to_csv(self, path: str | Path) -> None:
-        """Write time and torque as CSV, to the last bit; refused for a profile with `after_contact`."""
-        profile_files.write_csv(self, Path(path))
+        """Write time and torque as CSV, 17 digits: read back, each number has the same bits.
+
+        InputError for a profile with `after_contact`.
+        """
+        if self.after_contact is not None:
+            raise InputError(
+                f"output = {path}: a CSV file has no place for what is played after the contact; "
+                "write this profile as TOML."
+            )
+
+        def write(stream: IO[str]) -> None:
+            table = np.column_stack([self.time, self.torque])
+            np.savetxt(stream, table, delimiter=",", header=HEADER, comments="", fmt="%.17g")
+
+        write_whole(Path(path), write)
 
     def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
         """Write TOML that the `profile` controller follows; `about` says where the profile comes from."""
-        profile_files.write_toml(self, Path(path), about or {})
+        parts = [
+            "# A torque profile: softstart simulate DRIVE --controller profile --param file=THIS_FILE",
+            '[controller]\nname = "profile"',
+            _table("profile", self),
+        ]
+        if self.after_contact is not None:
+            parts.append(_table("after_contact", self.after_contact))
+        if about:
+            lines = [f"{_text_literal(key)} = {_text_literal(value)}" for key, value in about.items()]
+            parts.append("\n".join(["[about]", *lines]))
+        write_whole(Path(path), lambda stream: stream.write("\n\n".join(parts) + "\n"))
 
     def to_c(
         self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
     ) -> None:
-        """Write C code with the function `double torque_profile(double time)`; `about` as in `to_toml`."""
-        profile_files.write_c(self, Path(path), name, about)
+        """Write C code for a target: `double name(double time)`, N m over s, tables and a bisection.
+
+        At a step it gives the value after it, behind the last knot the last torque, as `at` does. A profile
+        with `after_contact` has a second function `name_after_contact`, on a clock that starts there. `about`
+        goes into the comment on top. Raises InputError for a name that C does not take.
+        """
+        if not re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name):
+            raise InputError(f'name = "{name}": a C function is named with letters, digits and single _.')
+        after = self.after_contact
+        functions = {name: self} | ({} if after is None else {f"{name}_after_contact": after})
+        notes = [" ".join(f"{key}: {value}".split()) for key, value in (about or {}).items()]
+        notes += [
+            f"double {f}(double time);  {p.time.size} knots to {p.end:g} s" for f, p in functions.items()
+        ]
+        # */ would end the comment
+        text = C_HEADER % "".join(f"   {note.replace('*/', '* /')}\n" for note in notes)
+        for function, p in functions.items():
+            time, torque = (_rows(map(repr, values.tolist()), "{", "}") for values in (p.time, p.torque))
+            text += C_FUNCTION % {"name": function, "n": p.time.size, "time": time, "torque": torque}
+        write_whole(Path(path), lambda stream: stream.write(text))
 
     @classmethod
     def load(cls, path: str | Path) -> TorqueProfile:
@@ -257,13 +315,24 @@ class TorqueProfile(OneLine):
         InputError
             In one sentence that names the file, the place and the value.
         """
-        profile = None
-        for where, time, torque in reversed(profile_files.read_knots(Path(path))):
+        where, suffix, profile = f"profile = {path}", Path(path).suffix.lower(), None
+        if suffix not in (".toml", ".csv", ".txt", ".dat"):
+            raise InputError(f"{where}: its kind is unknown; give a file whose name ends in .csv or .toml.")
+        try:
+            text = read_text(Path(path))
+        except RefusedError as refusal:
+            raise InputError(f"{where}: {refusal.reason}.") from None
+        if suffix == ".toml":
+            parts = _from_toml(text, where)
+        else:
+            time, torque = read_columns(text, where, (TIME, TORQUE)).values
+            parts = [(where, time, torque)]
+        for place, time, torque in reversed(parts):  # what follows the contact is a part of the first one
             try:
                 profile = cls(time, torque, profile)
             except InputError as error:
                 reasons = [sentence.removeprefix("profile: ") for sentence in error.sentences]
-                raise InputError([f"{where}: {reason}" for reason in reasons]) from None
+                raise InputError([f"{place}: {reason}" for reason in reasons]) from None
         assert profile is not None  # a file without knots was refused
         return profile
 
@@ -286,3 +355,82 @@ def _vector(name: str, values: object) -> Vector:
         raise InputError(f"profile: its {name} holds a value that is not finite; give finite numbers.")
     vector.setflags(write=False)
     return vector
+
+
+# files ---------------------------------------------------------------------------------------------------
+
+
+def _table(name: str, profile: TorqueProfile) -> str:
+    columns = {"time": profile.time, "torque": profile.torque}
+    lines = (f"{key} = {_rows(map(literal, values.tolist()))}" for key, values in columns.items())
+    return "\n".join([f"[{name}]", *lines])
+
+
+def _rows(numbers: Iterable[str], begin: str = "[", end: str = "]") -> str:
+    """The numbers of a list, a few a line."""
+    texts = list(numbers)
+    rows = (", ".join(texts[i : i + PER_LINE]) for i in range(0, len(texts), PER_LINE))
+    return f"{begin}\n" + "".join(f"    {row},\n" for row in rows) + end
+
+
+def _text_literal(value: object) -> str:
+    return literal(str(value).encode("utf-8", "replace").decode("utf-8"))
+
+
+def _from_toml(text: str, where: str) -> list[Knots]:
+    """From the tables [profile] and, if there, [after_contact]: lists `time` in s and `torque` in N m.
+
+    `time_unit` and `torque_unit` name other units.
+    """
+    document = parsed(text, Wording(where, style="toml"), "a profile")
+    if unknown := [key for key in document if key not in TABLES]:
+        tables = ", ".join(f"[{name}]" for name in TABLES)
+        raise InputError(f"{where}: a profile has no {show(unknown[0])}; its tables are {tables}.")
+    controller = document.get("controller", {})
+    name = controller.get("name", "profile") if isinstance(controller, dict) else controller
+    if name != "profile":
+        raise InputError(
+            f'{where}: it is for the controller {show(name)}; a torque profile has name = "profile".'
+        )
+    if "profile" not in document:
+        raise InputError(f"{where}: it has no table [profile]; write one with the lists time and torque.")
+    parts = [part for part in ("profile", "after_contact") if part in document]
+    return [_knots(f"{where}: [{part}]", document[part]) for part in parts]
+
+
+def _knots(where: str, table: object) -> Knots:
+    if not isinstance(table, dict):
+        raise InputError(f"{where} = {show(table)}: write a table with the lists time and torque.")
+    if unknown := [key for key in table if key not in KEYS]:
+        raise InputError(f"{where} has no key {show(unknown[0])}; it has {', '.join(KEYS)}.")
+    columns = []
+    for key, si in (("time", "s"), ("torque", "N*m")):
+        values, unit = table.get(key), table.get(f"{key}_unit", si)
+        if not isinstance(values, list):
+            shown = f"{key} = {show(values)}" if key in table else f"{key} is missing"
+            raise InputError(f"{where} {shown}: write a list of numbers, {key} = [0.0, 0.1].")
+        size = to_si([f"1 {unit}"], si, name=f"{where} {key}_unit")
+        columns.append(np.atleast_1d(to_si(values, si, name=f"{where} {key}")) * size)
+    return where, columns[0], columns[1]
+
+
+C_HEADER = """/* Torque demand in N m over time in s, straight lines between knots. Generated by softstart.
+
+%s
+   At a step the value is the one after it; behind the last knot the last torque is held.
+   The clock begins with the start, that of ..._after_contact where the gap first closes. */
+"""
+C_FUNCTION = """
+double %(name)s(double time) {
+  static const double t[%(n)d] = %(time)s;
+  static const double u[%(n)d] = %(torque)s;
+  int low = 0, high = %(n)d - 1;
+  if (time >= t[high]) return u[high];
+  if (time <= t[0]) time = t[0];
+  while (high - low > 1) {  /* t[low] <= time < t[high] */
+    int middle = low + (high - low) / 2;
+    if (t[middle] <= time) low = middle; else high = middle;
+  }
+  return u[low] + (time - t[low]) / (t[high] - t[low]) * (u[high] - u[low]);
+}
+"""

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from softstart.views.numbers import TextTable
-    from softstart.views.sheet import Sheet
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -86,11 +85,10 @@ class Result(OneLine, ABC):
             cls._view = f"softstart.views.{module}", name
 
     @property
-    def sheet(self) -> Sheet:
+    def sheet(self) -> Any:
         """All that is shown of it: a `softstart.views.sheet.Sheet`."""
         module, name = self._view
-        sheet: Sheet = getattr(import_module(module), name)(self)
-        return sheet
+        return getattr(import_module(module), name)(self)
 
     @abstractmethod
     def summary(self) -> dict[str, Any]:

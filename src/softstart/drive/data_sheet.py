@@ -46,9 +46,8 @@ def still_assumed(drive: Drive, settled: Iterable[str]) -> str:
     'damping ratio 0.02'
     """
     settled = {*settled, *([] if drive.load_friction else ["load_friction"])}
-    assumptions = drive.assumed.split("; ")
     return "; ".join(
-        text for text in assumptions
+        text for text in drive.assumed.split("; ")
         if not any(text.startswith(begin) and names <= settled for begin, names in SETTLED_BY.items())
     )  # fmt: skip
 

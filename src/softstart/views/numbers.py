@@ -106,8 +106,7 @@ class TextTable(NamedTuple):
         [['1', '1.00'], ['2.5', '2.50']]
         """
         columns = [column for column in columns if column.is_shown(rows)]
-        plain = [column for column in columns if column.text is None]
-        texts = [c.heading for c in plain if any(isinstance(c.of(row), str) for row in rows)]
+        texts = [c.heading for c in columns if not c.text and any(isinstance(c.of(r), str) for r in rows)]
         return cls.of(title, {c.heading: c.cells(rows) for c in columns}, texts, **options)
 
     @classmethod
