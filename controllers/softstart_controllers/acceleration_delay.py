@@ -174,7 +174,7 @@ class AccelerationDelay(CompiledController):
         return {"half": half, "stride": stride, "threshold": threshold, "wait": wait}
 
 
-def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int, float]:
+def window(drive: Drive, torque: float, drop: float, period: float) -> tuple[int, int, float]:
     """Kept samples in half a window, stride between them in periods, threshold of the difference in rad.
 
     >>> crane = Drive.load("crane-4amtkf")
@@ -190,7 +190,7 @@ def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int,
     return half, stride, a * (half * stride * period) ** 2
 
 
-def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> float:
+def detection_latency(drive: Drive, torque: float, drop: float, period: float) -> float:
     """Time in s from contact until the window is at its threshold, at most the length of stage 2.
 
     The angle lost to the shaft is l(s) = int int T/J1 with T of [G](11), so with x = Omega s

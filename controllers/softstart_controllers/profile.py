@@ -161,9 +161,9 @@ class Profile(CompiledController):
         return TorqueProfile.load(str(self.file))
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, object]:
         """The file's name, or how many knots the profile has and when it ends in s; the period in s."""
-        about: dict[str, Any] = {"file": self.file}
+        about: dict[str, object] = {"file": self.file}
         if self.file is None:
             about = {"profile": {"knots": int(self.played.time.size), "end": self.played.end}}
         return {**about, "period": self.period}

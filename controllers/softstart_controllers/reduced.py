@@ -93,7 +93,7 @@ def raise_parameter() -> Any:
     return parameter("", meaning, "peak", choices=INSTANTS)
 
 
-def delay_of(drive: Drive, torque: Any, raise_at: str) -> float:
+def delay_of(drive: Drive, torque: float, raise_at: str) -> float:
     """Time in s from contact until the torque is raised.
 
     >>> [round(delay_of(Drive.load("crane-4amtkf"), 15.5, one), 4) for one in INSTANTS]
@@ -102,7 +102,7 @@ def delay_of(drive: Drive, torque: Any, raise_at: str) -> float:
     return (0.5 if raise_at == "peak" else 1.0) * stage_2_duration(drive, torque)
 
 
-def closing_speed(drive: Drive, torque: Any) -> float:
+def closing_speed(drive: Drive, torque: float) -> float:
     """Speed in rad/s at which the driving flanks first meet, [G](10), from any start position and speeds.
 
     >>> round(closing_speed(Drive.load("crane-4amtkf"), 62), 3)
@@ -125,7 +125,7 @@ def load_drift(drive: Drive) -> float:
     return pull / drive.J2
 
 
-def stage_2_duration(drive: Drive, torque: Any) -> float:
+def stage_2_duration(drive: Drive, torque: float) -> float:
     """Length of stage 2 in s under the reduced torque: [G](15), for a load that friction holds the exact one.
 
     Where friction then keeps the gap closed for good, [G](15) is taken all the same.
@@ -142,11 +142,11 @@ def stage_2_duration(drive: Drive, torque: Any) -> float:
     return swing_duration(drive, torque, dw12)
 
 
-def swing_duration(drive: Drive, torque: Any, dw12: float) -> float:
+def swing_duration(drive: Drive, torque: float, dw12: float) -> float:
     """Length of stage 2 in s for flanks that meet at dw12 in rad/s, active load: [G](15)."""
     return 2.0 * math.atan2(drive.c * dw12 / drive.Omega, -mean_under(drive, torque)) / drive.Omega
 
 
-def mean_under(drive: Drive, torque: Any) -> float:
+def mean_under(drive: Drive, torque: float) -> float:
     """M12avg in N m, the mean shaft torque under a motor torque, [G](12)."""
     return float(formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))

@@ -20,13 +20,13 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from functools import partial, wraps
 from importlib import import_module
 from itertools import islice
 from queue import Empty, SimpleQueue
-from typing import Any, Literal, NamedTuple, ParamSpec, Self, TypeVar, cast
+from typing import IO, Any, Literal, NamedTuple, ParamSpec, Self, TypeVar, cast
 
 from softstart import __version__
 from softstart.errors import InputError, SimulationError
@@ -100,7 +100,7 @@ class Progress:
         """Report the share that is done, 0 to 1 (None: unknown), and what is being done."""
         self._send(Message("progress", (share, message)))
 
-    def part(self, value: Any) -> None:
+    def part(self, value: object) -> None:
         """Report a part of the result."""
         self._send(Message("part", value))
 
@@ -145,7 +145,7 @@ class Worker:
         """Whether the process has not ended."""
         return self._process.poll() is None
 
-    def submit(self, function: Callable[..., Any], *args: Any, reports: bool = False) -> None:
+    def submit(self, function: Callable[..., object], *args: object, reports: bool = False) -> None:
         """Start `function(*args)`, importable; with `reports` it is given a `progress`."""
         task = pickle.dumps((function, args, reports))
         assert self._process.stdin is not None
@@ -168,7 +168,7 @@ class Worker:
             raise DiedError(f"signal {-code}" if code < 0 else f"exit code {code}")
         return cast("Message", pickle.loads(message))
 
-    def run(self, function: Callable[..., R], *args: Any) -> R:
+    def run(self, function: Callable[..., R], *args: object) -> R:
         """The result of `function(*args)`. Raises what it raised, and DiedError if the process died."""
         self.submit(function, *args)
         while (message := self.receive()) is None or message.kind in ("progress", "part"):
@@ -191,7 +191,7 @@ class Worker:
                 AT_STOP.remove(self.kill)
 
 
-def _collect(stream: Any, queue: SimpleQueue[bytes | None]) -> None:
+def _collect(stream: IO[bytes], queue: SimpleQueue[bytes | None]) -> None:
     """Put what is read from a pipe into a queue, and None at its end."""
     with stream, suppress(OSError, ValueError, EOFError, pickle.UnpicklingError):
         while True:
@@ -213,7 +213,7 @@ def _serve(modules: Sequence[str], niceness: int) -> None:
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)  # what a controller or a solver prints must not get between the messages
-    tasks: SimpleQueue[Any] = SimpleQueue()
+    tasks: SimpleQueue[bytes | None] = SimpleQueue()
     lock = threading.Lock()
 
     def listen() -> None:
@@ -232,7 +232,7 @@ def _serve(modules: Sequence[str], niceness: int) -> None:
         import_module(module)
     while True:
         try:
-            function, args, reports = pickle.loads(tasks.get())
+            function, args, reports = pickle.loads(tasks.get() or b"")
             result = function(*args, progress=Progress(send)) if reports else function(*args)
             send(Message("result", result))
         except Exception as error:  # of any kind: it belongs to whoever asked
@@ -261,7 +261,7 @@ def checked_workers(workers: object, scheduler: str | None = None) -> int:
 class _ImportableOnly(pickle.Unpickler):
     """Loads only what another process can load too."""
 
-    def find_class(self, module: str, name: str) -> Any:
+    def find_class(self, module: str, name: str) -> object:
         if module == "__main__" or module.startswith(LOADED_FROM_FILE):
             raise ImportError(f"{name} is defined in a script")
         return super().find_class(module, name)
@@ -333,7 +333,7 @@ class Pool:
         self.stopping = threading.Event()
         self._workers: list[Worker] = []
         self._own = threading.local()
-        self._executor: Any = None  # of threads, each of which may have a Worker, or of dask
+        self._executor: Executor | None = None  # of threads, each of which may have a Worker, or of dask
         self._client: Any = None
 
     def __enter__(self) -> Self:

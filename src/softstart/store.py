@@ -75,7 +75,7 @@ class Target(NamedTuple):
         reason = getattr(error, "strerror", None) or error
         return self.error(f"cannot be written ({reason}); {self.other}.")
 
-    def check_same(self, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    def check_same(self, before: Mapping[str, object], now: Mapping[str, object]) -> None:
         """Raise InputError that names the inputs which differ from those that the target was begun with."""
         other = [name for name in {**before, **now} if before.get(name) != now.get(name)]
         if other:
@@ -130,7 +130,7 @@ class PartStore:
     ({'cell': 3, 'restart': 0, 'cost': 1.1}, None)
     """
 
-    def __init__(self, target: Target | None, inputs: Mapping[str, Any], keys: list[str]) -> None:
+    def __init__(self, target: Target | None, inputs: Mapping[str, object], keys: list[str]) -> None:
         self.target, self.keys = target, keys
         self._inputs = json.dumps(inputs, sort_keys=True)
         self._parts: dict[str, PartRecord] = {}
@@ -162,7 +162,7 @@ class PartStore:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
-    def find(self, *part: Any) -> PartRecord | None:
+    def find(self, *part: object) -> PartRecord | None:
         """The record of a part, or None if it is not finished."""
         return self._parts.get(json.dumps(part))
 

@@ -92,7 +92,7 @@ class Vibration(Result, view="chains.vibration_sheet"):
         """The lowest elastic shapes with their nodes."""
         return super().plot(ax=ax) if ax is not None else self.figures["shapes"](modes)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """The frequencies, shapes, torques and nodes as plain data."""
         masses = [mass.name for mass in self.chain.masses]
         modes = [
@@ -363,7 +363,7 @@ class Reduction(Result, view="chains.reduction_sheet"):
             initial_load_speed=speed,
         )
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """The figures of both, the ratio and the notes as plain data."""
         whole, reduced = self.whole.Omega, self.reduced.Omega
         return {

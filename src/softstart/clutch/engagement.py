@@ -233,8 +233,7 @@ def engage(clutch: Clutch | str | os.PathLike[str], *, until: float | str | None
     ('LOCKED', 4.1527, 1.2123, True)
     """
     clutch = object_of(clutch, Clutch, Clutch.load, "clutch: give one Clutch")
-    advice = "; leave it out to run to the lock-up"
-    end = None if until is None else time_above_0(until, "until", advice)
+    end = None if until is None else time_above_0(until, "until", "; leave it out to run to the lock-up")
     law = clutch.friction
     events: list[EngagementEvent] = []
     steps, mode, lost = _steps(clutch, law, end, events)

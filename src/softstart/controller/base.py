@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum, IntFlag
 from itertools import repeat
 from numbers import Real
+from types import UnionType
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba.core.errors import NumbaError
+from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.controller.parameters import ParameterValues, declared_parameters
@@ -132,7 +134,7 @@ class Command(NamedTuple):
 WholeReply = tuple[float, float, tuple[float, ...], float]  # the fields of a Command, none left out
 
 # what a class says of itself: its type, and how it is written
-DECLARED: dict[str, tuple[Any, str]] = {
+DECLARED: dict[str, tuple[type | UnionType, str]] = {
     **dict.fromkeys(("name", "summary", "source"), (str, "a text in quotes")),
     "sensors": (Sensor, "Sensor.STAGE, Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |"),
     "effort": (Effort | None, "one of Effort, as Effort.RAMPS"),
@@ -218,7 +220,7 @@ class Controller:
         drive = drive.design_drive
         return self.fitted(drive), drive
 
-    def _arrays(self) -> dict[str, Any]:
+    def _arrays(self) -> dict[str, NDArray[np.float64]]:
         """The parameters that are arrays: one value for each of many starts."""
         return {
             name: value
@@ -226,7 +228,7 @@ class Controller:
             if isinstance(value := getattr(self, name), np.ndarray) and declaration.kind == "quantity"
         }
 
-    def set_ups(self, drives: Any) -> Iterator[SetUp]:
+    def set_ups(self, drives: Machine | MachineTable | Sequence[Machine]) -> Iterator[SetUp]:
         """`set_up` for each machine of records or a list, last index fastest, or for a single one.
 
         The only place where a controller meets arrays: its parameters may be some, as many as machines, or of
@@ -370,7 +372,7 @@ class CompiledController(Controller):
 
     kernel: ClassVar[Any]
     state_size: ClassVar[int] = 0
-    record: ClassVar[Any] = np.dtype([])
+    record: ClassVar[np.dtype[np.void]] = np.dtype([])
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -408,7 +410,7 @@ class CompiledController(Controller):
         """What the kernel needs beside parameters and drive, by name; called on a fitted controller."""
         return {}
 
-    def _in_order(self, record: Any, numbers: Mapping[str, Any], drive: Drive) -> Iterator[float]:
+    def _in_order(self, record: np.dtype[np.void], numbers: Numbers, drive: Drive) -> Iterator[float]:
         for name in record.names or ():
             source = next((source for source in (self, drive) if hasattr(source, name)), None)
             if source is None and name not in numbers:
@@ -417,7 +419,7 @@ class CompiledController(Controller):
                     "of the drive; declare it with `parameter`, or return it from `numbers`."
                 )
             value = numbers[name] if name in numbers else getattr(source, name)
-            if isinstance(value, Mapping):  # a record within the record
+            if isinstance(value, dict):  # a record within the record
                 yield from self._in_order(record[name], value, drive)
             else:
                 yield value

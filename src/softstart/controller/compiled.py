@@ -31,7 +31,7 @@ def keep_state(state: Vector, command: Vector) -> None:
 INTERFACE = (Path(__file__), *(Path(str(one.__file__)) for one in (jit, motor, records)))
 
 
-def _called(function: Any, seen: set[int]) -> set[Path]:
+def _called(function: Callable[..., object], seen: set[int]) -> set[Path]:
     """The files of all compiled functions that this one names, and those that they name."""
     files: set[Path] = set()
     for name in function.__code__.co_names:

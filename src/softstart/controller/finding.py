@@ -9,7 +9,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from softstart.controller.base import Controller, label_of
 from softstart.controller.parameters import declared_parameters
@@ -170,9 +169,9 @@ def changed_controller(controller: Controller, changes: Mapping[str, object]) ->
 
 def _values(
     cls: type[Controller], name: str, parameters: Mapping[str, object]
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[dict[str, object], list[str]]:
     """Parameters of a controller as its class takes them, and a sentence for each that is wrong."""
-    known, values, wrong = declared_parameters(cls), dict[str, Any](), list[str]()
+    known, values, wrong = declared_parameters(cls), dict[str, object](), list[str]()
     for key, value in parameters.items():
         if key not in known:
             hint = did_you_mean(

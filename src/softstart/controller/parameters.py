@@ -14,6 +14,7 @@ from softstart.input.parameters import LEAST, LIMITS, MOST, Limit, Parameter, Wo
 from softstart.quantities import RefusedError, show
 
 Interval = tuple[float, float]
+Default = Callable[[Drive, "ParameterValues"], Any] | float | str | None
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class ControllerParameter(Parameter):
     """What a controller declares of a parameter; its fields are the arguments of `parameter`."""
 
     example: str = ""
-    default: Any = None
+    default: Default = None
     default_text: str = ""
     multiples: Interval | None = None
     between: Interval | None = None
@@ -59,7 +60,7 @@ class ControllerParameter(Parameter):
 def parameter(
     unit: str,
     meaning: str,
-    default: Callable[[Drive, Any], Any] | float | str | None = None,
+    default: Default = None,
     default_text: str = "",
     limit: Limit = "any",
     *,
@@ -113,7 +114,7 @@ def parameter(
     return field(default=None, metadata={"parameter": declaration})
 
 
-def declared_parameters(controller: Any) -> Mapping[str, ControllerParameter]:
+def declared_parameters(controller: object) -> Mapping[str, ControllerParameter]:
     """The parameters of a controller or of its class, by name.
 
     >>> from softstart.controller import controller_class
@@ -125,7 +126,7 @@ def declared_parameters(controller: Any) -> Mapping[str, ControllerParameter]:
 
 
 @cache
-def _of_class(cls: Any) -> Mapping[str, ControllerParameter]:
+def _of_class(cls: type) -> Mapping[str, ControllerParameter]:
     plain = ControllerParameter("", "1", "")
     return {f.name: replace(f.metadata.get("parameter", plain), key=f.name, name=f.name) for f in fields(cls)}
 

@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, cast, get_args
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class RobustFile(NamedTuple):
     """A robust set: a controller, its parameters, and the drive they are fitted to."""
 
     controller: str
-    parameters: dict[str, Any]
+    parameters: dict[str, object]
     drive: Drive
 
 
@@ -60,7 +60,7 @@ class ScheduleFile(NamedTuple):
     gaps: tuple[float, ...]
     load_inertias: tuple[float, ...]
     gains: dict[str, Gain]
-    fixed: dict[str, Any]
+    fixed: dict[str, object]
 
 
 # ---- controllers ----------------------------------------------------------------------------------------
@@ -114,12 +114,12 @@ class RobustGains(Tuned):
         ready, drive_of_gains = self.controller.set_up(self.nominal)
         return self._called(ready), drive_of_gains
 
-    def set_ups(self, drives: Any) -> Iterator[SetUp]:
+    def set_ups(self, drives: object) -> Iterator[SetUp]:
         """One for all drives."""
         yield self.set_up(self.nominal)
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, object]:
         """Those of the controller as it is set up."""
         return self.controller.set_up(self.nominal)[0].parameters
 
@@ -164,7 +164,7 @@ class GainSchedule(Tuned):
         return self._called(ready), drive_of_gains
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, object]:
         """Grid and gains."""
         grid = {"gaps": list(self.gaps), "load_inertias": list(self.load_inertias)}
         return grid | {name: values.tolist() for name, _, values in self.gains}
@@ -245,7 +245,7 @@ def refused_file(path: Path, reason: str) -> InputError:
     return InputError(f'controller = "{path}": {reason}.')
 
 
-def _name(document: Mapping[str, Any], path: Path) -> str:
+def _name(document: Mapping[str, object], path: Path) -> str:
     name = document.get("controller")
     if not isinstance(name, str) or not name:
         raise refused_file(
@@ -254,14 +254,14 @@ def _name(document: Mapping[str, Any], path: Path) -> str:
     return name
 
 
-def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
+def _section(document: Mapping[str, object], key: str, path: Path, needed: bool = True) -> dict[str, object]:
     section = document.get(key, None if needed else {})
     if not isinstance(section, dict):
         raise refused_file(path, f"the table [{key}] is missing; write the file again with softstart tune")
     return section
 
 
-def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
+def _read_robust(document: Mapping[str, object], path: Path) -> RobustFile:
     name = _name(document, path)
     parameters = _section(document, "parameters", path)
     tables = _section(document, "drive", path)
@@ -269,7 +269,7 @@ def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
     return RobustFile(name, dict(parameters), drive)
 
 
-def _read_schedule(document: Mapping[str, Any], path: Path) -> ScheduleFile:
+def _read_schedule(document: Mapping[str, object], path: Path) -> ScheduleFile:
     name = _name(document, path)
     gaps = _axis(document.get("gaps"), "gaps", path)
     inertias = _axis(document.get("load_inertias"), "load_inertias", path)
@@ -340,7 +340,7 @@ def meanings_of(controller: Controller) -> dict[str, str]:
 
 
 def robust_text(
-    saved: RobustFile, about: Mapping[str, Any] | None = None, meanings: Mapping[str, str] | None = None
+    saved: RobustFile, about: Mapping[str, object] | None = None, meanings: Mapping[str, str] | None = None
 ) -> str:
     """The TOML text of a robust set; `about` says where it comes from and is not read, nor are `meanings`.
 
@@ -360,7 +360,7 @@ def robust_text(
 
 
 def schedule_text(
-    saved: ScheduleFile, about: Mapping[str, Any] | None = None, meanings: Mapping[str, str] | None = None
+    saved: ScheduleFile, about: Mapping[str, object] | None = None, meanings: Mapping[str, str] | None = None
 ) -> str:
     """The TOML text of a schedule; `about` says where it comes from and is not read, nor are `meanings`."""
     said = meanings or {}
@@ -399,7 +399,7 @@ def _figure(value: object) -> str:
     return str(value)
 
 
-def _table(name: str, values: Mapping[str, Any], meanings: Mapping[str, str] | None = None) -> str:
+def _table(name: str, values: Mapping[str, object], meanings: Mapping[str, str] | None = None) -> str:
     said = {key: f"  # {what}" for key, what in (meanings or {}).items()}
     lines = [
         f"{key} = {literal(value)}{said.get(key, '')}" for key, value in values.items() if value is not None

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, Protocol, TypeVar
 
 import llvmlite.binding
 import numba
@@ -18,27 +19,34 @@ from numba.extending import lower_builtin, type_callable
 
 from softstart.errors import InputError
 
-_config: Any = numba.config
-if _config.DISABLE_JIT:
+if vars(numba.config).get("DISABLE_JIT"):
     raise InputError(
         "NUMBA_DISABLE_JIT = 1: softstart simulates with compiled code alone; unset this variable."
     )
 
-_njit: Any = numba.njit
-_cfunc: Any = numba.cfunc
-_type_callable: Any = type_callable
-_lower_builtin: Any = lower_builtin
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 FUSED = {**OPTIONS, "fastmath": {"contract"}}  # a x + b is rounded once: quicker, and more exact
 
-compiled: Any = _njit(**FUSED)
+_njit: Any = numba.njit  # its annotations do not know `_nrt`
+_cfunc: Any = numba.cfunc
+_lower_builtin: Any = lower_builtin
+F = TypeVar("F", bound=Callable[..., object])
+
+
+class Decorator(Protocol):
+    """Compiles a function, which type checkers see as it is written."""
+
+    def __call__(self, function: F, /) -> F: ...
+
+
+compiled: Decorator = _njit(**FUSED)
 # called by compiled functions alone, a fifth less to compile: Python that calls it crashes
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner: Any = _njit(**FUSED, **INNER)
+inner: Decorator = _njit(**FUSED, **INNER)
 # the same digits as the same lines in Python, for controllers
-unfused: Any = _njit(**OPTIONS)
-unfused_inner: Any = _njit(**OPTIONS, **INNER)
+unfused: Decorator = _njit(**OPTIONS)
+unfused_inner: Decorator = _njit(**OPTIONS, **INNER)
 
 
 class Compiled:
@@ -77,13 +85,13 @@ class Compiled:
 
 
 def compiled_as(
-    signature: Any, cache: bool = True, options: Mapping[str, Any] = FUSED
-) -> Callable[[Callable[..., Any]], Compiled]:
+    signature: object, cache: bool = True, options: Mapping[str, object] = FUSED
+) -> Callable[[Callable[..., object]], Compiled]:
     """Compile with one explicit signature, when the function is first needed."""
     return lambda function: Compiled(function, signature, {**options, "cache": cache})
 
 
-def compile_now(module: Any) -> None:
+def compile_now(module: ModuleType) -> None:
     """Compile all functions of a module that have one signature."""
     for one in vars(module).values():
         if isinstance(one, Compiled):
@@ -102,8 +110,8 @@ def as_record(row: Any, dtype: Any) -> Any:
     return row[: dtype.itemsize // row.itemsize].view(dtype)[0]
 
 
-@_type_callable(as_record)
-def _typed(_: Any) -> Any:
+@type_callable(as_record)
+def _typed(_: Any) -> Callable[..., object]:
     return lambda row, dtype: dtype.dtype
 
 
@@ -113,14 +121,14 @@ def _lowered(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return builder.bitcast(data, context.get_value_type(signature.return_type))
 
 
-def separately_compiled(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+def separately_compiled(signature: Any) -> Callable[[Callable[..., object]], Any]:
     """Compile by itself, once: the kernel calls it by its symbol, and its code is no part of its callers.
 
     LLVM optimises what a function calls again within each caller, and each caller of that one: what is large
     and called from several places costs less here. Arguments are records and numbers, the result is a number.
     """
 
-    def declared(function: Callable[..., Any]) -> Any:
+    def declared(function: Callable[..., object]) -> Any:
         symbol = f"{function.__module__}.{function.__qualname__}"
         code = _cfunc(signature, **FUSED)(function)
         llvmlite.binding.add_symbol(symbol, code.address)

@@ -18,10 +18,11 @@ MOST_PENDING: Final = 16  # answers of a controller that may wait for their comp
 MOST_POINTS: Final = 16  # of a load curve
 MOST_NOTED: Final = 2 * MOST_MASSES + 16  # events at one instant
 
+Part = int | tuple[int, ...] | np.dtype[np.void]
 Record = Any  # a record of one of these types, in compiled code
 
 
-def record(*fields: type, whole: Sequence[str] = (), **parts: Any) -> Any:
+def record(*fields: type, whole: Sequence[str] = (), **parts: Part) -> np.dtype[np.void]:
     """The NumPy type of a record: a float64 for each field of the classes, in order.
 
     A field named in `parts` is an array of so many numbers or of this shape, or a record within the record;
@@ -50,7 +51,7 @@ def _field(name: str) -> property:
     return property(lambda row: row[name], lambda row, value: row.__setitem__(name, value))
 
 
-def size(dtype: Any) -> int:
+def size(dtype: np.dtype[np.void]) -> int:
     """How many float64 numbers a record takes."""
     return int(dtype.itemsize) // 8
 
@@ -328,9 +329,9 @@ _WHOLE = (  # numbers that are counted
 )
 
 
-def _parts() -> dict[str, Any]:
+def _parts() -> dict[str, Part]:
     """The arrays in the work of a start."""
-    shapes: dict[str, Any] = dict.fromkeys(("torque_u", "angle_u", "f"), ORDERS)
+    shapes: dict[str, Part] = dict.fromkeys(("torque_u", "angle_u", "f"), ORDERS)
     shapes |= dict.fromkeys(("at", "torque_at"), (MOST_MASSES, MOST_POINTS))
     shapes |= dict.fromkeys(
         ("note_time", "note_kind", "note_place", "note_value", "note_impulse"), MOST_NOTED
@@ -367,7 +368,7 @@ N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
 # In the work of a start the fields of MassRecord, ShaftRecord, ShaftNotes and EventRow are arrays, one behind
 # the other in the same order; these are the places of the first ones
 AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, AT_EVENTS = (
-    int(WORK.fields[name][1]) // 8 for name in ("lag", "J", "c", "peak", "note_time")
+    int(dict(WORK.fields or ())[name][1]) // 8 for name in ("lag", "J", "c", "peak", "note_time")
 )
 
 # a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and

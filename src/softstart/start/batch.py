@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.controller.base import Controller, SetUp, numbers_of
-from softstart.drive import PARAMETERS, Drive, Limits
-from softstart.drive.machine import Machine
+from softstart.drive import PARAMETERS, Drive, Limits, Machine
 from softstart.drive.machine_table import MachineTable, each_of
 from softstart.kernel import records as rec
 from softstart.parallel import checked_workers
@@ -182,7 +181,7 @@ def simulate_many(
     if isinstance(machines, MachineTable):
         shape, means = machines.shape, machines.mean_torque
         dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
-        coordinates: dict[str, Any] = {
+        coordinates: dict[str, object] = {
             name: (dims, values.copy()) for name, values in machines.fields.items()
         }
         shaft_names = {machines.parts[0].shaft_names}
@@ -211,7 +210,7 @@ def simulate_many(
     return _dataset(data, coordinates)
 
 
-def _different(machines: Sequence[Machine]) -> Iterator[tuple[str, list[Any]]]:
+def _different(machines: Sequence[Machine]) -> Iterator[tuple[str, list[object]]]:
     """The parameters in which drives of a list differ; of chains they are not known by name."""
     for name in PARAMETERS if all(isinstance(one, Drive) for one in machines) else ():
         values = [getattr(machine, name) for machine in machines]
@@ -219,7 +218,7 @@ def _different(machines: Sequence[Machine]) -> Iterator[tuple[str, list[Any]]]:
             yield name, values
 
 
-def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.Dataset:
+def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, object]) -> xarray.Dataset:
     import xarray
 
     return xarray.Dataset(

@@ -150,7 +150,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
         rows = (replace(row, worst_case=tuple({*row.worst_case} - {SOFT_END})) for row in self.rows)
         return recommend(self.drive, tuple(rows))
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Everything as plain data, for JSON."""
         return {
             "drive": self.drive.name,

@@ -105,7 +105,7 @@ class Life(OneLine):
         """`worn_hours` in years of 8766 h."""
         return self.worn_hours / HOURS_PER_YEAR
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """The figures under the names used everywhere."""
         wear = {"worn_relative": self.worn_relative, "worn_hours": self.worn_hours}
         return {
@@ -183,7 +183,7 @@ class Fatigue(Result, view="fatigue.fatigue_sheet"):
         runs = sorted(self.by_run, key=lambda lives: -min(life.relative for life in lives))
         return tuple(life for lives in runs for life in lives)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Everything as plain data, for JSON."""
         machine = self.drive
         return {

@@ -208,7 +208,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, PeriodicTorque]) -> t
         curve["mass"], curve["points"], curve["by_angle"] = i, len(at_points), by_angle
         curve["at"][: len(at_points)] = np.array(at_points) / ratio
         curve["torque"][: len(at_points)] = np.array(torques) * ratio
-    welded = _welded(arrays)
+    welded = arrays.rigid & (arrays.gap == 0.0)  # joined rigidly, without a gap
     for k in range(count - 1):
         if welded[k]:  # one body has one speed, not two that differ by rounding
             masses["w0"][k + 1] = masses["w0"][k]
@@ -262,13 +262,8 @@ def _driven_by_curves(made: KernelInput, left: float, heavier: Vector, speeds: f
     return speeds * float(np.mean(1.0 / torque)) if torque.min() > 0.0 else math.inf
 
 
-def _welded(arrays: ChainArrays) -> NDArray[np.bool_]:
-    """Which shafts join their masses rigidly, without a gap."""
-    return arrays.rigid & (arrays.gap == 0.0)
-
-
 def _refuse(chain: Chain, arrays: ChainArrays) -> None:
-    wrong, welded = [], _welded(arrays)
+    wrong, welded = [], arrays.rigid & (arrays.gap == 0.0)
     for k, shaft in enumerate(chain.shafts):
         if shaft.efficiency != 1.0 and arrays.rigid[k]:
             wrong.append(

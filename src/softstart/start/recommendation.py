@@ -105,7 +105,7 @@ class Margin:
         """Whether the limit is kept."""
         return self.share >= 0.0
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """As plain data."""
         plain = {"limit": self.name, "unit": self.unit, "value": self.value, "permitted": self.limit}
         return {**plain, "margin": self.share, "kept": self.kept, "case": self.case}
@@ -309,7 +309,7 @@ class Recommendation(OneLine):
             return "recommended" if row is self.recommended else more
         return "Pareto-optimal" if row in self.best else "dominated by another strategy"
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """As plain data."""
         return {
             "text": self.text,

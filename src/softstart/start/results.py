@@ -66,9 +66,8 @@ class StartResults:
     def finished(self) -> NDArray[np.bool_]:
         """Which starts went to their end."""
         reasons, which = np.unique(self["status"], return_inverse=True)
-        return np.array([status_of(int(reason), True, False).finished for reason in reasons], dtype=bool)[
-            which
-        ]
+        finished = [status_of(int(reason), True, False).finished for reason in reasons]
+        return np.array(finished, dtype=bool)[which]
 
 
 def worst_position(results: Sequence[StartResults]) -> StartResults:

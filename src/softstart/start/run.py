@@ -513,7 +513,7 @@ class Run(Result, view="starts.run_sheet"):
         columns = self.columns(times)
         header, table = ",".join(columns), np.column_stack(list(columns.values()))
 
-        def write(stream: IO[Any]) -> None:
+        def write(stream: IO[str]) -> None:
             np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
 
         write_whole(Path(path), write)
@@ -531,7 +531,7 @@ class Run(Result, view="starts.run_sheet"):
         }
         return {"worst": self.position, **each}
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
         first, second = self.stage_durations
         known = self._has_base

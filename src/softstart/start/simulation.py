@@ -141,13 +141,12 @@ def simulate(
     strategy = None if controller is None else as_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     fitted, reference = _beside("fitted_to", fitted_to, machine), _beside("base", base, machine)
+    if excitation and not isinstance(machine, Chain):
+        raise InputError("excitation: it acts on the masses of one chain; start several one at a time.")
     if not isinstance(machine, Machine):
         listed = machine.parts if isinstance(machine, MachineTable) else machine
         if not (listed and all(isinstance(each, Machine) for each in listed)):
             raise InputError("drive: give a list of Drives or of Chains, not empty.")
-    if excitation and not isinstance(machine, Chain):
-        raise InputError("excitation: it acts on the masses of one chain; start several one at a time.")
-    if not isinstance(machine, Machine):
         if strategy is None:
             raise InputError("controller is missing: many starts need one.")
         return simulate_many(machine, strategy, until, fitted, reference, time_limit, max_events, workers)

@@ -102,7 +102,7 @@ class StartRecorder:
     def of_shafts(self) -> NDArray[np.void]:
         """What is noted of each shaft: its largest torque, the time of that, its largest impulse, ..."""
         now, noted = self.state, np.zeros(self.input.count - 1, rec.SHAFT_NOTES)
-        for name in rec.SHAFT_NOTES.names:
+        for name in rec.ShaftNotes.__annotations__:
             noted[name] = now[name][: noted.size]
         return noted
 
