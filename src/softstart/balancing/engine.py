@@ -152,7 +152,7 @@ class Engine(ParameterFile):
     counterweights: Counterweights = component(Counterweights, default=Counterweights())
     gas: SimpleCycle | None = component(SimpleCycle, default=None)
     operation: Operation = component(Operation)
-    shafts: Rows[BalancerShaft] = component(BalancerShaft, many=True, default=())
+    shafts: Rows[BalancerShaft] = component(BalancerShaft, least=0, default=())
     name: str = parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine")
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
     assumed: str = parameter("assumed", "", "which values are assumed", '"rod_length, all masses"',

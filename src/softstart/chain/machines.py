@@ -96,7 +96,7 @@ def is_chain_text(text: str) -> bool:
     return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))
 
 
-def machine_table(machine: Machine | MachineTable | str, **fields: Any) -> MachineTable:
+def machine_table(machine: MachineLike | MachineTable, **fields: object) -> MachineTable:
     """Many machines that differ in some values, for one call of `simulate`.
 
     Parameters
@@ -163,7 +163,7 @@ def quantity_of(machine: Machine, key: str, given: object, name: str) -> float:
         raise InputError(f"{name} = {show(given)}: {refusal.reason}.") from None
 
 
-def listed_of(given: Any, name: str) -> list[Any]:
+def listed_of(given: object, name: str) -> list[Any]:
     """The values of a list, or the one that is none; "at output" stands behind each of them, or behind none.
 
     >>> listed_of("1x", "gaps"), listed_of([0.5, "2x"], "gaps")
@@ -177,14 +177,18 @@ def listed_of(given: Any, name: str) -> list[Any]:
     return listed
 
 
-def _records(machine: Any, values: Mapping[str, Any], change: Callable[..., DriveColumns]) -> MachineTable:
+def _records(
+    machine: MachineLike | MachineTable, values: Mapping[str, object], change: Callable[..., DriveColumns]
+) -> MachineTable:
     if not isinstance(machine, MachineTable):
         machine = as_machine(machine)
         machine = MachineTable(machine, {}, (machine,))
     whole = machine.machine
     if isinstance(whole, Chain):
         return _chains(machine, values)
-    table = MachineTable.of(whole, change(DriveColumns.of(machine.parts[0]), **values))
+    columns = machine.parts[0]
+    assert isinstance(columns, Drive)
+    table = MachineTable.of(whole, change(DriveColumns.of(columns), **values))
     if not table.fields:
         raise InputError(SINGLE)
     return table

@@ -116,8 +116,8 @@ class Chain(ParameterFile, Machine):
     LIMITS_GIVEN: ClassVar[str] = "shafts their permissible_torque"
 
     # fmt: off
-    masses: Rows[Mass] = component(Mass, many=True, least=2, kw_only=False)
-    shafts: Rows[Shaft] = component(Shaft, many=True, least=1, kw_only=False)
+    masses: Rows[Mass] = component(Mass, least=2, kw_only=False)
+    shafts: Rows[Shaft] = component(Shaft, least=1, kw_only=False)
     motor: Motor | None = component(Motor, default=None, kw_only=False)
     load_mass: str = parameter("start.load", "", "name of the mass that is to reach the target speed",
         '"drum"', default="")
@@ -132,8 +132,8 @@ class Chain(ParameterFile, Machine):
     units: str = like(Drive, "units")
     # fmt: on
 
-    def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
-        super()._fill(_completed(given), *args, **known)
+    def _fill(self, given: Mapping[str, object], *rest: Any) -> None:
+        super()._fill(_completed(given), *rest)
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         if {"masses", "shafts", "load_mass"} <= values.keys():

@@ -63,7 +63,7 @@ def _main(arguments: list[str]) -> int:
         with warnings.catch_warnings():
             usual = warnings.showwarning
 
-            def show(message: Any, category: type[Warning], *where: Any, **also: Any) -> None:
+            def show(message: Warning | str, category: type[Warning], *where: Any, **also: Any) -> None:
                 if issubclass(category, DamagedWarning):
                     print(f"softstart: {message}", file=sys.stderr, flush=True)
                 else:

@@ -93,7 +93,7 @@ def typed_command() -> str:
 def reading(read: Reader) -> Callable[..., Any]:
     """The callback of an option or argument: its command is given `read(text, name)`, or None without it."""
 
-    def callback(context: click.Context, parameter: click.Parameter, text: Any) -> Any:
+    def callback(context: click.Context, parameter: click.Parameter, text: object) -> object:
         return text if text is None or context.resilient_parsing else read(text, parameter.opts[0])
 
     return callback
@@ -376,7 +376,7 @@ def machine_argument(
 ) -> Decorator:
     """A TOML file or the name of a shipped one, with --set; the command gets `read(name, texts of --set)`."""
 
-    def load(typed: str, _: str) -> Any:
+    def load(typed: str, _: str) -> object:
         click.get_current_context().meta[TYPED] = typed
         return read(typed, typed_settings())
 

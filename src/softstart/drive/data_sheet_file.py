@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from softstart.drive.data_sheet_mechanics import MotorSide, parts_text, total_stiffness
 from softstart.drive.data_sheet_values import SheetValues
@@ -17,7 +17,7 @@ SHOWN_IN = {"kW": 1e3, "ms": 1e-3}  # units of a drive file that are not those o
 class Entry(NamedTuple):
     """A line of a drive file: the value in SI at the motor shaft, its text, and its source."""
 
-    value: Any
+    value: float | str | None
     text: str
     source: str
 
@@ -129,13 +129,13 @@ def output_entry(
     return Entry(value, f'"{quantity_text(at_output, unit, 6)} at output"', source)
 
 
-def entry(value: Any, unit: str = "", source: str = "") -> Entry:
+def entry(value: float | str | None, unit: str = "", source: str = "") -> Entry:
     """A word or a number in SI, shown in this unit.
 
     >>> entry(147.65485471872029, "rad/s").text, entry("hanging").text, entry(2e3 / 3.0, "kW").text
     ('"1410 rpm"', '"hanging"', '"0.66667 kW"')
     """
-    if not unit or value is None:
+    if not unit or not isinstance(value, float | int):
         return Entry(value, literal(value), source)
     return Entry(value, f'"{quantity_text(value / SHOWN_IN.get(unit, 1.0), unit, 5)}"', source)
 

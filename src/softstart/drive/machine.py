@@ -242,7 +242,7 @@ class Machine(ABC):
         """The machine with all gaps and the load inertia multiplied; start angles keep their share."""
 
     @abstractmethod
-    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Any = None) -> Self:
+    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Self | None = None) -> Self:
         """The machine with this sum of the gaps and this load inertia.
 
         A chain whose gaps are all closed widens them in the proportions of `origin`.

@@ -215,8 +215,8 @@ class Drive(ParameterFile, Machine):
         label="S-N cycles")
     # fmt: on
 
-    def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
-        super()._fill(given, *args, **known)
+    def _fill(self, given: Mapping[str, object], *rest: Any) -> None:
+        super()._fill(given, *rest)
         vars(self).update(self._derived(vars(self)))
 
     def _derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -292,14 +292,6 @@ class Drive(ParameterFile, Machine):
         return super()._from_document(document, where, also)
 
     # ---- the drive changed -------------------------------------------------------------------------------
-
-    def replace(self, **changes: Any) -> Self:
-        """The same drive with some parameters changed; those that follow another one follow it still.
-
-        >>> Drive.load("crane-4amtkf").replace(gap="2 rad", load_inertia="700 kg*cm^2").gap
-        2.0
-        """
-        return self._changed(changes, Wording(), [])
 
     def with_settings(self, settings: Iterable[str]) -> Self:
         """The drive with changes as typed at a command line: `table.key=value` or `name=value`.
@@ -502,7 +494,7 @@ class Drive(ParameterFile, Machine):
         """Inertia of the motor at the shaft of the load, kg m2: the load is at the motor shaft here."""
         return self.motor_inertia
 
-    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Any = None) -> Self:
+    def with_gap_and_inertia(self, gap: float, inertia: float, origin: Self | None = None) -> Self:
         """The drive with another gap, as `with_gap`, and another load inertia; `origin` is for chains."""
         return self.with_gap(gap, load_inertia=inertia)
 
@@ -697,7 +689,7 @@ class Drive(ParameterFile, Machine):
             return 0.0
         return math.inf if isinstance(self.release, str) else self.release
 
-    def with_gap(self, gap: Any, **changes: Any) -> Self:
+    def with_gap(self, gap: object, **changes: object) -> Self:
         """The drive with another gap, its start where it was in the gap: as `replace`, for maps and wear.
 
         A position that is a word moves with the flanks anyway. An angle in the gap keeps its share of the

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -177,7 +177,7 @@ class Log:
             count=0.0, notes=(),
         )  # fmt: skip
 
-    def changed(self, **fields: Any) -> Log:
+    def changed(self, **fields: object) -> Log:
         """The log with other fields, which are not checked again."""
         log = object.__new__(Log)
         vars(log).update(vars(self) | fields)

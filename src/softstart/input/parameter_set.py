@@ -129,15 +129,10 @@ class Component:
 
 
 def component(
-    kind: type[ParameterSet],
-    *,
-    many: bool = False,
-    least: int = 0,
-    default: Any = REQUIRED,
-    kw_only: bool = True,
+    kind: type[ParameterSet], *, least: int | None = None, default: Any = REQUIRED, kw_only: bool = True
 ) -> Any:
     """A field that is a parameter set of this kind, or a tuple of at least so many."""
-    return Component(kind, many, least, default, not kw_only)
+    return Component(kind, least is not None, least or 0, default, not kw_only)
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter, component))
@@ -156,6 +151,7 @@ class ParameterSet:
     USUAL: ClassVar[Mapping[str, str]] = {}
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
     PARTS: ClassVar[Mapping[str, Component]] = {}
+    FIELDS: ClassVar[Mapping[str, Component | Parameter]] = {}
     TABLES: ClassVar[tuple[DocumentTable, ...]] = ()
 
     def __init_subclass__(cls, kw_only: bool = True) -> None:
@@ -169,13 +165,14 @@ class ParameterSet:
             name: replace(one, name=name, positional=one.positional or not kw_only)
             for name, one in declared.items()
         }
+        cls.FIELDS = {**cls.PARTS, **cls.PARAMETERS}
         everyone, tables = cls.PARAMETERS.values(), [table for p in cls.PARTS.values() for table in p.tables]
         for table in dict.fromkeys(p.table for p in everyone):
             keys = tuple(p for p in everyone if p.table == table)
             tables.append(DocumentTable(table, keys, required=any(p.required for p in keys)))
         cls.TABLES = tuple(sorted(tables, key=lambda table: bool(table.name)))  # "" first
         cls.__replace__ = cls.replace  # type: ignore[attr-defined]  # copy.replace of Python 3.13
-        arguments = [_argument(name, one) for name, one in cls._fields().items()]
+        arguments = [_argument(name, one) for name, one in cls.FIELDS.items()]
         arguments.sort(key=lambda one: one.kind)
         cls.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
         if cls.__doc__:
@@ -183,8 +180,8 @@ class ParameterSet:
 
     if not TYPE_CHECKING:  # type checkers see the fields as keywords
 
-        def __init__(self, *positional: Any, **given: Any) -> None:
-            names = [name for name, one in self._fields().items() if one.positional]
+        def __init__(self, *positional: object, **given: object) -> None:
+            names = [name for name, one in self.FIELDS.items() if one.positional]
             if len(positional) > len(names):
                 raise TypeError(f"{type(self).__name__} takes {len(names)} positional arguments")
             self._fill(dict(zip(names, positional, strict=False)) | given, Wording(), [])
@@ -213,7 +210,7 @@ class ParameterSet:
                 values[name] = part.default
             elif not mistakes:  # else it may have been there, and wrong
                 found.append(Mistake(wording.sentence(f"{name} is missing", f"{self.WHAT} needs it")))
-        wrong, names = [*mistakes, *found], self._fields()
+        wrong, names = [*mistakes, *found], self.FIELDS
         for name in [one for one in given if one not in names]:
             free = [p for p in parameters.values() if p.name not in given]
             meant = meant_by(name, parameters.values(), free)
@@ -239,10 +236,6 @@ class ParameterSet:
             raise InputError(sentences)
 
     @classmethod
-    def _fields(cls) -> dict[str, Component | Parameter]:
-        return {**cls.PARTS, **cls.PARAMETERS}
-
-    @classmethod
     def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
         """The gear among the values given, through which those "... at output" go, or why there is none."""
         return NO_GEAR
@@ -261,7 +254,7 @@ class ParameterSet:
         one._fill(*filled)
         return one
 
-    def _derive(self, **values: Any) -> None:
+    def _derive(self, **values: object) -> None:
         """Set values that follow from others, as if they had been given; None takes one back."""
         fields = vars(self)
         fields.update(values)
@@ -272,15 +265,20 @@ class ParameterSet:
     def given(self) -> dict[str, Any]:
         """The parameters that were given, in the order of the fields; the others have their defaults."""
         fields, given = vars(self), vars(self)["_given"]
-        return {name: fields[name] for name in self._fields() if name in given}
+        return {name: fields[name] for name in self.FIELDS if name in given}
 
     def values(self) -> dict[str, Any]:
         """All parameters by name."""
         fields = vars(self)
-        return {name: fields[name] for name in self._fields()}
+        return {name: fields[name] for name in self.FIELDS}
 
-    def replace(self, **changes: Any) -> Self:
-        """The same with some parameters changed; those that follow another one follow it still."""
+    def replace(self, **changes: object) -> Self:
+        """The same with some parameters changed; those that follow another one follow it still.
+
+        >>> from softstart import Drive
+        >>> Drive.load("crane-4amtkf").replace(gap="2 rad", load_inertia="700 kg*cm^2").gap
+        2.0
+        """
         return self._changed(changes, Wording(), [])
 
     def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.errors import InputError
 from softstart.hints import nearest, term
@@ -345,13 +346,13 @@ def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
     return (gear.lossless if p.at_output == "limit" else gear).to_motor(number, p.unit)
 
 
-def _refuse(number: Value, allowed: Any, reason: str) -> None:
+def _refuse(number: Value, allowed: bool | NDArray[np.bool_], reason: str) -> None:
     """Raise for the first value of a number or array that is not allowed."""
     if not np.ndim(number):
         if not allowed:
             raise RefusedError(reason)
-    elif not allowed.all():
-        index = tuple(int(i) for i in np.argwhere(~allowed)[0])
+    elif not np.all(allowed):
+        index = tuple(int(i) for i in np.argwhere(np.logical_not(allowed))[0])
         raise RefusedError(reason, float(np.asarray(number)[index]), index)
 
 

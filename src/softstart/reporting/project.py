@@ -78,8 +78,8 @@ class Project(ParameterFile):
     logo: str = _line("project.logo", "picture for the head of page 1", "logo.png")
     paper: str = _line("project.paper", "paper size", "A4", "A4", "A4, letter")
     decimal: str = _line("project.decimal", "decimal sign", "point", "point", "point, comma")
-    revisions: Rows[Revision] = component(Revision, many=True, default=())
-    sources: Rows[Source] = component(Source, many=True, default=())
+    revisions: Rows[Revision] = component(Revision, least=0, default=())
+    sources: Rows[Source] = component(Source, least=0, default=())
     # fmt: on
 
     @classmethod

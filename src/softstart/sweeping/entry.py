@@ -158,7 +158,7 @@ def sweep(
 
 def _settings(
     given: MachineLike, controller: ControllerLike | None, grid: Mapping[str, Any],
-    parameters: Mapping[str, object] | None, until: object, fitted_to: MachineLike | None, figures: Any,
+    parameters: Mapping[str, object] | None, until: object, fitted_to: MachineLike | None, figures: object,
     *, allow_code: bool,
 ) -> tuple[SweepSettings, Grid]:  # fmt: skip
     """What is the same for all starts, and the axes; or one InputError for all that is wrong with them."""

@@ -131,7 +131,7 @@ def tuning_problem(
     metric: str,
     start_time: float | str | None,
     tolerances: Mapping[str, Any] | None,
-    quantile: Any,
+    quantile: float,
     search: Mapping[str, Any],
 ) -> TuningProblem:
     """The arguments of `tune`, read; InputError with all mistakes."""
