@@ -67,6 +67,8 @@ class UnknownStiffness(NamedTuple):
 class DataSheet(SheetValues):
     """A machine as plates, catalogues and drawings give it; `drive` is what follows for the motor shaft.
 
+    It is an input; a `reporting.ParameterSheet` is a result, a `views.sheet.Sheet` what is shown of one.
+
     With the ratio i and the efficiency eta of the gears, an inertia J, a stiffness c and a torque M behind
     them are J/(i^2 eta), c/(i^2 eta) and M/(i eta) at the motor shaft, a backlash i times as wide.
     Stiffnesses in series add by their reciprocals, backlashes directly. A mass m on a radius r is m r^2; a

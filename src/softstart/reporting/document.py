@@ -27,7 +27,7 @@ from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
 from softstart.views import chains, drives, starts, traces
 from softstart.views import fatigue as lives
-from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_map, literal, panels, svg_of
+from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_map, panels, svg_of, verbatim
 from softstart.views.numbers import (
     RPM,
     Column,
@@ -258,7 +258,7 @@ def maps_figure(report: Report) -> Figure:
             box = Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, fc="none", ec=COLOURS[1], lw=2.0, zorder=5)
             panel.add_patch(box)
             worst = f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
-            panel.set_title(f"{literal(name)}: {worst}", loc="left", fontsize=SMALL)
+            panel.set_title(f"{verbatim(name)}: {worst}", loc="left", fontsize=SMALL)
     return figure
 
 

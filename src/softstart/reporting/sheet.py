@@ -143,7 +143,9 @@ class Rise(OneLine):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ParameterSheet(OneLine):
-    """What to set for one strategy, and what comes of it.
+    """What to set on the inverter for one strategy, and what comes of it: a result.
+
+    What is shown of any result is a `softstart.views.sheet.Sheet`, what is known of a drive a `DataSheet`.
 
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
     largest K_dyn, `slowest` the longest start time (s) of `variants` starts in which the rounded values are

@@ -145,7 +145,7 @@ def legend_beside(axes: Axes, columns: int = 1, **options: float) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, **options)
 
 
-def literal(name: str) -> str:
+def verbatim(name: str) -> str:
     """A name for a figure: not set as a formula, and cut where it is too long."""
     return cut(name, LONGEST_NAME).replace("$", r"\$")
 
@@ -153,9 +153,9 @@ def literal(name: str) -> str:
 def mark_points(axes: Axes, points: Sequence[tuple[str, float, float]], filled: Sequence[int] = ()) -> None:
     """A mark for each point (name, x, y), named in the legend beside the panel; some are filled."""
     for index, (name, x, y) in enumerate(points):
-        colour = COLOURS[(index + 1) % len(COLOURS)]
-        axes.plot([x], [y], MARKERS[index % len(MARKERS)], ms=8, mfc=colour if index in filled else "none",
-                  mew=1.8, color=colour, label=literal(name), clip_on=False, ls="none", zorder=4)  # fmt: skip
+        colour, marker = COLOURS[(index + 1) % len(COLOURS)], MARKERS[index % len(MARKERS)]
+        axes.plot([x], [y], marker, ms=8, mfc=colour if index in filled else "none", mew=1.8, color=colour,
+                  label=verbatim(name), clip_on=False, ls="none", zorder=4)  # fmt: skip
     legend_beside(axes, fontsize=8.5)
 
 

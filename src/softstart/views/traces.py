@@ -21,12 +21,12 @@ from softstart.views.drawing import (
     legend_above,
     legend_beside,
     line_of,
-    literal,
     mark_points,
     new_figure,
     panels,
     plain_ticks,
     shade_open_gap,
+    verbatim,
 )
 from softstart.views.numbers import units_of
 
@@ -157,7 +157,7 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
                 shade_open_gap(panel, run, latest)
             panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=0.9, label="motor torque u")
             shaft_torques(panel, run)
-            panel.set_title(f"{literal(row.name)}: {run.k_dyn:.3f}", loc="left", pad=3, fontsize=8.0)
+            panel.set_title(f"{verbatim(row.name)}: {run.k_dyn:.3f}", loc="left", pad=3, fontsize=8.0)
             if not math.isnan(run.shown.start_time):
                 panel.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
         axes[0].set_xlim(0.0, latest)
@@ -181,7 +181,7 @@ def before_after_figure(rows: Sequence[Row]) -> Figure:
         lines = ((COLOURS[1], 1.1), (COLOURS[0], 2.0))[-len(rows) :]
         for row, run, (colour, width) in zip(rows, runs, lines, strict=True):
             worst = run.T.reshape(run.t.size, -1)[:, run.worst_shaft]
-            torque.plot(run.t, worst, color=colour, lw=width, label=literal(row.name))
+            torque.plot(run.t, worst, color=colour, lw=width, label=verbatim(row.name))
             peak = float(run.trajectory.shafts["peak"][run.worst_shaft])
             torque.plot([run.peak_time], [peak], "o", ms=4, color=colour)
             speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, lw=width)
