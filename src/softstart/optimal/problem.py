@@ -45,8 +45,9 @@ class StartTime:
             return given
         try:
             multiple = read_multiple(given, name)
-            value = given if multiple is None else multiple[0]
-            return cls(time_above_0(value, name, ', as 0.3 or "300 ms"'), multiple is not None)
+            if multiple is not None and 0.0 < multiple[0] < math.inf:
+                return cls(multiple[0], True)
+            return cls(time_above_0(given, name, ', as 0.3 or "300 ms"'))
         except InputError as error:
             either = 'or a multiple of the start time of direct, as "1.2x".'
             sentences = [f"{sentence.removesuffix('.')}, {either}" for sentence in error.sentences]
