@@ -412,13 +412,14 @@ class CompiledController(Controller):
 
     def _in_order(self, record: np.dtype[np.void], numbers: Numbers, drive: Drive) -> Iterator[float]:
         for name in record.names or ():
-            source = next((source for source in (self, drive) if hasattr(source, name)), None)
-            if source is None and name not in numbers:
+            source = self if hasattr(self, name) else drive
+            try:
+                value = numbers[name] if name in numbers else getattr(source, name)
+            except AttributeError:
                 raise InputError(
                     f"{type(self).__name__}: its step takes {name}, which is neither a parameter nor a value "
                     "of the drive; declare it with `parameter`, or return it from `numbers`."
-                )
-            value = numbers[name] if name in numbers else getattr(source, name)
+                ) from None
             if isinstance(value, dict):  # a record within the record
                 yield from self._in_order(record[name], value, drive)
             else:
