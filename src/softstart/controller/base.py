@@ -133,6 +133,22 @@ class Command(NamedTuple):
 
 WholeReply = tuple[float, float, tuple[float, ...], float]  # the fields of a Command, none left out
 
+
+class Regulation(NamedTuple):
+    """How a start ends under a controller that holds the speed: what `Controller.regulation` returns.
+
+    Parameters
+    ----------
+    band : share of the target speed within which the load has settled, on both sides.
+    command_end : when the ramp of the commanded speed has ended, s.
+    dwell : for how long the load must stay in the band after that, s; then the start ends.
+    """
+
+    band: float
+    command_end: float
+    dwell: float
+
+
 # what a class says of itself: its type, and how it is written
 DECLARED: dict[str, tuple[type | UnionType, str]] = {
     **dict.fromkeys(("name", "summary", "source"), (str, "a text in quotes")),
@@ -204,6 +220,13 @@ class Controller:
             return self
         derived = self.defaults(drive.design_drive)
         return replace(self, **{name: derived[name] for name in missing if name in derived})
+
+    def regulation(self, drive: Drive) -> Regulation | None:
+        """How the start ends if the strategy holds the speed; called on a fitted controller.
+
+        None, the default, is a torque strategy: the start ends at the first passage of the target speed.
+        """
+        return None
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller with every parameter a number, and the drive whose numbers it works with.
@@ -426,13 +449,25 @@ class CompiledController(Controller):
                 yield value
 
 
-def numbers_of(set_ups: Iterable[SetUp]) -> tuple[CompiledController, Matrix] | list[SetUp]:
-    """A compiled controller with its numbers, a row for each set-up; those in plain Python as they are."""
-    plain, rows, compiled = list[SetUp](), list[Vector](), None
-    for controller, drive in set_ups:
-        if isinstance(controller, CompiledController):
-            compiled = controller
-            rows.append(controller.vector(drive))
-        else:
-            plain.append((controller, drive))
-    return plain if compiled is None else (compiled, np.array(rows, dtype=np.float64))
+class ReadyControllers(NamedTuple):
+    """Set-ups as the kernel needs them: of a compiled controller its numbers, else as they are."""
+
+    compiled: CompiledController | None
+    numbers: Matrix
+    plain: list[SetUp]
+    regulations: list[Regulation]  # of each set-up; empty under torque strategies
+
+    @classmethod
+    def of(cls, set_ups: Iterable[SetUp]) -> ReadyControllers:
+        """Those of the same controller."""
+        plain, rows, regulations = list[SetUp](), list[Vector](), list[Regulation]()
+        compiled = None
+        for controller, drive in set_ups:
+            if isinstance(controller, CompiledController):
+                compiled = controller
+                rows.append(controller.vector(drive))
+            else:
+                plain.append((controller, drive))
+            if regulation := controller.regulation(drive):
+                regulations.append(regulation)
+        return cls(compiled, np.array(rows, dtype=np.float64), plain, regulations)

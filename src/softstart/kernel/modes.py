@@ -315,8 +315,11 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         s.start_time = s.time
         s.modes_changed = 0.0
         note(s, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
-        if s.t_end == math.inf:  # without `until` a run goes on for one elastic period
-            s.t_end = s.time + s.period
+        if s.regulated == 0.0:
+            if not math.isnan(s.band_low):  # it is judged from here on
+                s.settled = s.time
+            if s.t_end == math.inf:  # without `until` a run goes on for one elastic period
+                s.t_end = s.time + s.period
     else:
         if event == REJOIN:
             speed = s.side[k] * (s.w[k] - s.w[k + 1])

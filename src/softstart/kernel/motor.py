@@ -18,7 +18,8 @@ TORQUE, ASK_AGAIN, SLOPE, NEW_STATE = range(4)
 # indices of `measured`
 N_MEASURED = size(MEASURED)
 (
-    M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M_LOAD_SPEED,
+    M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M_LOAD_SPEED, M_RUN,
+    M_SET_SPEED, M_COMMAND_TIME,
 ) = range(N_MEASURED)  # fmt: skip
 # what a controller may declare to see beyond time, motor angle, speed and torque
 SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
@@ -194,6 +195,9 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     measured.stage = s.stage if sees & SEES_STAGE else math.nan
     measured.shaft_torque = math.nan
     measured.load_speed = s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
+    measured.run = s.run
+    measured.set_speed = s.set_speed
+    measured.command_time = s.time - s.command_since
 
 
 @separately_compiled(types.int64(WORK_TYPE, types.float64, types.float64, types.float64))

@@ -6,6 +6,7 @@ Outside of the kernel a record is a row of float64 numbers; `row.view(WORK)[0]` 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -77,6 +78,13 @@ class MachineRecord:
     event_cap: float
     motor: float  # indices of masses
     load: float
+    set_speed: float  # commanded speed, rad/s
+    # the band of the load speed in which it has settled, rad/s; NaN: it is not noted when
+    band_low: float
+    band_high: float
+    regulated: float  # 1 where the controller holds the speed: the start ends `dwell` after it has settled
+    command_end: float  # when the last command of such a controller has ended, s
+    dwell: float  # for how long the load must stay in its band, s
 
 
 class MassRecord:
@@ -129,6 +137,9 @@ class ResultRecord:
 
     status: float
     start_time: float
+    settled: float  # since when the load speed is in its band; NaN where it is not
+    reached: float  # at the end 1 where the load has its target speed, of a regulated start in its band
+    overshoot: float  # of a regulated start: share of the target by which the load exceeds it; else NaN
     time: float  # at the end that of the run
     final_speed: float  # of the load at the end
     stage: float  # odd while a gap between motor and load is open, even while none is
@@ -233,6 +244,9 @@ class StartState:
     """The rest of the state of a start."""
 
     t_end: float
+    run: float  # commands: 1 run, 0 stop; the set speed is in MachineRecord
+    command_since: float  # when they last changed
+    highest_speed: float  # of the load so far, in a regulated start
     phi: float  # angle of the load
     u: float  # its realised torque
     u_ref: float  # the demand after the slew limiter
@@ -294,11 +308,13 @@ class Measured(NamedTuple):
     stage : 1, 2, ... as in [G]: odd with the gap open, even with the gap closed. Needs `Sensor.STAGE`.
     shaft_torque : N m. Needs `Sensor.SHAFT_TORQUE`.
     load_speed : rad/s. Needs `Sensor.LOAD_SPEED`.
+    run : 1 while the drive is to run, 0 while it is to stop.
+    set_speed : rad/s, the commanded speed with its sign; in a start the target speed.
+    command_time : s since `run` or `set_speed` last changed.
 
     Examples
     --------
-    >>> import math
-    >>> Measured(0.1, 0.25, 12.0, 62.0, math.nan, math.nan, math.nan).motor_speed
+    >>> Measured(0.1, 0.25, 12.0, 62.0).motor_speed
     12.0
 
     References
@@ -310,9 +326,12 @@ class Measured(NamedTuple):
     motor_angle: float
     motor_speed: float
     motor_torque: float
-    stage: float
-    shaft_torque: float
-    load_speed: float
+    stage: float = math.nan
+    shaft_torque: float = math.nan
+    load_speed: float = math.nan
+    run: float = 1.0
+    set_speed: float = math.nan
+    command_time: float = math.nan
 
 
 class Reply:

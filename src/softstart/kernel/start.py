@@ -7,7 +7,9 @@ import math
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import FAINT, deviation_bound, next_event, peak_within, rounding_of_twist, value
+from softstart.kernel.events import (
+    FAINT, LOST, crossing, deviation_bound, next_event, peak_within, rounding_of_twist, set_line, value,
+)  # fmt: skip
 from softstart.kernel.jit import as_record, compiled_as, inner, separately_compiled
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
@@ -16,7 +18,8 @@ from softstart.kernel.motor import (
 )  # fmt: skip
 from softstart.kernel.records import (
     ANSWER, ASK, AT_EVENTS, AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, BEYOND, BUFFER_FULL, CURVE,
-    ENDED, EVENT_LIMIT, LOWER, MEASURED, MOST_MASSES, MOST_NOTED, NOT_FINITE, NOT_LOCATED, NO_EVENT, N_NOTES,
+    ENDED, EVENT_LIMIT, LOWER, MEASURED, MOST_MASSES, MOST_NOTED, NOTES, NOT_FINITE, NOT_LOCATED, NO_EVENT,
+    N_NOTES,
     OF_MASS, OF_SHAFT, OPEN, PRESSED, SETTLE, SPANS_PER_EVENT, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF,
     S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG, TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE,
     Record,
@@ -27,6 +30,7 @@ _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
 STEP = types.FunctionType(STEP_SIGNATURE)
+ACROSS = 1.0 / 64.0  # of a span, in which the load does not slow down and speed up again
 
 
 @inner
@@ -85,7 +89,12 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     s.sample_time = 0.0
     s.t_end = until if until == math.inf else min(until, s.longest)
     s.start_time = s.release_time = s.first_contact = s.impact_speed = math.nan
-    s.contact_torque = s.stage_2_end = math.nan
+    s.contact_torque = s.stage_2_end = s.settled = s.overshoot = math.nan
+    s.run = 1.0
+    s.command_since = 0.0
+    s.highest_speed = s.w0[s.at_load]
+    if s.regulated != 0.0 and s.band_low <= s.highest_speed <= s.band_high:
+        s.settled = 0.0
     s.braked = 1.0 if s.release_at > 0.0 else 0.0
     s.noted = 0
     begin_modes(s)
@@ -110,6 +119,71 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
         for k in range(s.path, s.path_end):
             if s.half_gap[k] > 0.0:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
+
+
+@separately_compiled(types.float64(WORK_TYPE, types.int64, types.float64, types.float64))
+def leaves_band(s: Record, n: int, begin: float, end: float) -> float:
+    """The first share of the span, in [begin, end], at which the load speed leaves its band; -1 without."""
+    speed = s.speed[s.at_load]
+    set_line(s.f, speed, n, -s.band_low, 1.0)
+    below = crossing(s, 0, n, begin, end)
+    if s.band_high == math.inf:
+        return below
+    set_line(s.f, speed, n, s.band_high, -1.0)
+    above = crossing(s, 0, n, begin, end)
+    return above if below < 0.0 or 0.0 <= above < below else below
+
+
+@inner
+def note_highest_speed(s: Record, n: int, end: float) -> bool:
+    """Note the largest speed of the load up to the share `end` of the span; False if it is not located."""
+    speed = s.speed[s.at_load]
+    s.highest_speed = max(s.highest_speed, value(speed, n, end))
+    for o in range(n):
+        s.f[o] = (o + 1.0) * speed[o + 1]  # the acceleration
+    x = 0.0
+    while x < end:
+        if value(s.f, n - 1, x) <= 0.0:  # it slows down: on to where it speeds up again
+            x += ACROSS * end
+            continue
+        x = crossing(s, 0, n - 1, x, end)
+        if x < 0.0:
+            return x != LOST
+        s.highest_speed = max(s.highest_speed, value(speed, n, x))
+        x += ACROSS * end
+    return True
+
+
+@separately_compiled(types.int64(WORK_TYPE, types.int64, types.float64, types.float64))
+def watch_speed(s: Record, n: int, end: float, h: float) -> int:
+    """Note since when the load speed is in its band, and its largest value, up to a share of the span.
+
+    0 if an instant is not located, else 1. The span is not cut: a start that is watched keeps its bits.
+    """
+    speed = s.speed[s.at_load]
+    deviation = deviation_bound(speed, n)
+    located = True
+    if s.regulated != 0.0 and speed[0] + deviation > s.highest_speed:
+        located = note_highest_speed(s, n, end)
+    if speed[0] < s.band_low or speed[0] > s.band_high:
+        s.settled = math.nan
+    elif math.isnan(s.settled):
+        s.settled = s.time  # after an impact the speed has jumped
+    if s.band_low + deviation < speed[0] < s.band_high - deviation:
+        return 1 if located else 0
+    x = 0.0
+    while True:
+        if math.isnan(s.settled):
+            if value(speed, n, x) < 0.5 * (s.band_low + s.band_high):
+                set_line(s.f, speed, n, s.band_low, -1.0)
+            else:
+                set_line(s.f, speed, n, -s.band_high, 1.0)
+            x = crossing(s, 0, n, x, end)
+        else:
+            x = leaves_band(s, n, x, end)
+        if x < 0.0:
+            return 1 if located and x != LOST else 0
+        s.settled = s.time + x * h if math.isnan(s.settled) else math.nan
 
 
 @inner
@@ -202,6 +276,9 @@ def rate_of(s: Record) -> float:
 @inner
 def last_instant(s: Record) -> float:
     """When the start ends, or is given up because its target speed is not reached."""
+    if s.regulated != 0.0 and s.t_end == math.inf:
+        settled = max(s.settled, s.command_end) + s.dwell
+        return s.time_limit if math.isnan(s.settled) else settled
     return s.time_limit if math.isnan(s.start_time) and s.t_end == math.inf else s.t_end
 
 
@@ -215,6 +292,8 @@ def stop_reason(s: Record, spans: Matrix, events: Matrix) -> int:
     if s.time >= last_instant(s):
         note_excess(s)
         s.final_speed = s.w[s.at_load]
+        s.overshoot = max(s.highest_speed / s.target - 1.0, 0.0) if s.regulated != 0.0 else math.nan
+        s.reached = 0.0 if math.isnan(s.settled if s.regulated != 0.0 else s.start_time) else 1.0
         if s.stage == 2.0:
             s.stage_2_end = s.time
         if s.stage <= 2.0:
@@ -280,6 +359,9 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         if x > 0.0:
             if spans.shape[0] > 0:
                 note_span(s, spans[int(s.n_spans)])
+            begun = s.regulated != 0.0 or not math.isnan(s.start_time)
+            if begun and not math.isnan(s.band_low) and watch_speed(s, n, x, h) == 0:
+                return NOT_LOCATED
             advance_state(s, n, x, x * h)
             if spans.shape[0] > 0:
                 spans[int(s.n_spans), S_END] = s.time
@@ -412,3 +494,10 @@ def run_many(  # type: ignore[no-untyped-def]
         for k in range(s.n - 1):
             for j in range(shaft_notes.shape[2]):
                 shaft_notes[i, k, j] = work[AT_SHAFT_NOTES + MOST_MASSES * j + k]
+        # the torque of a start goes on: whether the load keeps its speed is judged beyond the figures' end
+        if not math.isnan(s.band_low) and s.regulated == 0.0 and s.status == ENDED and s.reached != 0.0:
+            s.t_end = s.start_time + s.dwell
+            if s.t_end > s.time:
+                run_start(step, numbers, sees, work, nothing, nothing, nothing, measured, state, command)
+                if s.status == ENDED:
+                    as_record(notes[i], NOTES).settled = s.settled

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.controller.base import Controller, SetUp, numbers_of
+from softstart.controller.base import Controller, ReadyControllers, SetUp
 from softstart.drive import PARAMETERS, Drive, Limits, Machine
 from softstart.drive.machine_table import MachineTable, each_of
 from softstart.kernel import records as rec
@@ -52,18 +52,24 @@ class Batch:
         until: float | None = None,
         time_limit: float | None = None,
         workers: int = 1,
+        settled: bool = False,
     ) -> StartResults:
         """The results of machines `which[i]` in place i, of several positions the worst; or of all.
 
+        With `settled` starts under torque strategies are followed on until their load has settled.
         The set-ups of the controller serve all places, one each, or as many in a row.
         """
-        ready, sizes = numbers_of(set_ups), self.positions[which]
+        ready, sizes = ReadyControllers.of(set_ups), self.positions[which]
         # all of a million starts are not copied
         single = isinstance(which, slice) and len(self.places) == 1
         each = [slice(None)] if single else self.places[: int(sizes.max(initial=1)), which]
         chosen = (self.starts.take(places) for places in each)
         if time_limit is not None:
             chosen = (starts.with_limits(time_limit) for starts in chosen)
+        if ready.regulations:
+            chosen = (starts.regulated(ready.regulations) for starts in chosen)
+        if settled:
+            chosen = (starts.watched() for starts in chosen)
         results = [run_set_ups(starts, ready, until, workers) for starts in chosen]
         if len(results) == 1:
             return results[0]
@@ -80,10 +86,16 @@ class Batch:
         until: float | None = None,
         time_limit: float | None = None,
         workers: int = 1,
+        settled: bool = False,
     ) -> Figures:
         """Figures by name of the same starts. `base` is M12avg in N m, one or one a start."""
-        results = self.results(set_ups, which, until=until, time_limit=time_limit, workers=workers)
-        return self.read(results, base, which, until)
+        results = self.results(
+            set_ups, which, until=until, time_limit=time_limit, workers=workers, settled=settled
+        )
+        values = self.read(results, base, which, until)
+        if settled and "settled_time" not in values:  # none has settled
+            values["settled_time"] = (np.full(results["settled"].shape, np.nan), "s", "")
+        return values
 
     def read(
         self,

@@ -143,7 +143,7 @@ def check_limits(
 
 def ended(notes: rec.ResultRecord, reason: int, until: float | None, max_events: int, start: str) -> Status:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
-    status = status_of(reason, not math.isnan(notes.start_time), until is not None, notes.braked == 1.0)
+    status = status_of(reason, notes.reached == 1.0, until is not None, notes.braked == 1.0)
     if status.finished:
         return status
     remedy = ""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
+from softstart.controller.base import Regulation
 from softstart.drive import Drive, Machine
 from softstart.drive.machine_table import DriveColumns, each_of
 from softstart.errors import InputError
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
 LAWS: Final = {"no-pull": rec.NO_PULL, "dead-zone": rec.DEAD_ZONE, "modelica": rec.MODELICA}
 LONGEST: Final = 100_000  # elastic periods of one start
 MAX_EVENTS: Final = 1_000_000  # events and control instants of one start
+# a load has settled under a torque strategy where it is below its target speed by this share at most, over so
+# many elastic periods after the start time
+SETTLED_BAND: Final = 0.001
+SETTLING_PERIODS: Final = 5.0
+NOT_REGULATED: Final = (math.nan, 0.0, 0.0)
 SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
 
 
@@ -75,6 +81,29 @@ class KernelInput:
             columns["event_cap"] = max_events
         return replace(self, machines=machines)
 
+    def regulated(self, regulations: Sequence[Regulation | None]) -> KernelInput:
+        """The same under controllers that hold the speed, one for each start or as many in a row."""
+        machines = self.machines.copy()
+        columns = machines.view(rec.MACHINE)[:, 0]
+        each = np.array([NOT_REGULATED if one is None else one for one in regulations], dtype=np.float64)
+        band, end, dwell = np.repeat(each, len(machines) // len(each), axis=0).T
+        columns["regulated"] = np.isfinite(band)
+        columns["band_low"], columns["band_high"] = (
+            (1.0 + sign * band) * columns["target"] for sign in (-1, 1)
+        )
+        columns["command_end"], columns["dwell"] = end, dwell
+        return replace(self, machines=machines)
+
+    def watched(self) -> KernelInput:
+        """The same, with notes of when a load under a torque strategy has settled."""
+        machines = self.machines.copy()
+        columns = machines.view(rec.MACHINE)[:, 0]
+        torque = columns["regulated"] == 0.0
+        columns["band_low"][torque] = (1.0 - SETTLED_BAND) * columns["target"][torque]
+        columns["band_high"][torque] = math.inf
+        columns["dwell"][torque] = SETTLING_PERIODS * columns["period"][torque]
+        return replace(self, machines=machines)
+
 
 def concatenate(inputs: Sequence[KernelInput]) -> KernelInput:
     """Starts in one call; InputError for machines that do not match."""
@@ -114,6 +143,8 @@ def kernel_input(
         made, stiff = _of_chain(cast("Chain", machine), excitation or {})
     named = made.machines.view(rec.MACHINE)[:, 0]
     named["event_cap"] = max_events
+    named["set_speed"] = named["target"]
+    named["band_low"] = math.nan  # not watched
     named["longest"] = np.where(named["period"] > 0.0, LONGEST * named["period"], math.inf)
     longest = named["longest"]
     if time_limit is not None:

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from softstart.kernel import records as rec
+from softstart.start.kernel_input import SETTLED_BAND
 from softstart.start.trajectory import Trajectory
 
 REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
-# share of the target speed by which a load that has settled may still be below it
-SETTLED_BAND = 0.001
 
 
 def settled_time(trajectory: Trajectory, target_speed: float, band: float = SETTLED_BAND) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softstart import formulas
 from softstart.arrays import Matrix, Vector
-from softstart.controller.base import CompiledController, Sensor, SetUp
+from softstart.controller.base import CompiledController, ReadyControllers, Sensor
 from softstart.drive import UNKNOWN_POSITIONS, Limits
 from softstart.kernel import records as rec
 from softstart.kernel import start as kernel
@@ -42,7 +42,11 @@ _COLUMNS = (
     ("torque_excess", "excess", "N*m", "largest excess of the demand over the torque limits"),
     ("torque_excess_time", "excess_time", "s", "how long the demand lay beyond the torque limits"),
 )
-_LATEST = ("start_time", "excess", "excess_time")  # of several positions the largest counts
+_SETTLED = ("settled_time", "settled", "s", "instant from which on the load keeps its speed")
+# where the kernel notes them
+_REGULATED = (_SETTLED, ("overshoot", "overshoot", "1", "share of the target by which the load exceeds it"))
+# of several positions the largest counts
+_LATEST = ("start_time", "settled", "overshoot", "excess", "excess_time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,7 @@ def worst_position(results: Sequence[StartResults]) -> StartResults:
     worst.starts["position"] = which + 1.0
     for name in _LATEST:
         worst.starts[name] = np.max(starts[name], axis=0)
+    worst.starts["reached"] = np.min(starts["reached"], axis=0)
     worst.starts["impact_speed"] = np.fmax.reduce(starts["impact_speed"], axis=0)
     first = np.where(np.isnan(starts["stage_2_end"])[..., None], np.nan, np.abs(shafts["first_peak"]))
     worst.shafts["first_peak"] = np.fmax.reduce(first, axis=0)
@@ -95,24 +100,28 @@ def worst_position(results: Sequence[StartResults]) -> StartResults:
     return worst
 
 
-Ready = tuple[CompiledController, Matrix] | list[SetUp]
-
-
-def run_set_ups(starts: KernelInput, ready: Ready, until: float | None, workers: int = 1) -> StartResults:
-    """The results of starts; set-ups, by `numbers_of`, serve all, one each, or as many in a row."""
+def run_set_ups(
+    starts: KernelInput, ready: ReadyControllers, until: float | None, workers: int = 1
+) -> StartResults:
+    """The results of starts; set-ups serve all, one each, or as many in a row."""
     count = starts.machines.shape[0]
-    if isinstance(ready, tuple):
-        controller, numbers = ready
+    if ready.compiled is not None:
+        numbers = ready.numbers
         if len(numbers) > 1:
             numbers = np.repeat(numbers, count // len(numbers), axis=0)
-        return run_compiled(starts, controller, numbers, until, workers)
+        return run_compiled(starts, ready.compiled, numbers, until, workers)
     notes = np.zeros((count, rec.N_NOTES))
     shafts = np.zeros((count, starts.count - 1), rec.SHAFT_NOTES)
     for i in range(count):
-        plain, drive = ready[i * len(ready) // count]
+        plain, drive = ready.plain[i * len(ready.plain) // count]
         recorder = StartRecorder(starts.take(slice(i, i + 1)), int(plain.sensors), room=0)
-        run_one(plain, drive, recorder, until)
+        reason = run_one(plain, drive, recorder, until)
         notes[i], shafts[i] = recorder.work[: rec.N_NOTES], recorder.of_shafts
+        now = recorder.state
+        end = float(now.start_time + now.dwell)
+        judged = not math.isnan(now.band_low) and now.regulated == 0.0 and reason == rec.ENDED
+        if judged and end > now.time and run_one(plain, drive, recorder, end) == rec.ENDED:  # as `run_many`
+            notes[i : i + 1].view(rec.NOTES)["settled"] = recorder.state.settled
     return StartResults(notes.view(rec.NOTES)[:, 0], shafts)
 
 
@@ -168,7 +177,7 @@ def figures(results: StartResults, base: Vector | float, until: float | None = N
     could not be finished have NaN.
     """
     codes = 4 * results["status"].astype(np.int64) + 2 * (results["braked"] == 1.0)
-    reasons, which = np.unique(codes + ~np.isnan(results["start_time"]), return_inverse=True)
+    reasons, which = np.unique(codes + (results["reached"] == 1.0), return_inverse=True)
     kinds = [status_of(c // 4, bool(c % 2), until is not None, bool(c & 2)) for c in reasons.tolist()]
     finished = np.array([kind.finished for kind in kinds])[which]
 
@@ -191,6 +200,9 @@ def figures(results: StartResults, base: Vector | float, until: float | None = N
     }
     for name, column, unit, meaning in _COLUMNS:
         values[name] = (valid(results[column]), unit, meaning)
+    for name, column, unit, meaning in _REGULATED:
+        if not np.all(np.isnan(results[column])):
+            values[name] = (valid(results[column]), unit, meaning)
     if not np.all(np.isnan(results["release_time"])):
         values["release_time"] = (valid(results["release_time"]), "s", "when the brake was released")
     if np.any(results["position"]):

@@ -22,7 +22,7 @@ from softstart.kernel import records as rec
 from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.engine import run_one
-from softstart.start.kernel_input import MAX_EVENTS
+from softstart.start.kernel_input import MAX_EVENTS, SETTLING_PERIODS
 from softstart.start.status import Status, status_of
 from softstart.start.trajectory import StartRecorder, Trajectory
 
@@ -39,7 +39,6 @@ EVENT_NAMES = {
 OF_MOTOR = {rec.STARTS: "motor starts", rec.STOPS: "motor stops"}
 OF_GEAR = {rec.STARTS: "gear lets go", rec.STOPS: "gear holds"}
 PLOT_POINTS = 1500
-SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a load must keep its speed
 
 
 class Event(NamedTuple):
@@ -304,13 +303,27 @@ class Run(Result, view="starts.run_sheet"):
 
     @cached_property
     def settled_time(self) -> float:
-        """From when on the load keeps its speed, not below 99.9 % of the target, s; NaN if it does not.
+        """From when on the load keeps its speed, s; NaN if it does not.
 
-        Never before the start time. It is judged over five elastic periods after that, for which the run is
-        computed further where it is shorter. See `metrics.settled_time` for the definition.
+        Under a strategy that holds the speed: within 2 % of the target, to the end of the run. Under a torque
+        strategy: not below 99.9 % of the target, and never before the start time. This is judged over five
+        elastic periods after that, for which the run is computed further where it is shorter; see
+        `metrics.settled_time`.
         """
+        if self.regulated:
+            return self._worst(lambda run: float(run.trajectory.notes.settled))
         target = float(self.drive.target_speed)
         return self._worst(lambda run: metrics.settled_time(run._continued.trajectory, target))
+
+    @property
+    def regulated(self) -> bool:
+        """Whether the strategy holds the speed, so that the load settles in a band on both sides of it."""
+        return bool(self.trajectory.input.machine.regulated)
+
+    @property
+    def overshoot(self) -> float:
+        """Share of the target speed by which the load exceeds it at most; NaN under a torque strategy."""
+        return self._worst(lambda run: float(run.trajectory.notes.overshoot))
 
     @property
     def settling_end(self) -> float:

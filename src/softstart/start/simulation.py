@@ -158,7 +158,10 @@ def simulate(
     ready, design = (None, None) if strategy is None else strategy.set_up((fitted or machine).design_drive)
     start = f"{machine.name}, controller {'no motor torque' if ready is None else label_of(ready)}"
     runs = {}
+    regulation = None if ready is None or design is None else ready.regulation(design)
     for name, machine_input in inputs.items():
+        if regulation is not None:
+            machine_input = machine_input.regulated([regulation])  # noqa: PLW2901
         recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
         reason = run_one(ready, design, recorder, until)
         status = ended(recorder.state, reason, until, max_events, start)

@@ -13,9 +13,9 @@ from softstart.drive.data_sheet_words import BAND
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import Sentence
 from softstart.start.comparison import SOFT_END, Comparison
-from softstart.start.metrics import SETTLED_BAND
+from softstart.start.kernel_input import SETTLED_BAND, SETTLING_PERIODS
 from softstart.start.recommendation import Recommendation, Row, checked_limits, margins_of
-from softstart.start.run import SETTLING_PERIODS, Run, Stage
+from softstart.start.run import Run, Stage
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
 from softstart.views.numbers import DataColumn, TextTable, label, number, short, with_unit
