@@ -62,6 +62,7 @@ class Effort(Enum):
     ----------
     CONTACTOR : any contactor does it.
     RAMPS : any inverter or soft starter with torque ramps.
+    SPEED : any inverter with closed-loop speed control: speed ramp, gains, torque limit.
     STEPS : an inverter with torque steps, and the motor's speed to time them by.
     CODE : code of the user in the inverter, that measures speed and current at most. The default.
     ENCODER : the same with an encoder on the motor and a model of the drive.
@@ -77,6 +78,7 @@ class Effort(Enum):
 
     CONTACTOR = "contactor", "a contactor"
     RAMPS = "ramps", "an inverter with torque ramps"
+    SPEED = "speed", "an inverter with closed-loop speed control"
     STEPS = "steps", "an inverter with torque steps"
     CODE = "code", "code of your own in the inverter"
     ENCODER = "encoder", "code of your own in the inverter, and an encoder"
@@ -155,7 +157,8 @@ DECLARED: dict[str, tuple[type | UnionType, str]] = {
     "sensors": (Sensor, "Sensor.STAGE, Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |"),
     "effort": (Effort | None, "one of Effort, as Effort.RAMPS"),
     "needs": (tuple, 'names of parameters with commas after them, as ("time",)'),
-    "saturates": (bool, "True or False"),
+    **dict.fromkeys(("saturates", "can_stop", "can_reverse"), (bool, "True or False")),
+    "time_parameter": (str, "the name of a parameter in quotes"),
 }
 
 
@@ -175,6 +178,9 @@ class Controller:
     needs : parameters of which one must be given, as no drive implies it.
     saturates : whether it relies on the torque limits of the drive to cut off its demand, as a feedback may.
         Then tables do not mention a demand beyond them; `Run.clipped` has it always.
+    can_stop, can_reverse : whether it follows a command to stop, and one to run the other way.
+    time_parameter : the parameter that sets how long a start takes, which comparisons at equal time vary; by
+        default there is none.
 
     Examples
     --------
@@ -191,6 +197,9 @@ class Controller:
     effort: ClassVar[Effort | None] = None
     needs: ClassVar[tuple[str, ...]] = ()
     saturates: ClassVar[bool] = False
+    can_stop: ClassVar[bool] = False
+    can_reverse: ClassVar[bool] = False
+    time_parameter: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         wrong = [

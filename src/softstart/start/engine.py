@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -22,7 +23,6 @@ from softstart.controller.base import (
     label_of,
     reply_of,
 )
-from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.kernel.motor import M_TIME, NEW_STATE
@@ -72,45 +72,70 @@ def _watch() -> None:
                 print(sentence, file=sys.stderr, flush=True)
 
 
-def run_one(controller: Controller | None, drive: Any, recorder: StartRecorder, until: float | None) -> int:
+def run_one(
+    controller: Controller | None,
+    drive: Any,
+    recorder: StartRecorder,
+    until: float | None,
+    changes: Sequence[tuple[Any, int, Any]] = (),
+) -> int:
     """A start from its beginning to `until`; returns why it ended. Without a controller the motor is off.
 
-    `drive` is the one for which the (fitted) controller is set up.
+    `drive` is the one for which the (fitted) controller is set up; `changes` of command are (s, run, rad/s).
     """
-    sees = 0 if controller is None else controller.sensors
-    recorder.begin(math.inf if until is None else float(until), bool(sees & Sensor.STAGE))
-    if isinstance(controller, CompiledController):
-        return _run_compiled(controller, drive, recorder)
+    end = math.inf if until is None else float(until)
+    on_gap = controller is not None and bool(controller.sensors & Sensor.STAGE)
+    recorder.begin(changes[0][0] if changes else end, on_gap)
     if controller is None:
         recorder.state.ask_at = math.inf
-    elif not isinstance(controller, PlainController):
+    segment = _segment(controller, drive, recorder)
+    reason = segment()
+    ends = [*(at for at, *_ in changes[1:]), end]
+    for (_, run, set_speed), following in zip(changes, ends, strict=False):
+        if reason != rec.ENDED:
+            break
+        now = recorder.state
+        now.run, now.set_speed, now.command_since, now.t_end = run, set_speed, now.time, following
+        reason = segment()
+    recorder.state.status = reason
+    return reason
+
+
+def _segment(controller: Controller | None, drive: Any, recorder: StartRecorder) -> Callable[[], int]:
+    """A function that goes on to the end that is set in the recorder, and returns why it came back."""
+    if isinstance(controller, CompiledController):
+        numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, for the kernel
+        memory = np.zeros(controller.state_size)
+        command = np.zeros(NEW_STATE + controller.state_size)
+        step = controller.compiled_kernel()
+
+        def compiled() -> int:
+            with watched(controller):
+                while (reason := recorder.run(step, numbers, memory, command)) == rec.BUFFER_FULL:
+                    recorder.grow()
+            return reason
+
+        return compiled
+    if controller is not None and not isinstance(controller, PlainController):
         raise InputError(
             f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
         )
     state = tuple(controller.initial_state) if controller else ()
-    while True:
-        reason = recorder.advance()
-        if reason == rec.BUFFER_FULL:
-            recorder.grow()
-        elif reason == rec.ASK and controller:
-            recorder.measure()
-            torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
-            reason = recorder.answer(torque, ask_again, slope)
-        if reason not in (rec.ASK, rec.BUFFER_FULL):
-            recorder.state.status = reason
-            return reason
 
+    def plain() -> int:
+        nonlocal state
+        while True:
+            reason = recorder.advance()
+            if reason == rec.BUFFER_FULL:
+                recorder.grow()
+            elif reason == rec.ASK and controller:
+                recorder.measure()
+                torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
+                reason = recorder.answer(torque, ask_again, slope)
+            if reason not in (rec.ASK, rec.BUFFER_FULL):
+                return reason
 
-def _run_compiled(controller: CompiledController, drive: Drive, recorder: StartRecorder) -> int:
-    """The same under a compiled controller: the loop itself runs in the kernel."""
-    numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, as the kernel wants it
-    memory = np.zeros(controller.state_size)
-    command = np.zeros(NEW_STATE + controller.state_size)
-    step = controller.compiled_kernel()
-    with watched(controller):
-        while (reason := recorder.run(step, numbers, memory, command)) == rec.BUFFER_FULL:
-            recorder.grow()
-    return reason
+    return plain
 
 
 def plain_answer(controller: PlainController, measured: Vector, state: tuple[float, ...]) -> WholeReply:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypedDict, Unpack, overload
 
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
-from softstart.controller.base import label_of
+from softstart.controller.base import Controller, label_of
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
+from softstart.quantities import number_in, show
 from softstart.start.batch import Machines, simulate_many
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.engine import check_limits, ended, run_one
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 DEFAULT_DRIVE = "crane-4amtkf"
 Time = float | str | None  # s, or with a unit
+DriveCommand = tuple[float | str, int, float | str]  # time, run, set speed
 
 
 class SimulateOptions(TypedDict, total=False):
@@ -37,6 +39,7 @@ class SimulateOptions(TypedDict, total=False):
     time_limit: Time
     max_events: int
     excitation: Mapping[str | int, PeriodicTorque] | None
+    commands: Sequence[DriveCommand]
     workers: int | None
 
 
@@ -64,6 +67,7 @@ def simulate(
     time_limit: Time = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, PeriodicTorque] | None = None,
+    commands: Sequence[DriveCommand] = (),
     workers: int | None = None,
 ) -> Run | xarray.Dataset:
     """Simulate the start of a drive under a controller, exactly.
@@ -105,6 +109,10 @@ def simulate(
     excitation : mapping, optional
         Periodic torques, N m, by the names (or indices) of the masses on which they act, each at the speed
         of its own shaft; of a single chain.
+    commands : sequence of (time, run, set_speed), optional
+        Changes of what the drive is commanded, which the controller sees at its next sample: time in s, run 1
+        or 0 (stop), set speed in rad/s. Before the first one it is (0, 1, target speed). Of a single machine,
+        with `until`; a strategy that cannot stop or reverse refuses such a command.
     workers : int, optional
         How many threads compute many starts. By default one for each processor.
 
@@ -143,6 +151,8 @@ def simulate(
     fitted, reference = _beside("fitted_to", fitted_to, machine), _beside("base", base, machine)
     if excitation and not isinstance(machine, Chain):
         raise InputError("excitation: it acts on the masses of one chain; start several one at a time.")
+    if commands and not isinstance(machine, Machine):
+        raise InputError("commands: they are of one machine; start several one at a time.")
     if not isinstance(machine, Machine):
         listed = machine.parts if isinstance(machine, MachineTable) else machine
         if not (listed and all(isinstance(each, Machine) for each in listed)):
@@ -158,12 +168,13 @@ def simulate(
     ready, design = (None, None) if strategy is None else strategy.set_up((fitted or machine).design_drive)
     start = f"{machine.name}, controller {'no motor torque' if ready is None else label_of(ready)}"
     runs = {}
+    changes = check_commands(commands, strategy, machine, until)
     regulation = None if ready is None or design is None else ready.regulation(design)
     for name, machine_input in inputs.items():
         if regulation is not None:
             machine_input = machine_input.regulated([regulation])  # noqa: PLW2901
         recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
-        reason = run_one(ready, design, recorder, until)
+        reason = run_one(ready, design, recorder, until, changes)
         status = ended(recorder.state, reason, until, max_events, start)
         runs[name] = Run(positions[name], ready, reference, status, recorder.finished(), design)
     return worst_run(runs, machine) if len(runs) > 1 else next(iter(runs.values()))
@@ -182,6 +193,38 @@ def _beside(name: str, other: object, machines: object) -> Machine | MachineTabl
             )
         return other
     return as_machine(other, name)
+
+
+def check_commands(
+    commands: Sequence[DriveCommand], controller: Controller | None, machine: Machine, until: float | None
+) -> list[DriveCommand]:
+    """The changes of command, in SI; InputError for those that the controller cannot follow."""
+    if not commands:
+        return []
+    if controller is None or until is None:
+        missing = "controller" if controller is None else "until"
+        raise InputError(
+            f"commands: {missing} is missing; commands change what a controller follows until then."
+        )
+    name, last, changes = label_of(controller), 0.0, list[DriveCommand]()
+    for time, run, set_speed in commands:
+        where = f"commands: ({show(time)}, {show(run)}, {show(set_speed)})"
+        at, speed = number_in("s", time, "commands"), number_in("rad/s", set_speed, "commands")
+        if not last < at < until:
+            raise InputError(f"{where}: times rise from 0 to the end of the run at {until:g} s.")
+        if run not in (0, 1):
+            raise InputError(f"{where}: run is 1, or 0 to stop.")
+        if run == 0 and not controller.can_stop:
+            raise InputError(
+                f"{where}: {name} cannot stop the drive; use a strategy that can, as speed-ramp."
+            )
+        if run == 1 and speed * (machine.target_speed or 1.0) < 0.0 and not controller.can_reverse:
+            raise InputError(
+                f"{where}: {name} cannot reverse the drive; use a strategy that can, as speed-ramp."
+            )
+        changes.append((at, int(run), speed))
+        last = at
+    return changes
 
 
 def check_end(machine: Machine, controller: object, until: float | None, start: KernelInput) -> None:
