@@ -214,14 +214,10 @@ def check_commands(
             raise InputError(f"{where}: times rise from 0 to the end of the run at {until:g} s.")
         if run not in (0, 1):
             raise InputError(f"{where}: run is 1, or 0 to stop.")
-        if run == 0 and not controller.can_stop:
-            raise InputError(
-                f"{where}: {name} cannot stop the drive; use a strategy that can, as speed-ramp."
-            )
-        if run == 1 and speed * (machine.target_speed or 1.0) < 0.0 and not controller.can_reverse:
-            raise InputError(
-                f"{where}: {name} cannot reverse the drive; use a strategy that can, as speed-ramp."
-            )
+        reverses = run == 1 and speed * (machine.target_speed or 1.0) < 0.0
+        if (run == 0 and not controller.can_stop) or (reverses and not controller.can_reverse):
+            verb = "reverse" if reverses else "stop"
+            raise InputError(f"{where}: {name} cannot {verb} the drive; use one that can, as speed-ramp.")
         changes.append((at, int(run), speed))
         last = at
     return changes
