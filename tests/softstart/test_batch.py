@@ -62,8 +62,8 @@ def test_comparison_rows_are_the_single_starts() -> None:
         CRANE, ["direct", "reduced-two-stage"], parameters={"reduced-two-stage": {"torque": 15.5}}
     )
     direct, reduced = table.rows
-    assert direct.time_lost == 0.0
-    assert reduced.time_lost == reduced.run.start_time - direct.run.start_time
+    assert direct.settled_lost == 0.0
+    assert reduced.settled_lost == reduced.run.settled_time - direct.run.settled_time
     worn = simulate(CRANE.replace(gap=2.0), "reduced-two-stage", parameters={"torque": 15.5}, fitted_to=CRANE)
     assert reduced.k_dyn_worn_gap == pytest.approx(worn.k_dyn, rel=1e-12)
     light = Drive.load("crane-4amtkf-light")

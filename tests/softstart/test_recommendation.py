@@ -125,8 +125,8 @@ def test_with_limits_the_simplest_that_keeps_them_in_the_worst_case():
     drive = CRANE.replace(permissible_torque=180.0, permissible_start_time=0.6)
     found = compare(drive)
     chosen = found.recommendation.recommended
-    worn = simulate(CRANE.with_gap(2.0), "acceleration-delay", fitted_to=CRANE, base=CRANE)
-    assert chosen.name == "acceleration-delay"
+    worn = simulate(CRANE.with_gap(2.0), "speed-ramp", fitted_to=CRANE, base=CRANE)
+    assert chosen.name == "speed-ramp"
     torque, time = chosen.margins(drive.limits)
     assert (torque.case, torque.value) == ("gap x4", worn.peak_torque)
     assert torque.share == pytest.approx(1.0 - worn.peak_torque / 180.0)

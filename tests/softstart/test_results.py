@@ -78,7 +78,7 @@ def test_a_result_draws_its_main_panel_on_given_axes():
     assert run.plot(ax=left) is figure
     assert both.plot(ax=right) is figure
     assert left.get_ylabel() == "torque, N m"
-    assert right.get_xlabel() == "start time, s"
+    assert right.get_xlabel() == "settled time, s"
     assert len(both.plot().axes) == 2
     with pytest.raises(InputError, match=r"^ax: the figure of Fatigue has several axes; leave ax out"):
         fatigue([run]).plot(ax=left)

@@ -237,6 +237,10 @@ class Controller:
         """
         return None
 
+    def doubts(self, drive: Drive) -> list[str]:
+        """What an engineer should know of these settings, a sentence each; called on a fitted controller."""
+        return []
+
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller with every parameter a number, and the drive whose numbers it works with.
 

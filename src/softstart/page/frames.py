@@ -373,16 +373,17 @@ def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[s
 
 def figure_view(session: Session, result: Strategy) -> Frame:
     """The large figure and the numbers around it."""
-    run, units = result.run, session.inputs.units
+    run, units, known = result.run, session.inputs.units, session.row(result.name)
     facts = outcomes(result) | {
-        "time_lost": json_number(session.time_lost(result)),
+        "settled_lost": None if known is None else json_number(known.settled_lost),
         "status": result.status,
         "base": json_number(float(session.inputs.machine.mean_torque)),
         "speed_unit": units.of("rad/s"),
     }
     if run is not None:
         facts |= {
-            "reached": math.isfinite(run.start_time),
+            "reached": math.isfinite(run.limited_time),
+            "overshoot": json_number(100.0 * run.overshoot),
             "output_torque": json_number(run.peak_torque_at_output),
             "contacts": run.contacts,
             "impact_speed": json_number(units.shown(run.impact_speed, "rad/s")),
@@ -402,18 +403,19 @@ def outcomes(result: Strategy) -> Frame:
 
 
 def row(session: Session, result: Strategy) -> Frame:
-    """One line of the table; `worn`, `soft`, `settled`, `limits`, `flag` are empty until computed."""
-    line = outcomes(result) | {
-        "time_lost": json_number(session.time_lost(result)),
-        "trouble": result.trouble or ("" if math.isfinite(result.start_time) else result.status),
-    }
+    """One line of the table; `worn`, `soft`, times of settling, `limits`, `flag` are empty until computed."""
+    time = math.nan if result.run is None else result.run.limited_time
+    line = outcomes(result) | {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
     known = session.row(result.name)
     if known is None:
-        return line | {"worn": None, "soft": None, "settled": None, "limits": "", "flag": ""}
+        empty = dict.fromkeys(("worn", "soft", "settled", "settled_lost", "overshoot"))
+        return line | empty | {"limits": "", "flag": ""}
     return line | {
         "worn": json_number(known.k_dyn_worn_gap),
         "soft": json_number(known.cases[SOFT_END].k_dyn) if SOFT_END in known.cases else None,
         "settled": json_number(known.run.settled_time),
+        "settled_lost": json_number(known.settled_lost),
+        "overshoot": json_number(100.0 * known.run.overshoot),
         "limits": known.against_limits,
         "flag": ", ".join(flag.word for flag in known.flags),
         "trouble": line["trouble"] or "; ".join(flag.text for flag in known.flags),

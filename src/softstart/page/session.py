@@ -62,6 +62,11 @@ class Strategy:
         return math.nan if self.run is None else self.run.start_time
 
     @property
+    def settled_time(self) -> float:
+        """From when on the load keeps its speed, s; NaN if it does not."""
+        return math.nan if self.run is None else self.run.settled_time
+
+    @property
     def peak_torque(self) -> float:
         """Largest |T| in N m."""
         return math.nan if self.run is None else self.run.peak_torque
@@ -353,9 +358,9 @@ class Session:
             self._change(reference=new)
 
     def select_lowest_k_dyn(self) -> None:
-        """Select the strategy with the lowest K_dyn of those that reach the target speed in good time."""
-        latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.start_time)
-        timely = [strategy for strategy in self.strategies if strategy.start_time <= latest]
+        """Select the strategy with the lowest K_dyn of those that settle in good time."""
+        latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.settled_time)
+        timely = [strategy for strategy in self.strategies if strategy.settled_time <= latest]
         if timely:
             self.select(min(timely, key=lambda strategy: strategy.k_dyn).name)
 
@@ -437,11 +442,6 @@ class Session:
                 run = None
             self._direct = machine, run
         return self._direct[1]
-
-    def time_lost(self, strategy: Strategy) -> float:
-        """Start time over that of `direct`, s; NaN where one of them is."""
-        direct = self.direct()
-        return strategy.start_time - (math.nan if direct is None else direct.start_time)
 
     def close(self) -> None:
         """Release all results and listeners: the user has gone."""

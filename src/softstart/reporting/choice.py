@@ -19,6 +19,7 @@ from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row
+from softstart.start.results import limited_time
 
 GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
 INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
@@ -30,7 +31,8 @@ class RobustnessMap(OneLine):
     """K_dyn and start time (s) of one strategy: a row per gap (rad), a column per load inertia (kg m2).
 
     K_dyn refers to the mean torque of the nominal drive, so that it compares shaft torques. NaN where the
-    start was not finished or the load did not reach its target speed.
+    start was not finished or the load did not reach its target speed. Under a strategy that holds the speed
+    `start_time` is the settled time.
     """
 
     gaps: tuple[float, ...]
@@ -62,8 +64,8 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     many = varied(drive, {"gap": np.array(gaps)[:, None], "load_inertia": np.array(inertias)[None, :]})
     found = prepared(many).figures(controller.set_ups(drive), drive.mean_torque)
     k_dyn, time = (
-        np.asarray(found[name][0], dtype=np.float64).reshape(len(gaps), len(inertias))
-        for name in ("k_dyn", "start_time")
+        np.asarray(values, dtype=np.float64).reshape(len(gaps), len(inertias))
+        for values in (found["k_dyn"][0], limited_time(found))
     )
     return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k_dyn), time)
 

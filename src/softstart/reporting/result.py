@@ -150,7 +150,7 @@ class Report(Result):
         """The strategies by K_dyn; those that do not reach the target speed last."""
 
         def place(row: Row) -> tuple[bool, float]:
-            return math.isnan(row.run.start_time), float(f"{row.run.k_dyn:.9g}")
+            return math.isnan(row.run.limited_time), float(f"{row.run.k_dyn:.9g}")
 
         return sorted(self.comparison.rows, key=place)
 
@@ -222,11 +222,13 @@ class Report(Result):
             "chosen": best.name if best else None,
             "k_dyn": best.run.k_dyn if best else None,
             "start_time": best.run.start_time if best else None,
+            "settled_time": best.run.settled_time if best else None,
             "peak_torque": best.run.peak_torque if best else None,
             "k_dyn_lower_bound": self.lower_bound(best) if best else None,
             "k_dyn_lowest_known": self.lowest_known(best) if best else None,
             "k_dyn_direct": direct.k_dyn,
             "start_time_direct": direct.start_time,
+            "settled_time_direct": direct.settled_time,
             "ordinary": plain.name if plain else None,
             "k_dyn_ordinary": plain.run.k_dyn if plain else None,
             "strategies": [
@@ -358,7 +360,7 @@ def report(
 
     curve = limit(
         machine,
-        [row.run.start_time for row in choice.of_sheets],
+        [row.run.start_time for row in choice.of_sheets if not math.isnan(row.run.start_time)],
         [row.run.start_time for row in rows if not math.isnan(row.run.start_time)],
         choice.direct.run.start_time,
         budget,

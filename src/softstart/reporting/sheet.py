@@ -21,6 +21,7 @@ from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
+from softstart.start.results import limited_time
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.numbers import RPM, decimals_of, digits, fixed, short, unit
@@ -148,11 +149,11 @@ class ParameterSheet(OneLine):
     What is shown of any result is a `softstart.views.sheet.Sheet`, what is known of a drive a `DataSheet`.
 
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
-    largest K_dyn, `slowest` the longest start time (s) of `variants` starts in which the rounded values are
-    half a step off, all combinations if `corners`, else each alone and all together; NaN if one of them
-    fails. `moved` names settings that are not at their nearest step, because the
-    rule by which the strategy was chosen would not hold there; where it holds nowhere near, there is no start
-    with rounded values, and `failure` says why. `own` is the drive whose numbers the strategy works with,
+    largest K_dyn, `slowest` the longest `Run.limited_time` (s) of `variants` starts in which the rounded
+    values are half a step off, all combinations if `corners`, else each alone and all together; NaN if one
+    of them fails. `moved` names settings that are not at their nearest step, because the rule by which
+    the strategy was chosen would not hold there; where it holds nowhere near, there is no start with rounded
+    values, and `failure` says why. `own` is the drive whose numbers the strategy works with,
     `computes_with` says with which of them. `torque_step` (N m) is that of the inverter. `full_rise` is a
     ramp by its time from 0 to 100 % of torque, s, `gear_ramp` by the rate that a DCS 500B counts.
     """
@@ -211,6 +212,8 @@ class ParameterSheet(OneLine):
             "k_dyn_rounded": self.rounded.k_dyn if self.rounded else None,
             "start_time": self.exact.start_time,
             "start_time_rounded": self.rounded.start_time if self.rounded else None,
+            "settled_time": self.exact.settled_time,
+            "settled_time_rounded": self.rounded.settled_time if self.rounded else None,
             "k_dyn_half_a_step_off": self.worst_k_dyn,
             "start_time_half_a_step_off": self.slowest,
             "time_0_to_100_percent": self.full_rise.summary() if self.full_rise else None,
@@ -362,10 +365,10 @@ def _half_steps_off(
     values = [{v.name: v.beside(0.5 * side) for v, side in zip(varied, one, strict=True)} for one in sides]
     set_ups = [(replace(ready, **one), sheet.own) for one in values]
     found = prepared([machine]).figures(set_ups, machine.mean_torque, np.zeros(len(sides), dtype=np.int64))
-    time = np.asarray(found["start_time"][0], dtype=np.float64)
+    time = limited_time(found)
     k_dyn = np.where(np.isnan(time), np.nan, found["k_dyn"][0])
     # the values as they are set are among what may be
-    worst, slowest = np.maximum((np.max(k_dyn), np.max(time)), (rounded.k_dyn, rounded.start_time))
+    worst, slowest = np.maximum((np.max(k_dyn), np.max(time)), (rounded.k_dyn, rounded.limited_time))
     return replace(
         sheet, variants=len(sides), corners=corners, worst_k_dyn=float(worst), slowest=float(slowest)
     )

@@ -35,7 +35,7 @@ WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
 LEFT_POSSIBLE = "the upper end of 95 %"  # the case of a row whose drive is known within intervals
 SOFT_END = f"elastic frequency {BAND[0]:g} Hz"  # the case of a row whose drive is of unknown stiffness
-UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque", "start_time")
+UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque")
 FEWEST_KNOWN: Final = 0.9  # of the drives drawn whose start must have such a figure
 
 
@@ -68,12 +68,15 @@ def intervals(
 ) -> dict[str, tuple[float, float]]:
     """The interval of 95 % of K_dyn, peak torque and start time over drives that are left possible.
 
-    The controller is set up as in `run`; each K_dyn refers to the mean torque of its own drive. Where the
-    life of the shaft line is limited, `used_life` in % too.
+    Under a strategy that holds the speed it is the settled time instead of the start time. The controller is
+    set up as in `run`; each K_dyn refers to the mean torque of its own drive. Where the life of the shaft
+    line is limited, `used_life` in % too.
     """
     starts = simulate(drawn, controller, until, fitted_to=fitted_to or run.drive)
-    every = {name: np.asarray(starts[name]) for name in UNCERTAIN_FIGURES}
-    middle = {name: float(getattr(run, name)) for name in UNCERTAIN_FIGURES}
+    names = (*UNCERTAIN_FIGURES, "settled_time" if run.regulated else "start_time")
+    none = np.full(drawn.shape, math.nan)  # where none has settled
+    every = {name: np.asarray(starts.get(name, none)) for name in names}
+    middle = {name: float(getattr(run, name)) for name in names}
     if checked_limits(run.drive).life is not None:
         one = (
             simulate(each, controller, until, fitted_to=fitted_to or run.drive) for each in drawn.elements()
@@ -100,7 +103,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
     drive : Drive or Chain
         The drive, or the chain, that is started.
     rows : tuple of Row
-        One for each strategy, in the order given: its `run`, `time_lost` (s), `k_dyn_worn_gap`,
+        One for each strategy, in the order given: its `run`, `settled_lost` (s), `k_dyn_worn_gap`,
         `k_dyn_light_load`, `flags`, and the `margins` to limits.
     fitted_to : Drive or None
         The drive for which the strategies are set up, None where that is `drive` itself.
@@ -297,7 +300,7 @@ def compared(
         return Row(run, direct, cases, worst_case)
     found = intervals(run, drawn, controller, until, fitted_to)
     own = Case.of(run)
-    upper = {name: ends[1] for name, ends in found.items()}
+    upper = {name.replace("settled", "start"): ends[1] for name, ends in found.items()}
     cases[LEFT_POSSIBLE] = Case(**{"used_life": own.used_life, **upper})
     return Row(run, direct, cases, (*worst_case, LEFT_POSSIBLE), intervals=found)
 

@@ -452,7 +452,7 @@ def life_ratio(reference: float, damage: float) -> float:
 
 def _again(run: Run, machine: Machine) -> Run:
     """The same start of a changed machine, its controller as it was set up."""
-    until = max(one.end_time for one in run.each) if math.isnan(run.start_time) else None
+    until = max(one.end_time for one in run.each) if math.isnan(run.limited_time) else None
     return simulate(machine, run.controller, until, fitted_to=run.design_drive, base=run.base)
 
 

@@ -42,6 +42,7 @@ class Flag:
 class Case:
     """A start on a drive that has changed: N m, s, NaN where it fails; K_dyn over the mean torque before.
 
+    `start_time` is the time that a limit on it bounds (`Run.limited_time`).
     `used_life`: what the starts that the shaft line must last use of its life, %; `used_torque`: what the
     start uses of the permissible torques of a chain's shafts, %. 0 where no limit asks.
     """
@@ -60,7 +61,7 @@ class Case:
         limits, used = checked_limits(run.drive), 0.0
         if limits.life is not None and limits.fatigue is not None:
             used = 100.0 * (limits.starts or 0.0) * worst_damage(run, limits.fatigue).damage
-        return Case(run.k_dyn, run.peak_torque, run.start_time, used, run.used_torque)
+        return Case(run.k_dyn, run.peak_torque, run.limited_time, used, run.used_torque)
 
 
 @dataclass(frozen=True)
@@ -171,11 +172,6 @@ class Row(OneLine):
         return effort_of(self.controller)
 
     @property
-    def time_lost(self) -> float:
-        """Start time over that of `direct`, s."""
-        return float(self.run.start_time) - (math.nan if self.direct is None else self.direct.start_time)
-
-    @property
     def settled_lost(self) -> float:
         """Settled time over that of `direct`, s."""
         return float(self.run.settled_time) - (math.nan if self.direct is None else self.direct.settled_time)
@@ -202,12 +198,13 @@ class Row(OneLine):
     def margins(self, limits: Limits) -> tuple[Margin, ...]:
         """The margin to each limit, in the worst of the drive as it is and of `worst_case`."""
         own = {"": self._own, **{case: self.cases[case] for case in self.worst_case}}
-        found = []
+        found, names = [], {"start_time": self.run.limited_name}
         for limit in limits.each:
             values = {case: float(getattr(one, limit.figure)) for case, one in own.items()}
             # of values that are equal but for rounding that of the machine as it is
             worst = max(values, key=lambda case: (math.isnan(values[case]), float(f"{values[case]:.12g}")))
-            found.append(Margin(limit, values[worst], worst))
+            named = replace(limit, name=names.get(limit.figure, limit.name))
+            found.append(Margin(named, values[worst], worst))
         return tuple(found)
 
     @property
@@ -232,7 +229,6 @@ class Row(OneLine):
         limits = checked_limits(self.run.drive)
         return {
             **self.run.summary(),
-            "time_lost": self.time_lost,
             "settled_time_lost": self.settled_lost,
             "k_dyn_worn_gap": self.k_dyn_worn_gap,
             "k_dyn_light_load": self.k_dyn_light_load,
@@ -253,10 +249,13 @@ def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
     Slow is what takes more than twice as long as `direct` until the load has settled, unless the drive has a
     limit on the start time, which then decides.
     """
-    if math.isnan(run.start_time):
+    if math.isnan(run.start_time) and not run.regulated:
         return (Flag("no start", "does not reach the target speed"),)
     found = []
-    if math.isnan(run.settled_time):
+    if math.isnan(run.settled_time) and run.regulated:
+        band = f"{100.0 * run.band:.3g} % of its speed"
+        found.append(Flag("not settled", f"the load does not stay within {band} by {run.end_time:.4g} s"))
+    elif math.isnan(run.settled_time):
         text = f"the load falls below its speed again, not settled within {run.settling_end:.4g} s"
         found.append(Flag("not settled", text))
     if direct is None:

@@ -212,6 +212,15 @@ def figures(results: StartResults, base: Vector | float, until: float | None = N
     return values
 
 
+def limited_time(values: Figures) -> Vector:
+    """What a limit on the start time bounds in each start, s, as `Run.limited_time`."""
+    start_time: Vector = values["start_time"][0]
+    if "overshoot" not in values:  # of torque strategies
+        return start_time
+    settled = values["settled_time"][0] if "settled_time" in values else np.full(start_time.shape, np.nan)
+    return np.where(np.isnan(values["overshoot"][0]), start_time, settled)
+
+
 def has_margin(limits: Limits) -> bool:
     """Whether there is a limit of torque or time, of which each start has a margin."""
     return any(limit is not None for limit in (limits.shaft_torque, limits.start_time, limits.used_torque))
@@ -221,8 +230,8 @@ def limit_margins(values: Figures, limits: Limits) -> Figures:
     """What is left of the limits of torque and time in starts with these figures; nothing without limits."""
     if not has_margin(limits):
         return {}
-    judged = ("peak_torque", "used_torque", "start_time")
-    limited = {name: values[name][0] for name in judged if name in values}
+    limited: dict[str, Vector] = {"start_time": limited_time(values)}
+    limited |= {name: values[name][0] for name in ("peak_torque", "used_torque") if name in values}
     margin = np.where(np.isnan(limited["start_time"]), np.nan, limits.margin(limited))
     return {
         "margin": (margin, "1", "smallest remaining share of the limits of shaft torque and start time"),

@@ -153,8 +153,8 @@ class Run(Result, view="starts.run_sheet"):
         <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
         """
         known = f"K_dyn {self.k_dyn:.3f}" if self._has_base else f"peak torque {self.peak_torque:.4g} N m"
-        reached = not math.isnan(self.start_time)
-        outcome = f"start time {self.start_time:.4f} s" if reached else self.status.value
+        reached = not math.isnan(self.limited_time)
+        outcome = f"{self.limited_name} {self.limited_time:.4f} s" if reached else self.status.value
         return f"<Run: {self.controller_name} on {self.drive.name}, {known}, {outcome}>"
 
     @property
@@ -324,6 +324,25 @@ class Run(Result, view="starts.run_sheet"):
     def overshoot(self) -> float:
         """Share of the target speed by which the load exceeds it at most; NaN under a torque strategy."""
         return self._worst(lambda run: float(run.trajectory.notes.overshoot))
+
+    @property
+    def band(self) -> float:
+        """Share of the target speed within which the load settles under a strategy that holds the speed."""
+        target = float(self.drive.target_speed)
+        return float(self.trajectory.input.machine.band_high) / target - 1.0 if self.regulated else math.nan
+
+    @property
+    def limited_time(self) -> float:
+        """What a limit on the start time bounds, s: the settled time under a strategy that holds the speed.
+
+        Such a load may settle without passing its target. Under a torque strategy it is the start time.
+        """
+        return self.settled_time if self.regulated else self.start_time
+
+    @property
+    def limited_name(self) -> str:
+        """Its name: "start time" or "settled time"."""
+        return "settled time" if self.regulated else "start time"
 
     @property
     def settling_end(self) -> float:
@@ -579,6 +598,7 @@ class Run(Result, view="starts.run_sheet"):
             "stages": int(self._notes.stage),
             "events": len(self.trajectory.events),
             "settled_time": self.settled_time,
+            **({"overshoot": self.overshoot} if self.regulated else {}),
             "torque_settling_time": self.settling_time() if known else None,
             "energy": {**asdict(self.energy), "dissipated": self.energy.dissipated},
             "end_time": self.end_time,

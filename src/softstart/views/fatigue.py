@@ -103,7 +103,7 @@ def fatigue_conclusion(found: Fatigue) -> str:
         return row.worn_relative if worn else row.relative
 
     shortest = [min(rows, key=life) for rows in found.by_run]
-    best = max([row for row in shortest if not math.isnan(row.start.start_time)] or shortest, key=life)
+    best = max([row for row in shortest if not math.isnan(row.start.limited_time)] or shortest, key=life)
     name, wear = best.run.controller_name, ", with wear" if worn else ""
     if name == REFERENCE:
         return f"Longest life: direct{wear}."

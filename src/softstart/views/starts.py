@@ -58,6 +58,7 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["the same at the output", there],
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
+        ["overshoot", overshoot_of(run)],
         ["shaft torque settled after", with_unit(run.settling_time(), "s")],
         ["first contact", f"{with_unit(run.first_contact, 's')}{of_one}"],
         ["speed of impact", with_unit(run.impact_speed, "rad/s")],
@@ -69,10 +70,20 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["limits", "; ".join(map(str, margins_of(run)))],
         ["brake released", f"{with_unit(run.release_time, 's')}{of_one}" if released else ""],
         *(
-            [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
+            [
+                f"from {name}",
+                f"K_dyn {number(one.k_dyn, 6)}, {one.limited_name} {with_unit(one.limited_time, 's')}",
+            ]
             for name, one in run.positions.items()
         ),
     ]
+
+
+def overshoot_of(run: Run) -> str:
+    """The overshoot and the band in which the load settles; "" under a torque strategy."""
+    if not run.regulated:
+        return ""
+    return f"{100.0 * run.overshoot:.3g} % (settled: within {100.0 * run.band:.3g} % of the target)"
 
 
 def position_notes(runs: Sequence[Run]) -> list[str]:
@@ -237,23 +248,27 @@ PEAK_COLUMNS = (
     DataColumn("K\nlight", lambda row: row.k_dyn_light_load, 3),
     DataColumn("peak\nN m", lambda row: row.run.peak_torque),
 )
+
+
+def _latest(row: Row) -> float:
+    """The upper end of the start time; of the settled time under a strategy that holds the speed."""
+    return row.intervals["settled_time" if row.run.regulated else "start_time"][1]
+
+
 INTERVALS = (
     DataColumn("K_dyn\nfrom", lambda row: row.intervals["k_dyn"][0], 3),
     DataColumn("K_dyn\nto", lambda row: row.intervals["k_dyn"][1], 3),
     DataColumn("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
-    DataColumn("start\ntime to s", lambda row: row.intervals["start_time"][1]),
+    DataColumn("start\ntime to s", _latest),
 )
 TIME_COLUMNS = (
     DataColumn("settled\ns", lambda row: row.run.settled_time),
     DataColumn("later\n%", share_lost, 1),
+    DataColumn("over-\nshoot %", lambda row: 100.0 * row.run.overshoot, 1, optional=True),
 )
 START_TIME = DataColumn("start\ntime s", lambda row: row.run.start_time)
-START_LATER = DataColumn("start\nlater s", lambda row: row.time_lost, digits=3)
-TIMES = (
-    START_TIME,
-    START_LATER,
-    DataColumn("settled\nlater s", lambda row: row.settled_lost, digits=3),
-)
+SETTLED_LATER = DataColumn("settled\nlater s", lambda row: row.settled_lost, digits=3)
+TIMES = (START_TIME, SETTLED_LATER)
 CONTACTS = DataColumn("contacts", lambda row: row.run.contacts, 0)
 AT_THE_GAP = (
     DataColumn("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
@@ -349,6 +364,21 @@ LEGEND = (
 )
 
 
+def settled_means(rows: Sequence[Row]) -> str:
+    """What `settled` is under each kind of strategy that is among these."""
+    held: dict[float, list[str]] = {}
+    for row in (row for row in rows if row.run.regulated):
+        held.setdefault(float(f"{100.0 * row.run.band:.3g}"), []).append(row.name)
+    kinds = [f"within {band:g} % of the target ({', '.join(names)})" for band, names in held.items()]
+    if any(not row.run.regulated for row in rows):
+        who = " (torque strategies)" if held else ""
+        kinds.append(
+            f"not below {100.0 * (1.0 - SETTLED_BAND):g} % of the target, judged for {SETTLING_PERIODS:g} "
+            f"elastic periods after the start time{who}"
+        )
+    return f"settled: the time from which on the load speed is {'; '.join(kinds)}."
+
+
 def definitions(comparison: Comparison) -> list[str]:
     """What the columns mean."""
     run = comparison.rows[0].run
@@ -359,8 +389,7 @@ def definitions(comparison: Comparison) -> list[str]:
         f"K_dyn = {'largest torque of all shafts at the motor shaft' if several else 'peak shaft torque'} / "
         f"{base:.4g} N m, the mean shaft torque under full starting torque.",
         f"{LEGEND} Strategies are set up for {nominal}.",
-        f"settled: from then on the load speed is never more than {100.0 * SETTLED_BAND:g} % below the "
-        f"target, for {SETTLING_PERIODS:g} elastic periods after the start time.",
+        settled_means(comparison.rows),
     ]
     if checked_limits(comparison.drive):
         cases = ", ".join(("the machine as it is", *comparison.worst_case))
@@ -374,11 +403,17 @@ def definitions(comparison: Comparison) -> list[str]:
     return found
 
 
+def short_notes(rows: Sequence[Row]) -> list[str]:
+    """What the columns of the table without details mean."""
+    band = [settled_means(rows)] if any(row.run.regulated for row in rows) else []
+    return [f"{LEGEND} More: --details.", *band]
+
+
 def remarks(comparison: Comparison) -> list[str]:
     """What the figures of these starts leave out, and which starts did not end as they should."""
     rows = comparison.rows
     cut = [(row.name, clipped_torque(row.run)) for row in rows]
-    failed = [row for row in rows if math.isnan(row.run.start_time)]
+    failed = [row for row in rows if math.isnan(row.run.limited_time)]
     return [
         *comparison.drive.warnings,
         *([INTERVALS_NOTE] if rows[0].intervals else []),
@@ -406,11 +441,11 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
     if details:
         several = len(machine.shaft_names) > 1
         parts += [("Times", TIMES), ("Shafts" if several else "Events in the backlash", at_details(machine))]
-    reached = [row for row in rows if not math.isnan(row.run.start_time)]
-    points = [(row.marked, row.run.start_time, row.run.k_dyn) for row in reached]
+    reached = [row for row in rows if not math.isnan(row.run.settled_time)]
+    points = [(row.marked, row.run.settled_time, row.run.k_dyn) for row in reached]
     figures = {"comparison": lambda: comparison_figure(rows, machine.name)}
     if points:
-        figures["trade-off"] = lambda: trade_off_figure(points, title=machine.name)
+        figures["trade-off"] = lambda: trade_off_figure(points, title=machine.name, time="settled time")
     records = list(map(_record, rows))
     files: dict[str, str | Writer] = {"comparison.csv": records_file(records)}
     stems: list[str] = []
@@ -426,11 +461,11 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         tables=[comparison_table(rows, which, title, bold) for title, which in parts],
         conclusions=[comparison.recommendation.text, *both_ends(comparison)],
         notes=[
-            *(definitions(comparison) if details else [f"{LEGEND} More: --details."]),
+            *(definitions(comparison) if details else short_notes(rows)),
             *remarks(comparison),
         ],
         figures=figures,
-        panel=lambda ax: draw_trade_off(ax, points, title=machine.name),
+        panel=lambda ax: draw_trade_off(ax, points, title=machine.name, time="settled time"),
         records=records,
         files=files,
         machine=machine,

@@ -112,10 +112,10 @@ def speeds(axes: Axes, run: Run) -> None:
     if machine.target_speed is not None:
         target = float(units.shown(machine.target_speed, "rad/s"))
         axes.axhline(target, color=GREY, lw=0.8, ls=":", label="target")
-    reached = not math.isnan(run.start_time)
+    reached = not math.isnan(run.limited_time)
     if reached:
-        axes.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
-    title = f"start time {run.start_time:.4f} s" if reached else run.status.value
+        axes.axvline(run.shown.limited_time, color=GREY, lw=0.8, ls=":")
+    title = f"{run.limited_name} {run.limited_time:.4f} s" if reached else run.status.value
     head(axes, title, f"speed, {units.of('rad/s')}")
 
 
@@ -138,10 +138,10 @@ def twists(axes: Axes, run: Run) -> None:
 
 def shown_until(rows: Sequence[Row]) -> float:
     """Until when several starts are shown, s."""
-    reached = [row.run for row in rows if not math.isnan(row.run.start_time)]
+    reached = [row.run for row in rows if not math.isnan(row.run.limited_time)]
     if not reached:
         return max(float(row.run.end_time) for row in rows)
-    most = LATE * float(np.median([run.start_time for run in reached]))
+    most = LATE * float(np.median([run.limited_time for run in reached]))
     return min(max(float(run.end_time) for run in reached), most)
 
 
@@ -158,8 +158,8 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
             panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=0.9, label="motor torque u")
             shaft_torques(panel, run)
             panel.set_title(f"{verbatim(row.name)}: {run.k_dyn:.3f}", loc="left", pad=3, fontsize=8.0)
-            if not math.isnan(run.shown.start_time):
-                panel.axvline(run.shown.start_time, color=GREY, lw=0.8, ls=":")
+            if not math.isnan(run.shown.limited_time):
+                panel.axvline(run.shown.limited_time, color=GREY, lw=0.8, ls=":")
         axes[0].set_xlim(0.0, latest)
         axes[0].set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
         handles, labels = axes[0].get_legend_handles_labels()
@@ -169,13 +169,20 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
     return figure
 
 
+def _shown_end(run: Run) -> float:
+    return run.limited_time if run.limited_time > 0.0 else float(run.end_time)
+
+
 def before_after_figure(rows: Sequence[Row]) -> Figure:
     """Shaft torque and load speed of `direct` and of another start, with the permissible torque as a line.
 
     Of several shafts the torque of the one that is loaded most.
     """
     machine, runs = rows[0].run.drive, [row.run for row in rows]
-    units, latest = units_of(machine), max(r.start_time if r.start_time > 0.0 else r.end_time for r in runs)
+    units, latest = (
+        units_of(machine),
+        max(map(_shown_end, runs)),
+    )
     with drawing():
         figure, (torque, speed) = new_figure(1, 2, (8.0, 3.2), width_ratios=(1.7, 1.0))
         lines = ((COLOURS[1], 1.1), (COLOURS[0], 2.0))[-len(rows) :]
@@ -200,7 +207,7 @@ Points = Sequence[tuple[float, float]]  # start time in s, K_dyn
 
 
 def trade_off_figure(points: Sequence[tuple[str, float, float]], **options: Any) -> Figure:
-    """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
+    """K_dyn against start time, one point a strategy: (name, time in s, K_dyn)."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 4.6))
         draw_trade_off(axes, points, **options)
@@ -217,6 +224,7 @@ def draw_trade_off(
     best: str = "optimum",
     bound: Points = (),
     note: str = "",
+    time: str = "start time",
 ) -> None:
     """The same on given axes, with optima and with the lower bound, below which no start is possible."""
     from matplotlib import ticker
@@ -242,4 +250,4 @@ def draw_trade_off(
         axes.set_ylim(0.85 * min(positive), 1.15 * max(positive))
     elif positive:
         axes.set_ylim(0.0, 1.08 * max(positive))
-    head(axes, title, "K_dyn", f"start time, s{note}")
+    head(axes, title, "K_dyn", f"{time}, s{note}")

@@ -37,7 +37,7 @@ def test_all_figures_are_those_of_compare_to_the_bit():
         assert strategy.start_time == row.run.start_time
         list(session.compute_row(strategy.name))
         assert session.row(strategy.name).k_dyn_worn_gap == row.k_dyn_worn_gap
-        assert session.time_lost(strategy) == row.time_lost
+        assert session.row(strategy.name).settled_lost == row.settled_lost
 
 
 TROLLEY = {

@@ -26,7 +26,7 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
     ramp, gentle, direct = (simulate(CHAIN, name) for name in ("ramp", "take-up", "direct"))
     assert made.choice.chosen.name == "take-up"
     assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in text
-    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in text
+    assert f"settled after {gentle.settled_time:.4f} s instead of {direct.settled_time:.4f} s" in text
     for run in (ramp, gentle, direct):
         row = re.findall(rf'<tr[^>]*><th scope="row"[^>]*>{run.controller_name}</th>(.*?)</tr>', page)
         assert len(row) == 5  # page 1, the rule, the strategies, shafts, beside the bound

@@ -122,10 +122,10 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
         made = replace(hostile, limit=OptimumCurve(points=(point,)), sheets=(replace(sheet, **changes),))
         return words in re.split(r" In the [\d.]+ s of ", text_answer(made))[0]  # what follows is of the ramp
 
-    calm = {"rounded": SimpleNamespace(k_dyn=k, start_time=time), "worst_k_dyn": k, "slowest": time}
+    calm = {"rounded": SimpleNamespace(k_dyn=k, limited_time=time), "worst_k_dyn": k, "slowest": time}
     for share, told in ((1.049, False), (1.051, True)):
-        for harm in (SimpleNamespace(k_dyn=share * k, start_time=time),
-                     SimpleNamespace(k_dyn=k, start_time=share * time)):  # fmt: skip
+        for harm in (SimpleNamespace(k_dyn=share * k, limited_time=time),
+                     SimpleNamespace(k_dyn=k, limited_time=share * time)):  # fmt: skip
             assert said("But these are exact values", **calm | {"rounded": harm}) == told
         for harm in ({"worst_k_dyn": share * k}, {"slowest": share * time}):
             assert said("With values half a step off", **calm | harm) == told

@@ -71,8 +71,8 @@ def test_numbers_are_those_of_compare(read, hostile):
         assert cells["K light"] == f"{row.k_dyn_light_load:.3f}"
         assert float(cells["start time, s"]) == pytest.approx(row.run.start_time, rel=1e-3)
         assert float(cells["peak, N m"]) == pytest.approx(row.run.peak_torque, rel=1e-3)
-        lost = float(cells["start later, s"].replace("\N{MINUS SIGN}", "-"))
-        assert lost == pytest.approx(row.time_lost, abs=5e-4)
+        lost = float(cells["settled later, s"].replace("\N{MINUS SIGN}", "-"))
+        assert lost == pytest.approx(row.settled_lost, abs=5e-4)
 
 
 def test_limit_is_that_of_optimize(read, hostile):

@@ -3,7 +3,8 @@ import { button, element, fixed, put, significant } from "./numbers.js";
 
 const FACTS = [
   ["start time", "s", (f) => fixed(f.start_time, 4)],
-  ["after direct", "s", (f) => fixed(f.time_lost, 4)],
+  ["settled later", "s", (f) => fixed(f.settled_lost, 4)],
+  ["overshoot", "%", (f) => fixed(f.overshoot, 1)],
   ["peak torque", "N m", (f) => significant(f.peak_torque, 5)],
   ["at the output", "N m", (f) => significant(f.output_torque, 5)],
   ["mean torque", "N m", (f) => significant(f.base, 5)],
@@ -32,6 +33,7 @@ export class Figure {
       const [, value, unit] = this.facts[index].children;
       put(value, text(figure));
       if (label === "first impact") put(unit, figure.speed_unit);
+      if (label === "overshoot") this.facts[index].hidden = figure.overshoot == null; // of a torque strategy
       if (label === "at the output") this.facts[index].hidden = figure.output_torque == null; // where no gear is known
     });
     this.tell();

@@ -10,8 +10,9 @@ const COLUMNS = [
   ["soft", "K 3 Hz", "", (row) => fixed(row.soft, 3), "K at an elastic frequency of 3 Hz, the soft end of a stiffness that no data sheet tells; the controller is set up for 30 Hz"],
   ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
   ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
-  ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed"],
-  ["time_lost", "later, s", "", (row) => fixed(row.time_lost, 4), "How much later than with direct the load has its target speed"],
+  ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed: within 2 % (strategies that hold the speed), not below 99.9 % (torque strategies)"],
+  ["settled_lost", "later, s", "", (row) => fixed(row.settled_lost, 4), "How much later than with direct the load has settled"],
+  ["overshoot", "overshoot, %", "", (row) => fixed(row.overshoot, 1), "By how much the load exceeds its target speed at most, under a strategy that holds the speed"],
 ];
 const FIGURES = COLUMNS.slice(1);
 const cells = () => FIGURES.map(([key]) => element("td", { class: "number", "data-key": key }));
@@ -43,6 +44,7 @@ export class Table {
     this.arrange(state);
     this.compare(state.reference);
     this.body.parentNode.classList.toggle("ends", Boolean(state.soft));
+    this.body.parentNode.classList.toggle("held", [...state.rows.values()].some((row) => row.overshoot != null));
     const largest = Math.max(2, ...[...state.rows.values()].map((row) => row.k_dyn ?? 0));
     for (const name of state.order) {
       const line = this.lines.get(name);
