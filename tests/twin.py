@@ -10,6 +10,7 @@ import numpy as np
 from softstart import Chain, Command, Drive, PlainController
 from softstart.chain import Mass, Motor, Shaft
 from softstart.controller import Measured, Sensor
+from softstart.controller.base import Regulation
 from softstart.kernel.motor import NEW_STATE
 
 
@@ -24,6 +25,10 @@ class PlainTwin(PlainController):
     def sensors(self) -> Sensor:  # type: ignore[override]
         """Those of the compiled controller."""
         return self.twin.sensors  # type: ignore[no-any-return]
+
+    def regulation(self, drive: Drive) -> Regulation | None:
+        """That of the compiled controller."""
+        return self.twin.regulation(drive)  # type: ignore[no-any-return]
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         size = self.twin.state_size

@@ -163,6 +163,13 @@ class Run(Result, view="starts.run_sheet"):
         return "no motor torque" if self.controller is None else label_of(self.controller)
 
     @property
+    def doubts(self) -> list[str]:
+        """What the controller says against its own settings, a sentence each."""
+        if self.controller is None or self.drive.motor is None:
+            return []
+        return self.controller.doubts(self.design_drive or self.drive.design_drive)
+
+    @property
     def position(self) -> str:
         """Where the start begins, of an unknown position the worst for the shaft; "" for an angle."""
         if self.positions:

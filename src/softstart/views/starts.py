@@ -118,9 +118,10 @@ def clipped_torque(run: Run) -> str:
 
 
 def outcome(run: Run) -> str:
-    """How the start ended, and what was cut off the demand."""
+    """How the start ended, what was cut off the demand, and what is doubted of the settings."""
     clipped = clipped_torque(run)
-    return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value
+    cut = [f"Torque cut off: {clipped}."] if clipped else []
+    return " ".join([run.status.value, *cut, *run.doubts])
 
 
 def _gap_in(stage: Stage) -> str:
@@ -192,7 +193,7 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
         run.status.value,
         figure_rows(run),
         _start_tables(run),
-        notes=run.drive.warnings,
+        notes=[*run.doubts, *run.drive.warnings],
         figures={f"run-{stem}": lambda: run_figure(run)},
         panel=lambda ax: torques(ax, run),
         files={
@@ -420,6 +421,7 @@ def remarks(comparison: Comparison) -> list[str]:
         *position_notes([row.run for row in rows]),
         *(f"{row.name}: {row.run.status.value}" for row in failed),
         *(f"{name}, torque cut off: {clipped}." for name, clipped in cut if clipped),
+        *(doubt for row in rows for doubt in row.run.doubts),
         *(
             f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
             for row in rows
