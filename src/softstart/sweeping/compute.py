@@ -55,8 +55,11 @@ def compute(task: ChunkTask) -> Block:
         settings.recipe.make(parameters, name).set_ups(fitted_to or machines),
         machines.mean_torque,
         until=settings.until,
+        settled="settled_time" in settings.figures,
     )
-    figures = {name: np.ascontiguousarray(results[name][0], dtype=np.float64) for name in settings.figures}
+    unknown = np.full(task.starts, np.nan)  # as the overshoot under a torque strategy
+    each = {name: results[name][0] if name in results else unknown for name in settings.figures}
+    figures = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in each.items()}
     return figures | {"status": np.array([CODES[one] for one in results["status"][0]], dtype=np.int8)}
 
 

@@ -93,7 +93,7 @@ def test_parameters_of_every_controller_as_axes(name):
             continue
         grid = {
             "gap": rng.uniform(0.01, 4, 3),
-            f"controller.{key}": value * np.array([0.8, 0.93]),
+            f"controller.{key}": (value or 0.01) * np.array([0.8, 0.93]),
             "stiffness": [300, 500],
         }
         results = sweep(CRANE, name, grid, figures=FIGURES, workers=1, fitted_to=CRANE)
