@@ -46,8 +46,6 @@ from softstart.linear.loop import ROUNDING, Loop
 from softstart.linear.systems import SMALL, zeros_of
 
 SHARES = np.geomspace(1e-4, 1.0, 200)  # n, of the grid
-SLOW = 1e-4 * math.pi  # rad a sample
-HOLDING = 10.0  # |1 + L| there with the gap open, above which a loop holds its speed
 LARGEST = 100.0  # amplitude, in half gaps and mean windups
 AMPLITUDES = 1500  # of the grid
 
@@ -136,8 +134,7 @@ def limit_cycles(loop: Loop, run: SampledRun) -> tuple[Cycle, ...]:
     if not drive.gap:
         return ()
     back = max(1, round(float(drive.elastic_period) / run.period))
-    open_loop = replace(loop, open=True).broken
-    if abs(1.0 + open_loop.at(np.array([SLOW / loop.period]), loop.period)[0]) > HOLDING:
+    if loop.holds_speed:
         w = float(np.mean([one.measured[M_MOTOR_SPEED] for one in run.samples[-1 - back :]]))
         mean = float(drive.Mc + drive.load_viscous_friction * w)
         demand = mean + float(drive.motor_friction + drive.motor_viscous_friction * w)

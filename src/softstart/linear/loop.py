@@ -10,6 +10,8 @@ closed-loop pole and -1 is the critical point. All crossings are found, and the 
     delay margin: the least further dead time between demand and torque that puts a closed-loop pole on the
         unit circle, of the exactly sampled loop with that dead time (no phase approximation)
     modulus margin: the least distance |1 + L| from -1, the inverse of the peak of the sensitivity
+    bandwidth: the first frequency at which |L/(1 + L)| is 3 dB below what it is at low frequency, of a loop
+        that holds the speed: there L/(1 + L) leads from a change of the commanded speed to the speed measured
 
 A delay is no mere turn of phase here: a controller that measures the torque it made measures the delay too,
 and between samples a held demand is divided again, so L under a delay is not L e^(-jws).
@@ -19,7 +21,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -46,6 +48,8 @@ MEASURED = {
     exchange.M_SHAFT_TORQUE: "shaft_torque",
     exchange.M_LOAD_SPEED: "load_speed",
 }
+SLOW = 1e-4 * math.pi  # rad a sample
+HOLDING = 10.0  # |1 + L| there with the gap open, above which a loop holds its speed
 ON_THE_CIRCLE = 1e-9  # poles this near to the unit circle do not count as stable
 
 
@@ -151,6 +155,30 @@ class Loop:
         loop, into, read = self.closed(delay)
         whole = System(loop - np.outer(into, read[1]), into[:, None], -read[[1]], np.zeros((1, 1)))
         return whole.part(whole.connected())
+
+    @cached_property
+    def with_gaps_open(self) -> Loop:
+        """The loop of the motor and what turns with it, with all gaps open."""
+        return self if self.open else replace(self, name="all gaps open", open=True)
+
+    @cached_property
+    def holds_speed(self) -> bool:
+        """Whether the loop holds the motor speed in the long run."""
+        slowly = np.array([SLOW / self.period])
+        return bool(abs(1.0 + self.with_gaps_open.broken.at(slowly, self.period)[0]) > HOLDING)
+
+    @cached_property
+    def bandwidth(self) -> float:
+        """Bandwidth in rad/s; NaN of a loop that does not hold the speed, or that is unstable."""
+        if not (self.holds_speed and self.stable):
+            return math.nan
+
+        def excess(w: Vector) -> Vector:
+            L = self.broken.at(w, self.period)
+            return np.abs(L / (1.0 + L)) - 0.5**0.5
+
+        crossovers = zeros_of(excess, frequencies(self.period, self.broken))
+        return min(crossovers, default=math.nan)
 
     @property
     def system(self) -> control.StateSpace:

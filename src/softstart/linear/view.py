@@ -34,6 +34,14 @@ VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
 
 
+def _fastest_growth(loop: Loop) -> str:
+    """The pole that grows fastest in words."""
+    mode = max(loop.modes, key=lambda mode: -mode.damping_ratio * mode.frequency)
+    if mode.imag == 0.0 and mode.real > 0.0:
+        return f"its speed runs away with a time constant of {1e3 / mode.frequency:.3g} ms"
+    return f"an oscillation at {mode.frequency:.4g} rad/s grows"
+
+
 def margin_texts(m: Margins) -> dict[str, str]:
     """The margins in words; the phase margin is not limited where the loop has no gain crossover."""
     texts = {
@@ -111,7 +119,7 @@ class LinearView(Result, view="linear.linear_sheet"):
             for symbol, key, factors in VARIATIONS
             for factor in factors
         ]
-        return (*varied, replace(self.loop, name="all gaps open", open=True))
+        return (*varied, self.loop.with_gaps_open)
 
     @cached_property
     def cycles(self) -> tuple[Cycle, ...]:
@@ -119,6 +127,33 @@ class LinearView(Result, view="linear.linear_sheet"):
         if self.loop is None or len(self.drive.shaft_names) > 1:
             return ()
         return limit_cycles(self.loop, self.run)
+
+    @cached_property
+    def warning(self) -> str:
+        """One sentence where a loop is unstable or a limit cycle is predicted; "" elsewhere.
+
+        The loop with all gaps open counts where the strategy holds the speed, and so acts in the gap too.
+        """
+        loop = self.loop
+        if loop is None:
+            return ""
+        if not loop.stable:
+            return f"Unstable with the gap closed: {_fastest_growth(loop)}."
+        cycle = max(self.cycles, key=lambda cycle: (cycle.stable, cycle.amplitude), default=None)
+        vibration = ""
+        if cycle is not None:
+            amplitude = f"amplitude of the twist {cycle.amplitude:.3g} rad"
+            vibration = f"{cycle.frequency:.4g} rad/s, {amplitude}" if cycle.stable else amplitude
+        alone = loop.with_gaps_open
+        if loop.holds_speed and not alone.stable:
+            growth = _fastest_growth(alone)
+            end = f", to a limit cycle of {vibration}" if cycle is not None and cycle.stable else ""
+            return f"Unstable with the gap open, where the motor is alone: {growth}{end}."
+        if cycle is None:
+            return ""
+        if cycle.stable:
+            return f"A limit cycle through the gap is predicted: {vibration}."
+        return f"Vibrations through the gap are predicted to grow from this size on: {vibration}."
 
     @property
     def elastic_mode(self) -> Mode | None:
@@ -148,6 +183,7 @@ class LinearView(Result, view="linear.linear_sheet"):
             "kind": self.kind,
             "conclusion": self.conclusion,
             "notes": list(self.notes),
+            "warning": self.warning,
         }
         if self.loop is None:
             return plain
@@ -163,11 +199,13 @@ class LinearView(Result, view="linear.linear_sheet"):
                 "mismatch": point.mismatch,
             },
             **asdict(self.loop.margins),
+            "bandwidth": self.loop.bandwidth,
             "elastic_frequency": elastic and elastic.frequency,
             "elastic_damping_ratio": elastic and elastic.damping_ratio,
             "modes": [asdict(mode) for mode in self.loop.modes],
             "variations": [
                 {"name": one.name, "stable": one.stable, "least_damping": one.least_damping}
+                | {"bandwidth": one.bandwidth}
                 | asdict(one.margins)
                 for one in self.variations
             ],
@@ -250,7 +288,5 @@ def _notes(name: str, run: SampledRun, loop: Loop) -> tuple[str, ...]:
             f"{100.0 * point.mismatch:.2g} %); use the margins with caution."
         )
     if not loop.stable:
-        notes.append(
-            "The closed loop is unstable in contact; the margins are those of crossings, not reserves."
-        )
+        notes.append("The margins of an unstable loop are those of crossings, not reserves.")
     return tuple(notes)

@@ -45,6 +45,7 @@ def margin_rows(view: LinearView, loop: Loop) -> list[tuple[str, str]]:
         *margin_texts(m).items(),
         ("gain reduction margin", f"{m.gain_reduction:.3g}" if m.gain_reduction > 0.0 else ""),
         ("modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"),
+        ("bandwidth", "" if math.isnan(loop.bandwidth) else f"{loop.bandwidth:.4g} rad/s"),
         ("gain crossover", _frequencies(m.gain_crossovers)),
         ("phase crossover", _frequencies(m.phase_crossovers)),
         ("elastic mode", f"{_frequencies([mode])}, damping ratio {mode.damping_ratio:.4g}" if mode else ""),
@@ -63,13 +64,14 @@ MODES = (
     DataColumn("pole z", lambda mode: _pole(mode.value)),
 )
 VARIATIONS = (
-    DataColumn("drive", lambda loop: loop.name),
+    DataColumn("drive", lambda loop: loop.name or "as it is"),
     DataColumn("stable", lambda loop: "yes" if loop.stable else "no"),
     DataColumn("gain\nmargin", lambda loop: _limited(loop.margins.gain_margin), 2),
     DataColumn("phase\nmargin deg", lambda loop: _limited(math.degrees(loop.margins.phase_margin)), 1),
     DataColumn("delay\nmargin ms", lambda loop: _limited(1e3 * loop.margins.delay_margin), 2),
     DataColumn("modulus\nmargin", lambda loop: _limited(loop.margins.modulus_margin), 3),
     DataColumn("minimum\ndamping", lambda loop: loop.least_damping, 3),
+    DataColumn("bandwidth\nrad/s", lambda loop: loop.bandwidth, optional=True),
 )
 CYCLES = (
     DataColumn("rad/s", lambda cycle: cycle.frequency),
@@ -91,7 +93,9 @@ def tables(view: LinearView, loop: Loop) -> list[TextTable]:
     return [
         TextTable.of_data("Modes of the closed loop", MODES, modes),
         TextTable.of_data(
-            "The same controller on other drives (-: not limited)", VARIATIONS, view.variations
+            "Both loops, and the same controller on other drives (-: not limited)",
+            VARIATIONS,
+            [loop, *view.variations[-1:], *view.variations[:-1]],
         ),
         TextTable.of_data(
             "Limit cycles predicted by the describing function of the gap", CYCLES, view.cycles
@@ -126,6 +130,7 @@ def linear_sheet(view: LinearView) -> Sheet:
     return Sheet(
         title,
         lines,
+        view.warning,
         facts=margin_rows(view, loop),
         tables=tables(view, loop),
         notes=linear_notes(view),
