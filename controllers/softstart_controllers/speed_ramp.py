@@ -155,9 +155,9 @@ class SpeedRamp(CompiledController):
         multiples=(0.25, 10.0))
     filter_time: float = parameter("s", "time constant of the speed filter", 0.0, limit="0 or more")
     feed_forward: float = parameter("1", "share of (J1 + J2) dn*/dt that is fed forward", 1.0,
-        limit="0 or more", between=(0.0, 1.2))
+        limit="0 or more")
     torque_limit: float = parameter("N*m", "torque limit of the inverter, both ways",
-        lambda drive, p: drive.Ms, "starting torque Ms", "above 0", multiples=(0.4, 1.0))
+        lambda drive, p: drive.Ms, "starting torque Ms", "above 0")
     preload: float = parameter("N*m", "torque that takes up the gap before the ramp, 0 for none", 0.0,
         limit="0 or more")
     period: float = period_parameter()

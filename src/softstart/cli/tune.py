@@ -134,8 +134,8 @@ def tune_command(
     --metric NAME
         Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits].
     --start-time TIME
-        Upper bound of the start time: 0.3 (s), or 1.2x that of direct in the same cell. Default: that of
-        the controller with its default gains.
+        Upper bound of the start time (settled time of a strategy that holds the speed): 0.3 (s), or 1.2x
+        that of direct in the same cell. Default: that of the controller with its default gains.
     --tolerance KEY=SPREAD
         Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover,
         encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.

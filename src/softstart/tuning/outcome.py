@@ -216,7 +216,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         return {
             "drive": self.drive.name,
             "metric": self.metric,
-            "start_time_bound": q.bound,
+            f"{q.time}_bound": q.bound,
             "gaps": list(q.gaps),
             "load_inertias": list(q.load_inertias),
             "scenarios": len(q.scenarios),

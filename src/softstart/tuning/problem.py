@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
+from functools import cached_property
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -73,11 +74,23 @@ class TuningProblem:
         """Whether the permissible start time is part of the margin, and there is no other bound."""
         return self.start_time is None and self.metric == MARGIN and self.drive.limits.start_time is not None
 
+    @cached_property
+    def time(self) -> str:
+        """The figure that the bound is on: the settled time of a strategy that holds the speed."""
+        ready, own = self.recipe.make().set_up(self.drive.design_drive)
+        return "start_time" if ready.regulation(own) is None else "settled_time"
+
+    @property
+    def time_name(self) -> str:
+        """Its name in words."""
+        return self.time.replace("_", " ")
+
     @property
     def bound(self) -> str:
         """The bound on the start time in words."""
         if (asked := self.start_time) is not None:
-            return f"at most {asked.value:g} " + ("times the start time of direct" if asked.multiple else "s")
+            unit = f"times the {self.time_name} of direct" if asked.multiple else "s"
+            return f"at most {asked.value:g} {unit}"
         return "by the limits of the drive" if self.limited else "no slower than with the defaults"
 
     def drive_of(self, cell: int) -> Machine:

@@ -90,9 +90,10 @@ def tune(
         "margin" is made large: the least share left of the limits of shaft torque and start time (of a chain
         the permissible torque of each shaft); the tables have its complement `limit_share`.
     start_time : float or str, optional
-        Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
-        default each start is to be no slower than with the controller's own defaults; for the margin to a
-        permissible start time there is no other bound.
+        Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"); under a
+        strategy that holds the speed it is a bound on the settled time. By default each start is to be no
+        slower than with the controller's own defaults; for the margin to a permissible start time there is
+        no other bound.
     tolerances : mapping, optional
         What drives may be off by, unknown to the controller, see `tuning_scenarios`: a parameter -> "10 %", a
         quantity, or a list of values; of a chain also one mass or shaft ("shaft[2].gap").

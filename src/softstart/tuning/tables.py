@@ -139,15 +139,16 @@ def _figures(trials: Trials, judged: Judged) -> Columns:
     name, share, columns = problem.metric_name, problem.quantile, Columns()
     over = "" if len(problem.scenarios) == 1 else f", quantile {share:g} over the tolerances"
     for end, what, one in (("", "tuned", judged), ("_default", "of the defaults", trials.default)):
-        metric, start_time = (_by_cell(trials, part) for part in one)
-        columns[f"start_time{end}"] = (start_time[:, 0], "s", f"start time, {what}, nominal")
+        metric, time = (_by_cell(trials, part) for part in one)
+        columns[f"{problem.time}{end}"] = (time[:, 0], "s", f"{problem.time_name}, {what}, nominal")
         columns[f"{name}{end}"] = (_over_scenarios(metric, share), "", f"{name}, {what}{over}")
         if over and not end:
             columns[f"{name}_as_is"] = (metric[:, 0], "", f"{name}, tuned, nominal")
-        late = excess(start_time, bound, share)
-        columns[f"excess{end}"] = (late, "1", f"relative violation of the bound on the start time, {what}")
-    columns["start_time_bound"] = (bound[:, 0], "s", "bound on the start time, nominal")
-    columns["in_time"] = (columns["excess"][0] == 0.0, "", "whether the start time is within its bound")
+        late = excess(time, bound, share)
+        columns[f"excess{end}"] = (late, "1", f"relative violation of the bound on the time, {what}")
+    columns[f"{problem.time}_bound"] = (bound[:, 0], "s", f"bound on the {problem.time_name}, nominal")
+    within = f"whether the {problem.time_name} is within its bound"
+    columns["in_time"] = (columns["excess"][0] == 0.0, "", within)
     return columns
 
 

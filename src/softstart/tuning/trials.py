@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from softstart.errors import InputError
 from softstart.hints import nearest
 from softstart.parallel import Pool
 from softstart.start.batch import Batch, prepared
+from softstart.start.results import limited_time
 from softstart.tuning.problem import MARGIN, TuningProblem
 
 Values = Mapping[str, Vector]  # parameter -> one value a candidate
@@ -33,7 +35,10 @@ STARTS_A_THREAD = 600  # in a call of one of several threads, which hear no Ctrl
 
 
 class Judged(NamedTuple):
-    """Metric and start time in s of starts. Axes: candidate, start of its job. NaN where a start failed."""
+    """Metric and time in s of starts. Axes: candidate, start of its job. NaN where a start failed.
+
+    `start_time` is that which the bound is on, the settled time of a strategy that holds the speed.
+    """
 
     metric: Vector
     start_time: Vector
@@ -64,7 +69,7 @@ class Trials:
         self.time_limit: float | None = None
         self.default, self.bound = known or self._measured()
         if np.isfinite(longest := float(self.bound.max())):
-            self.time_limit = PATIENCE * longest
+            self.time_limit = PATIENCE * longest + self._longest_dwell()
 
     def __reduce__(self) -> tuple[object, ...]:  # made again in another process
         return Trials, (self.problem, self.robust, (self.default, self.bound))
@@ -78,13 +83,26 @@ class Trials:
             return default, np.full(self.starts_of.shape, limit.value if limit else math.inf)
         return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
 
+    def _longest_dwell(self) -> float:
+        """For how long a start must be settled at most, s, under a strategy that holds the speed; else 0."""
+        highest = {one.name: one.ends(self.defaults[one.name])[1].tolist() for one in self.problem.ranges}
+        dwells = [0.0]
+        for job, drive in enumerate(self.drives):
+            values = {name: ends[job] for name, ends in highest.items()}
+            with suppress(InputError):
+                ready, own = replace(self.controller, **values).set_up(drive)
+                if regulation := ready.regulation(own):
+                    dwells.append(regulation.dwell)
+        return max(dwells)
+
     def _direct(self) -> Vector:
-        """Start time of `direct` for every start."""
+        """Start time, or settled time, of `direct` for every start."""
         problem = self.problem
         drives = [problem.drive_of(cell).design_drive for cell in range(len(problem.cells))]
-        start_times: Vector = self.batch.figures(make_controller("direct").set_ups(drives), 1.0)[
-            "start_time"
-        ][0]
+        figures = self.batch.figures(
+            make_controller("direct").set_ups(drives), 1.0, settled=problem.time == "settled_time"
+        )
+        start_times: Vector = figures[problem.time][0]
         if np.any(failed := np.isnan(start_times)):
             gap, inertia = problem.cells[int(failed.argmax()) // len(problem.scenarios)]
             raise InputError(
@@ -149,7 +167,8 @@ class Trials:
             near = nearest(metric, figures)
             hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figures)}."
             raise InputError(f'metric = "{metric}": this is not a result of a start; {hint}')
-        figure, time = (figures[name][0].reshape(starts.shape) for name in (metric, "start_time"))
+        time = limited_time(figures).reshape(starts.shape)
+        figure = figures[metric][0].reshape(starts.shape)
         return Judged(1.0 - figure if metric == MARGIN else figure.astype(np.float64), time)
 
 

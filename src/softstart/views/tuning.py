@@ -48,7 +48,7 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
     robust = None if tuning.robust is None else tuning.robust.cells
     table = {"price": tuning.price, "robust": robust}.get(what, tuning.schedule)
     assert table is not None
-    name, metric = tuning.metric, _metric(tuning)
+    name, metric, q = tuning.metric, _metric(tuning), tuning.problem
     if what == "gains":
         maps = {one.name: label(one.name, one.unit) for one in tuning.problem.ranges}
         return _maps(tuning, table, maps, "gains of each cell")
@@ -57,7 +57,7 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
         return _maps(tuning, table, maps, f"price of robustness, ratios of {metric}", alike=3)
     gains = "tuned for each cell" if what == "metric" else "one set for all"
     maps = {f"{name}_default": f"{metric}, defaults", name: f"{metric}, {gains}"}
-    return _maps(tuning, table, maps | {"start_time": f"start time, {gains}, s"}, gains, alike=2)
+    return _maps(tuning, table, maps | {q.time: f"{q.time_name}, {gains}, s"}, gains, alike=2)
 
 
 def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alike: int = 0) -> Figure:
@@ -75,7 +75,7 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
         for index, (panel, name) in enumerate(zip(axes, maps, strict=True)):
             values = fields[index]
             scale = colour_scale(*(fields[:alike] if index < alike else [values]))
-            struck = late if name in (tuning.metric, "start_time") else None
+            struck = late if name in (tuning.metric, q.time) else None
             largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
             decimals = min(max(2 - math.floor(math.log10(largest)), 0), 6) if largest else 2  # three digits
             heat_map(panel, inertias, gaps, values, scale, decimals=decimals, struck=struck)
@@ -101,7 +101,7 @@ def tuning_question(tuning: Tuning) -> str:
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
-        f"{tuning.controller}: {_metric(tuning)} minimised, start time {q.bound}, "
+        f"{tuning.controller}: {_metric(tuning)} minimised, {q.time_name} {q.bound}, "
         f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
         f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
     )
@@ -113,19 +113,22 @@ def _columns(table: Dataset) -> dict[str, list[Any]]:
     return {str(name): values for name, values in frame.to_dict("list").items()}
 
 
+_TIMES = {"start_time": "start\ntime s", "settled_time": "settled\nin s"}
+
+
 def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     """The schedule, one row per cell."""
-    of, metric = _columns(table), _metric(tuning)
+    of, metric, q = _columns(table), _metric(tuning), tuning.problem
     numbers = {
         "gap\nrad": of["gap"],
         "J2\nkg m2": of["load_inertia"],
         **{label(one.name, one.unit, "\n"): of[one.name] for one in tuning.problem.ranges},
         f"{metric}\ndefault": of[f"{tuning.metric}_default"],
         f"{metric}\ntuned": of[tuning.metric],
-        "start\ntime s": of["start_time"],
+        _TIMES[q.time]: of[q.time],
     }
     columns = {heading: column_of(values) for heading, values in numbers.items()} | {
-        "at most\ns": [one.replace("inf", "-") for one in column_of(of["start_time_bound"])],
+        "at most\ns": [one.replace("inf", "-") for one in column_of(of[f"{q.time}_bound"])],
         "in\ntime": ["yes" if good else "no" for good in of["in_time"]],
         "searches\nagree": [f"{n} of {tuning.problem.restarts}" for n in of["agreement"]],
     }
@@ -227,6 +230,8 @@ def tuning_notes(tuning: Tuning) -> list[str]:
     if len(drive.mass_names) > 2:
         load = drive.mass_names[drive.load_index]
         notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")
+    if tuning.robust is not None:
+        notes += tuning.robust.controller.controller.doubts(tuning.robust.controller.nominal)
     if q.soft is not None:
         notes.append(
             Sentence(
@@ -254,8 +259,8 @@ def tuning_notes(tuning: Tuning) -> list[str]:
         difference = float(np.max(np.abs(robust[known] / each[known] - 1.0), initial=0.0))
         if difference > SAME_TIME:
             notes.append(
-                "Permitted start times: one set, that of the defaults of the nominal drive; each cell tuned, "
-                f"that of the defaults there. They differ by up to {100.0 * difference:.1f} %."
+                f"Permitted {q.time_name}s: one set, that of the defaults of the nominal drive; each cell "
+                f"tuned, that of the defaults there. They differ by up to {100.0 * difference:.1f} %."
             )
     for ratio, title in PRICES.items():
         if price is not None and ratio in price and (missing := int(price[ratio].isnull().sum())):
