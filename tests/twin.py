@@ -26,6 +26,16 @@ class PlainTwin(PlainController):
         """Those of the compiled controller."""
         return self.twin.sensors  # type: ignore[no-any-return]
 
+    @property
+    def can_stop(self) -> bool:  # type: ignore[override]
+        """As the compiled controller."""
+        return self.twin.can_stop  # type: ignore[no-any-return]
+
+    @property
+    def can_reverse(self) -> bool:  # type: ignore[override]
+        """As the compiled controller."""
+        return self.twin.can_reverse  # type: ignore[no-any-return]
+
     def regulation(self, drive: Drive) -> Regulation | None:
         """That of the compiled controller."""
         return self.twin.regulation(drive)  # type: ignore[no-any-return]
