@@ -146,6 +146,8 @@ class AccelerationDelay(CompiledController):
     summary = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
     source = "[G]"
     effort = Effort.STEPS
+    time_parameter = "torque"
+    settings = ("delay", "full_torque")
     kernel = step
 
     # fmt: off

@@ -118,6 +118,7 @@ class Landing(CompiledController):
     """A strategy that lands softly. `impact` is c dw12/Omega over the shaft torque under the full torque."""
 
     effort = Effort.ENCODER
+    time_parameter = "full_torque"
     impact: ClassVar[float] = 0.7
 
     # fmt: off

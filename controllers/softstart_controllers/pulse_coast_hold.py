@@ -249,6 +249,7 @@ class PulseCoastHold(CompiledController):
     summary = "pulse to a motor speed, coast until the shaft torque peaks, hold the peak"
     source = "softstart: the optimum of docs/optimal-starts.md as feedback"
     effort = Effort.ENCODER
+    time_parameter = "hold_share"
     kernel = step
 
     # fmt: off

@@ -79,6 +79,8 @@ class Ramp(CompiledController):
     summary = "torque rises in a straight line from the load torque to the starting torque"
     source = "practice"
     effort = Effort.RAMPS
+    time_parameter = "time"
+    settings = ("initial", "full_torque")
     kernel = step
 
     # fmt: off

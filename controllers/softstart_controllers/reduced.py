@@ -81,6 +81,7 @@ class ReducedTorque(CompiledController):
     """A torque that is low until contact and for a time after it, switched at the events of the gap."""
 
     sensors = Sensor.STAGE
+    time_parameter = "torque"
     kernel = step_of_gap
 
     torque: float = reduced_torque_parameter("reduced torque")

@@ -139,6 +139,7 @@ class SpeedRamp(CompiledController):
     can_stop = True
     can_reverse = True
     time_parameter = "ramp_time"
+    settings = ("kp", "tn")
     kernel = step
 
     # fmt: off

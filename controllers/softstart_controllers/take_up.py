@@ -207,6 +207,7 @@ class TakeUp(CompiledController):
     summary = "all gaps taken up at low speed, then a damped rise once the load is met"
     source = "softstart: docs/take-up.md"
     effort = Effort.ENCODER
+    time_parameter = "full_torque"
     kernel = step
 
     # fmt: off

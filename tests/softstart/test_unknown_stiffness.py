@@ -56,18 +56,25 @@ def test_shipped_drives_with_gears_lie_between_the_ends(name):
 def test_each_end_is_what_its_own_starts_are(sheet, table):
     stiff, soft = sheet.possible
     for row, there in zip(table.rows, table.soft_end.rows, strict=True):
-        assert row.run.k_dyn == simulate(stiff, row.name).k_dyn
-        assert there.run.k_dyn == simulate(soft, row.name).k_dyn
-        so_set_up = simulate(soft, row.name, fitted_to=stiff).peak_torque / stiff.mean_torque
+        assert row.run.k_dyn == simulate(stiff, make_controller(row.name, row.setting)).k_dyn
+        assert there.run.k_dyn == simulate(soft, make_controller(row.name, there.setting)).k_dyn
+        so_set_up = simulate(soft, row.controller, fitted_to=stiff).peak_torque / stiff.mean_torque
         assert row.cases[SOFT_END].k_dyn == pytest.approx(so_set_up, rel=1e-12)
 
 
-def test_limits_must_be_kept_at_both_ends(table):
-    """2.3 kN m at the output: shaped keeps it at each end if it is set up for it, and not from end to end."""
+def test_limits_must_be_kept_at_both_ends(sheet, table):
+    """2.3 kN m at the output: shaped keeps it at each end if it is set up for it, and not from end to end.
+
+    A ramp does, as it is set for both.
+    """
     margins = {row.name: row.least_margin for row in table.rows}
     assert margins["shaped"].case == SOFT_END
     assert not margins["shaped"].kept
-    assert table.recommendation.recommended is None
+    ramp = table.recommendation.recommended
+    assert (ramp.name, bool(ramp.setting)) == ("ramp", True)
+    for end in sheet.possible:
+        peak = simulate(end, make_controller("ramp", ramp.setting), fitted_to=sheet.drive).peak_torque
+        assert peak <= sheet.drive.limits.shaft_torque
     said = both_ends(table)[1]
     for end, choice in ((STIFF, table.at_this_end), (SOFT, table.soft_end.recommendation)):
         row = choice.recommended

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @options.param_option
 @options.until_option
 @option("--worst-case", lambda text, name: () if text == "none" else options.read_list(text, name))
+@option("--at-time", is_flag=False, flag_value="1.3x")
 @option("--details", is_flag=True)
 @options.of_drive(options.read_machine_or_identified)
 @answers(out=True)
@@ -45,6 +46,10 @@ def compare_command(
     --worst-case A,B,...
         Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. Default:
         both.
+    --at-time TIME
+        Compare at equal time: each strategy with the value of its time parameter that has the lowest K_dyn of
+        64 values whose load has settled within this time, for example 0.5 (s), '500 ms' or 1.3x, times the
+        settled time of direct. Without TIME: 1.3x.
     --details
         Also show times, events, and what each column means.
     --out DIR

@@ -156,7 +156,9 @@ DECLARED: dict[str, tuple[type | UnionType, str]] = {
     **dict.fromkeys(("name", "summary", "source"), (str, "a text in quotes")),
     "sensors": (Sensor, "Sensor.STAGE, Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |"),
     "effort": (Effort | None, "one of Effort, as Effort.RAMPS"),
-    "needs": (tuple, 'names of parameters with commas after them, as ("time",)'),
+    **dict.fromkeys(
+        ("needs", "settings"), (tuple, 'names of parameters with commas after them, as ("time",)')
+    ),
     **dict.fromkeys(("saturates", "can_stop", "can_reverse"), (bool, "True or False")),
     "time_parameter": (str, "the name of a parameter in quotes"),
 }
@@ -181,6 +183,7 @@ class Controller:
     can_stop, can_reverse : whether it follows a command to stop, and one to run the other way.
     time_parameter : the parameter that sets how long a start takes, which comparisons at equal time vary; by
         default there is none.
+    settings : at most two more parameters that are set with it for the limits of a drive.
 
     Examples
     --------
@@ -200,6 +203,7 @@ class Controller:
     can_stop: ClassVar[bool] = False
     can_reverse: ClassVar[bool] = False
     time_parameter: ClassVar[str] = ""
+    settings: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         wrong = [

@@ -131,6 +131,20 @@ def _of_class(cls: type) -> Mapping[str, ControllerParameter]:
     return {f.name: replace(f.metadata.get("parameter", plain), key=f.name, name=f.name) for f in fields(cls)}
 
 
+def set_to_text(controller: object, setting: Mapping[str, float]) -> str:
+    """Values with their units, under the names by which they are given.
+
+    >>> from softstart.controller import make_controller
+    >>> set_to_text(make_controller("ramp"), {"time": 0.134, "initial": 7.0})
+    'time 0.134 s, initial 7 N m'
+    """
+    units = {name: one.unit.replace("*", " ") for name, one in declared_parameters(controller).items()}
+    return ", ".join(
+        f"{name} {value:g}{'' if units[name] in ('', '1') else ' ' + units[name]}"
+        for name, value in setting.items()
+    )
+
+
 class ParameterValues:
     """The parameters of a controller as attributes: as given, or derived when they are first read."""
 

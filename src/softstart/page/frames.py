@@ -27,6 +27,7 @@ from softstart.start.run import Run
 from softstart.views.numbers import unit
 from softstart.views.starts import NO_STIFFNESS, position_notes
 
+AS_SET_HERE = "Strategies count as they are set here; softstart compare also sets them for the limits."
 QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are computed after it
 QUICK = 0.010  # s, of a start that is computed at every step of a slider, even if no frame follows
 LONG = (math.inf, math.inf)
@@ -242,6 +243,8 @@ class FrameBuilder:
                 yield frame
             yield from session.compute_row(label)
         advice = [session.recommendation().text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
+        if inputs.machine.limits:
+            advice.append(AS_SET_HERE)
         yield {
             "rows": [row(session, result) for result in session.strategies],
             "recommendation": " ".join(advice),

@@ -7,9 +7,9 @@ import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from numbers import Real
 from pathlib import Path
@@ -21,6 +21,7 @@ from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive import Machine
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, Mistakes, SimulationError, fact_of
 from softstart.input.files import write_whole
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
@@ -36,10 +37,12 @@ from softstart.start.comparison import (
     as_far_as_known,
     compared,
     make_controllers,
+    set_for_limits,
 )
 from softstart.start.demand import ControllerLike
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
+from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.numbers import DASH, percent
 from softstart.views.sheet import Sheet
@@ -345,9 +348,15 @@ def report(
             if name == REFERENCE:
                 raise
             failed.append((name, " ".join(str(error).split())))
-    rows = tuple(row for _, row in started)
-    compared_soft = None if soft is None else Comparison(soft, tuple(at_soft_end))
-    choice = Choice(Comparison(machine, rows, worst_case=rows[0].worst_case, soft_end=compared_soft), maps)
+    compared_soft = None
+    if soft is not None:
+        ends = [(one, row) for (one, _), row in zip(started, at_soft_end, strict=True)]
+        compared_soft, _ = _set_for_limits(soft, ends, soft_reference)
+    comparison, started = _set_for_limits(machine, started, reference, drawn, soft, compared_soft)
+    rows = comparison.rows
+    changed = [(one, row) for one, row in started if row.setting and mapped]
+    maps |= {row.name: robustness(machine.design_drive, one) for one, row in changed}
+    choice = Choice(comparison, maps)
     sheets: list[ParameterSheet] = []
 
     def round_off() -> None:
@@ -371,6 +380,23 @@ def report(
     return Report(
         machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about
     )
+
+
+def _set_for_limits(
+    machine: Machine,
+    started: Sequence[tuple[Controller, Row]],
+    direct: Run | None,
+    drawn: MachineTable | None = None,
+    soft: Any = None,
+    soft_end: Comparison | None = None,
+) -> tuple[Comparison, list[tuple[Controller, Row]]]:
+    """The comparison of these rows, as `compare` makes it, and its rows with their strategies."""
+    start = partial(compared, machine, direct=direct, drawn=drawn, soft=soft)
+    controllers, rows = zip(*started, strict=True)
+    found, tried = set_for_limits(machine, rows, controllers, direct, start, None, soft)
+    made = [replace(one, **row.setting) for one, row in zip(controllers, found, strict=True)]
+    comparison = Comparison(machine, found, worst_case=found[0].worst_case, soft_end=soft_end, tried=tried)
+    return comparison, list(zip(made, found, strict=True))
 
 
 def _checked_options(

@@ -50,7 +50,7 @@ class Batch:
         which: Indices | slice = slice(None),
         *,
         until: float | None = None,
-        time_limit: float | None = None,
+        time_limit: Vector | float | None = None,
         workers: int = 1,
         settled: bool = False,
     ) -> StartResults:
@@ -84,7 +84,7 @@ class Batch:
         which: Indices | slice = slice(None),
         *,
         until: float | None = None,
-        time_limit: float | None = None,
+        time_limit: Vector | float | None = None,
         workers: int = 1,
         settled: bool = False,
     ) -> Figures:

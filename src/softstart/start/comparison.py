@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from statistics import NormalDist
 from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from softstart.chain.machines import MachineLike, as_machine
-from softstart.controller.base import Controller
+from softstart.controller.base import Controller, Effort, label_of
 from softstart.controller.finding import ready_controller_names
+from softstart.controller.parameters import set_to_text
 from softstart.drive import Drive
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.data_sheet_words import BAND
@@ -23,20 +24,34 @@ from softstart.drive.machine_table import MachineTable
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.profile import TorqueProfile
+from softstart.quantities import read_multiple, show, time_above_0
 from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.demand import ControllerLike, as_controller
-from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
+from softstart.start.recommendation import (
+    CASES,
+    HIGHER,
+    SLOW,
+    Case,
+    Recommendation,
+    Row,
+    checked_limits,
+    keeps,
+    recommend,
+)
 from softstart.start.run import Run
+from softstart.start.setting import Judge, for_limits, over_time
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
 
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
+SCALED: Final = {"gap x4": {"gaps": WORN_GAP}, "J2 x0.4": {"load_inertia": LIGHT_INERTIA}}
 LEFT_POSSIBLE = "the upper end of 95 %"  # the case of a row whose drive is known within intervals
 SOFT_END = f"elastic frequency {BAND[0]:g} Hz"  # the case of a row whose drive is of unknown stiffness
 UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque")
 FEWEST_KNOWN: Final = 0.9  # of the drives drawn whose start must have such a figure
+AT_TIME: Final = "1.3x"  # of the settled time of direct: the time at which strategies are compared
 
 
 class _Share(NamedTuple):
@@ -94,6 +109,29 @@ def intervals(
     return found
 
 
+class TooSlow(NamedTuple):
+    """A strategy that does not settle within the time of a comparison at equal time.
+
+    `settled_time` is its shortest, s, NaN where it does not settle, and `set_to` the value for that.
+    """
+
+    name: str
+    parameter: str
+    settled_time: float
+    set_to: str
+
+    def within(self, at: float) -> str:
+        """As a sentence."""
+        if not self.parameter:
+            return f"{self.name} settles in {self.settled_time:.4g} s, not within {at:.4g} s."
+        if math.isnan(self.settled_time):
+            return f"{self.name}: no value of {self.parameter} settles within {at:.4g} s."
+        return (
+            f"{self.name}: no value of {self.parameter} settles within {at:.4g} s; the quickest, "
+            f"{self.set_to}, settles in {self.settled_time:.4g} s."
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Result, view="starts.comparison_sheet"):
     """Strategies side by side on one drive.
@@ -111,6 +149,13 @@ class Comparison(Result, view="starts.comparison_sheet"):
         The changes of the drive under which its limits must be kept as well.
     soft_end : Comparison or None
         The strategies set up for the soft end of what an unknown stiffness may be, and started there.
+    at_time : float or None
+        The time within which all have settled, s, where they are compared at equal time: each row has its
+        `setting` of the time parameter.
+    too_slow : tuple of TooSlow
+        Strategies that no value of their time parameter makes quick enough for that: not among the rows.
+    tried : tuple of Row
+        Where limits are not kept: the setting of a strategy that came nearest.
 
     Examples
     --------
@@ -131,6 +176,9 @@ class Comparison(Result, view="starts.comparison_sheet"):
     fitted_to: Machine | None = None
     worst_case: tuple[str, ...] = CASES
     soft_end: Comparison | None = None
+    at_time: float | None = None
+    too_slow: tuple[TooSlow, ...] = ()
+    tried: tuple[Row, ...] = ()
 
     def __repr__(self) -> str:
         """One line with the gentlest and the hardest start.
@@ -145,13 +193,27 @@ class Comparison(Result, view="starts.comparison_sheet"):
     @cached_property
     def recommendation(self) -> Recommendation:
         """What is recommended, and why."""
-        return recommend(self.drive, self.rows)
+        return recommend(self.drive, self.rows, self.tried)
+
+    @property
+    def at_equal_time(self) -> str:
+        """The lowest K_dyn of each class of effort at equal time; "" for strategies as they are."""
+        if self.at_time is None:
+            return ""
+        lowest: dict[Effort, Row] = {}
+        for row in sorted(self.rows, key=lambda row: row.run.k_dyn):
+            lowest.setdefault(row.effort, row)
+        parts = [
+            f"{effort.meaning}: {row.name}, {row.run.k_dyn:.3f}{f' ({row.set_to})' if row.setting else ''}"
+            for effort, row in sorted(lowest.items(), key=lambda one: one[0].order)
+        ]
+        return f"Lowest K_dyn of starts that settle within {self.at_time:.4g} s, with {'; '.join(parts)}."
 
     @cached_property
     def at_this_end(self) -> Recommendation:
         """What is recommended if the stiffness is that of `drive`, whatever happens at the soft end."""
         rows = (replace(row, worst_case=tuple({*row.worst_case} - {SOFT_END})) for row in self.rows)
-        return recommend(self.drive, tuple(rows))
+        return recommend(self.drive, tuple(rows), self.tried)
 
     def summary(self) -> dict[str, object]:
         """Everything as plain data, for JSON."""
@@ -162,6 +224,8 @@ class Comparison(Result, view="starts.comparison_sheet"):
             "strategies": [row.summary() for row in self.rows],
             "plausibility_warnings": plausibility_warnings(self.drive),
             **({} if self.soft_end is None else {"soft_end": self.soft_end.summary()}),
+            **({} if self.at_time is None else {"at_time": self.at_time}),
+            **({} if self.at_time is None else {"too_slow": [one._asdict() for one in self.too_slow]}),
         }
 
 
@@ -173,6 +237,7 @@ def compare(
     until: float | str | None = None,
     fitted_to: Machine | None = None,
     worst_case: Sequence[str] | None = None,
+    at_time: float | str | None = None,
 ) -> Comparison:
     """Start the drive or chain under each controller and compare K_dyn, start time and robustness.
 
@@ -196,11 +261,18 @@ def compare(
         the one they assume.
     worst_case : sequence of str, optional
         Which of "gap x4" and "J2 x0.4" must keep the limits of the drive as well; by default both.
+    at_time : float or str, optional
+        Compare at equal time: of 64 values of the time parameter of each strategy (its `time_parameter`) that
+        with the lowest K_dyn among those whose load has settled within this time, s or with a unit, or a
+        multiple of the settled time of direct as "1.3x". A strategy without such a parameter, or to which it
+        is given, counts as it is.
 
     Returns
     -------
     Comparison
-        One row for each controller, in the order given.
+        One row for each controller, in the order given; at equal time of those that are quick enough. Where
+        the drive has limits and no simpler strategy keeps them as it is, the row is that of the best setting
+        of its time parameter and `Controller.settings`.
 
     Raises
     ------
@@ -219,6 +291,8 @@ def compare(
     >>> table = compare("crane-4amtkf", ["shaped", "pulse-coast-hold"], fitted_to=assumed)
     >>> [round(row.run.k_dyn, 3) for row in table.rows]
     [1.678, 1.274]
+    >>> compare("crane-4amtkf", ["direct", "s-curve"], at_time="1.3x").rows[1].set_to
+    'time 0.134 s'
 
     References
     ----------
@@ -235,11 +309,114 @@ def compare(
         raise InputError(f"worst_case = {worst_case!r}: there are {named}; () is the drive as it is alone.")
     made = make_controllers(controllers, parameters or {})
     direct = simulate(drive, REFERENCE, until)
-    rows = tuple(compared(drive, one, direct, until, fitted_to, counted, drawn, soft) for one in made)
+    start = partial(
+        compared,
+        drive,
+        direct=direct,
+        until=until,
+        fitted_to=fitted_to,
+        worst_case=counted,
+        drawn=drawn,
+        soft=soft,
+    )
     at_soft_end = None
     if soft is not None:
-        at_soft_end = compare(soft, made, until=until, fitted_to=fitted_to, worst_case=counted)
-    return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end)
+        at_soft_end = compare(
+            soft, made, until=until, fitted_to=fitted_to, worst_case=counted, at_time=at_time
+        )
+    if at_time is not None:
+        at = equal_time(at_time, direct)
+        found = [_at_time(drive, one, direct, at, fitted_to, start) for one in made]
+        rows = tuple(one for one in found if isinstance(one, Row))
+        too_slow = tuple(one for one in found if isinstance(one, TooSlow))
+        if not rows:
+            reasons = " ".join(one.within(at) for one in too_slow)
+            raise InputError(f"at_time = {show(at_time)}: give a longer time. {reasons}")
+        return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end, at, too_slow)
+    rows = tuple(map(start, made))
+    rows, tried = set_for_limits(drive, rows, made, direct, start, fitted_to, soft)
+    return Comparison(drive, rows, fitted_to, rows[0].worst_case, at_soft_end, tried=tried)
+
+
+def equal_time(at_time: float | str, direct: Run) -> float:
+    """The time of a comparison at equal time, s: itself, or a multiple of the settled time of direct."""
+    advice = f", or a multiple of the settled time of direct, as {AT_TIME}"
+    if multiple := read_multiple(at_time, "at_time"):
+        if not 0.0 < multiple[0] < math.inf:
+            raise InputError(f"at_time = {show(at_time)}: give a time above 0 s{advice}.")
+        if math.isnan(direct.settled_time):
+            raise InputError(f"at_time = {show(at_time)}: direct does not settle; give a time in s.")
+        return float(multiple[0] * direct.settled_time)
+    return time_above_0(at_time, "at_time", advice)
+
+
+def _at_time(
+    drive: Machine,
+    controller: Controller,
+    direct: Run,
+    at: float,
+    fitted_to: Machine | None,
+    start: Callable[[Controller], Row],
+) -> Row | TooSlow:
+    """The row of a strategy whose time parameter is set for the lowest K_dyn within a time."""
+    name = label_of(controller)
+    span = float(direct.settled_time)
+    tried = over_time(drive, controller, at if math.isnan(span) else span, at, fitted_to)
+    if tried is None:
+        row = start(controller)
+        settled = float(row.run.settled_time)
+        return row if settled <= at else TooSlow(name, "", settled, "")
+    if (setting := tried.best(at)) is None:
+        value, settled = tried.quickest or ({}, math.nan)
+        return TooSlow(name, tried.name, settled, set_to_text(controller, value))
+    return replace(start(replace(controller, **setting)), setting=setting)
+
+
+def set_for_limits(
+    drive: Machine,
+    rows: tuple[Row, ...],
+    controllers: Sequence[Controller],
+    direct: Run | None,
+    start: Callable[[Controller], Row],
+    fitted_to: Machine | None = None,
+    soft: Drive | None = None,
+) -> tuple[tuple[Row, ...], tuple[Row, ...]]:
+    """The rows with strategies set for the limits of the drive; and settings that do not keep them.
+
+    Class by class of effort, the least first: where no strategy keeps the limits as it is, each is set, until
+    one does. Above that class those below an encoder have their time parameter set if they do not keep the
+    limits. The row of a setting, with all its changed machines, decides.
+    """
+    limits = checked_limits(drive)
+    if not limits or direct is None or math.isnan(direct.settled_time):
+        return rows, ()
+    changed = [drive.scaled(**SCALED[case]) for case in CASES if case in rows[0].worst_case]
+    changed += [soft] if soft is not None else []
+    slow = math.inf if drive.limits.start_time is not None else SLOW
+    judge = Judge(drive, changed, limits, float(direct.k_dyn), float(direct.settled_time), slow, HIGHER)
+    found, tried, done = list(rows), list[Row](), False
+    for effort in Effort:
+        places = [i for i, row in enumerate(rows) if row.effort is effort]
+        if effort is Effort.SENSOR or (done and effort.order >= Effort.ENCODER.order):
+            break
+        if any(keeps(rows[i], limits) for i in places):
+            done = True
+            continue
+        before = done
+        for i in places:
+            setting = for_limits(controllers[i], judge, fitted_to, alone=before)
+            if not setting:
+                continue
+            try:
+                row = replace(start(replace(controllers[i], **setting)), setting=setting, label=rows[i].label)
+            except SimulationError:  # in one of its changed machines
+                continue
+            if keeps(row, limits):
+                found[i] = row
+            else:
+                tried.append(row)
+        done = done or any(keeps(found[i], limits) for i in places)
+    return tuple(found), tuple(tried)
 
 
 def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, MachineTable | None, Drive | None]:
@@ -314,13 +491,7 @@ def changed_case(
     soft: Drive | None = None,
 ) -> Case:
     """A controller set up for `drive`, with 4 times its gap, 0.4 of its load inertia, or on `soft`."""
-    changed: Machine
-    if soft is not None:
-        changed = soft
-    elif case == "gap x4":
-        changed = drive.scaled(gaps=WORN_GAP)
-    else:
-        changed = drive.scaled(load_inertia=LIGHT_INERTIA)
+    changed = drive.scaled(**SCALED[case]) if soft is None else soft
     try:
         return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:

@@ -71,7 +71,9 @@ class KernelInput:
         machines, masses, shafts = self.machines[which], self.masses[which], self.shafts[which]
         return KernelInput(machines, masses, shafts, self.curves[which], self.tones)
 
-    def with_limits(self, time_limit: float | None = None, max_events: int | None = None) -> KernelInput:
+    def with_limits(
+        self, time_limit: Vector | float | None = None, max_events: int | None = None
+    ) -> KernelInput:
         """The same with another time limit or cap on events."""
         machines = self.machines.copy()
         columns = machines.view(rec.MACHINE)[:, 0]

@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Controller, Effort, effort_of, label_of
+from softstart.controller.parameters import set_to_text
 from softstart.drive import Limit, Limits, Machine
 from softstart.errors import Sentence
 from softstart.results import OneLine
@@ -139,7 +140,8 @@ class Row(OneLine):
 
     `intervals` of 95 %, by figure, where the drive is known within intervals only (`compare`).
     `direct` is the start that times are compared with, None where that fails; `worst_case` names those of the
-    `cases` that must keep the limits, besides the drive as it is.
+    `cases` that must keep the limits, besides the drive as it is. `setting` are the parameters that were set
+    for this machine, at equal time or for its limits.
     """
 
     run: Run
@@ -148,6 +150,12 @@ class Row(OneLine):
     worst_case: tuple[str, ...] = CASES
     label: str = ""  # a name of its own in tables
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    setting: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def set_to(self) -> str:
+        """The parameters that were set for this machine: "time 0.134 s"; "" for the strategy as it is."""
+        return set_to_text(self.controller, self.setting)
 
     @property
     def controller(self) -> Controller:
@@ -233,6 +241,7 @@ class Row(OneLine):
             "k_dyn_worn_gap": self.k_dyn_worn_gap,
             "k_dyn_light_load": self.k_dyn_light_load,
             "effort": self.effort.value,
+            "set_to": dict(self.setting),
             "flags": [flag.text for flag in self.flags],
             **{
                 f"{name}_{end}": v
@@ -317,13 +326,16 @@ class Recommendation(OneLine):
         }
 
 
-def recommend(drive: Machine, rows: Iterable[Row]) -> Recommendation:
-    """The recommendation among the strategies started on a drive."""
+def recommend(drive: Machine, rows: Iterable[Row], tried: Sequence[Row] = ()) -> Recommendation:
+    """The recommendation among the strategies started on a drive.
+
+    `tried` are the best settings of strategies that keep the limits with none.
+    """
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _pareto_set(able)
     if limits:
-        return _with_limits(limits, rows, able, best, unchecked_life(drive))
+        return _with_limits(limits, rows, able, best, unchecked_life(drive), tried)
     advice = f"For a recommendation, give {drive.LIMITS_GIVEN}." if best else ""
     fact = f"{_pareto_optimal(best, rows)} {unchecked_life(drive)}".rstrip()
     return Recommendation(Sentence(fact, advice), None, best, limits)
@@ -398,7 +410,12 @@ def _why_not(row: Row, limits: Limits) -> str:
 
 
 def _with_limits(
-    limits: Limits, rows: Sequence[Row], able: Sequence[Row], best: tuple[Row, ...], unchecked: str
+    limits: Limits,
+    rows: Sequence[Row],
+    able: Sequence[Row],
+    best: tuple[Row, ...],
+    unchecked: str,
+    tried: Sequence[Row],
 ) -> Recommendation:
     def _answer(text: str, chosen: Row | None) -> Recommendation:
         return Recommendation(Sentence(f"{text} {unchecked}".rstrip()), chosen, best, limits)
@@ -407,23 +424,40 @@ def _with_limits(
         shares = [one.share for one in row.margins(limits)]
         return -math.inf if any(map(math.isnan, shares)) else min(shares, default=math.inf)
 
-    passing = [row for row in able if all(one.kept for one in row.margins(limits))]
+    at_best = {row.name: row for row in tried if not row.flags}
+
+    def why_not(row: Row) -> str:
+        row = at_best.get(row.name, row)
+        return f"{row.name}, {_why_not(row, limits)}{f' at best ({row.set_to})' if row.setting else ''}"
+
+    passing = [row for row in able if keeps(row, limits)]
     if not passing:
-        nearest = max(able, key=least, default=None)
-        reason = f"Nearest: {nearest.name}, {_why_not(nearest, limits)}" if nearest else _refused(rows)
+        nearest = max([*able, *at_best.values()], key=least, default=None)
+        reason = f"Nearest: {why_not(nearest)}" if nearest else _refused(rows)
         return _answer(f"No strategy keeps the limits. {reason}.", None)
     effort = min(row.effort.order for row in passing)
     chosen = max((row for row in passing if row.effort.order == effort), key=least)
     margins = _capital("; ".join(map(str, chosen.margins(limits))))
+    setting = (
+        f", set to {chosen.set_to}; settled in {chosen.run.settled_time:.4g} s" if chosen.setting else ""
+    )
     text = (
-        f"Recommended: {chosen.name}, the simplest strategy that keeps the limits ({chosen.effort.meaning}). "
-        f"{margins}."
+        f"Recommended: {chosen.name}, the simplest strategy that keeps the limits ({chosen.effort.meaning})"
+        f"{setting}. {margins}."
     )
     simpler = sorted((row for row in rows if row.effort.order < effort), key=lambda row: row.effort.order)
     if simpler:
-        reasons = "; ".join(f"{row.name}, {_why_not(row, limits)}" for row in simpler)
-        text = f"{text} Simpler ones do not: {reasons}."
+        text = f"{text} Simpler ones do not: {'; '.join(map(why_not, simpler))}."
+    others = [row for row in passing if row.setting and row is not chosen]
+    if others:
+        also = "; ".join(f"{row.name} when set to {row.set_to}" for row in others)
+        text = f"{text} These do as well: {also}."
     return _answer(text, chosen)
+
+
+def keeps(row: Row, limits: Limits) -> bool:
+    """Whether a strategy keeps all limits in the worst case and may be recommended."""
+    return not row.flags and row.effort is not Effort.SENSOR and all(one.kept for one in row.margins(limits))
 
 
 def _capital(text: str) -> str:

@@ -308,7 +308,15 @@ def comparison_table(
         *at_details(rows[0].run.drive),
     )
     judged = PEAK_COLUMNS[0] in figures
-    columns = [DataColumn("strategy", lambda row: row.marked if judged else row.name), *figures]
+    # several values of a strategy do not fit into a column: they are among the remarks
+    fits = all(len(row.setting) <= 1 for row in rows)
+
+    def name(row: Row) -> str:
+        return f"{row.marked if judged else row.name}{', set' if row.setting and not fits else ''}"
+
+    columns = [DataColumn("strategy", name), *figures]
+    if judged and fits and any(row.setting for row in rows):
+        columns.append(DataColumn("set to", lambda row: row.set_to))
     if judged and any(row.against_limits for row in rows):
         columns.append(DataColumn("limits", lambda row: row.against_limits))
     return TextTable.of_data(title, columns, rows, bold=bold)
@@ -417,6 +425,11 @@ def remarks(comparison: Comparison) -> list[str]:
     failed = [row for row in rows if math.isnan(row.run.limited_time)]
     return [
         *comparison.drive.warnings,
+        *(
+            f"{row.name} is set to {row.set_to}."
+            for row in rows
+            if row.setting and comparison.at_time is None
+        ),
         *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
         *(f"{row.name}: {row.run.status.value}" for row in failed),
@@ -461,9 +474,14 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         f"{machine.name}: soft-start strategies compared",
         machine_lines(machine, comparison.fitted_to),
         tables=[comparison_table(rows, which, title, bold) for title, which in parts],
-        conclusions=[comparison.recommendation.text, *both_ends(comparison)],
+        conclusions=[
+            *filter(None, [comparison.at_equal_time]),
+            comparison.recommendation.text,
+            *both_ends(comparison),
+        ],
         notes=[
             *(definitions(comparison) if details else short_notes(rows)),
+            *(one.within(comparison.at_time or math.nan) for one in comparison.too_slow),
             *remarks(comparison),
         ],
         figures=figures,
@@ -478,7 +496,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
 
 def _record(row: Row) -> Mapping[str, Any]:
     """The figures of a strategy under the names of JSON, each limit with a column of its own."""
-    found = row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)}
+    found = row.summary() | {"flags": "; ".join(flag.text for flag in row.flags), "set_to": row.set_to}
     found |= {f"margin_{one['limit'].replace(' ', '_')}": one["margin"] for one in found.get("limits", ())}
     return {
         key: value

@@ -77,7 +77,8 @@ def test_a_limit_at_the_output_is_judged_as_the_same_at_the_motor_without_losses
         drive=drive,
         k_dyn=1.0,
         peak_torque=60.0 * most * share,
-        start_time=1.0,
+        limited_time=1.0,
+        limited_name="start time",
         used_torque=0.0,
         controller=None,
     )
