@@ -90,18 +90,27 @@ class Choice(OneLine):
     @cached_property
     def ordinary(self) -> Row | None:
         """That of an ordinary inverter with the lowest worst-case K_dyn, unflagged, within the limits."""
-        ramps = [
+        return self._gentlest(Effort.RAMPS)
+
+    @cached_property
+    def speed_controlled(self) -> Row | None:
+        """That of an inverter with closed-loop speed control, by the same rule."""
+        return self._gentlest(Effort.SPEED)
+
+    def _gentlest(self, effort: Effort) -> Row | None:
+        rows = [
             row
             for row in self.comparison.rows
-            if row.effort is Effort.RAMPS and not row.flags and not math.isnan(self.worst(row))
+            if row.effort is effort and not row.flags and not math.isnan(self.worst(row))
             if all(margin.kept for margin in row.margins(self.recommendation.limits))
         ]
-        return min(ramps, key=self.worst, default=None)
+        return min(rows, key=self.worst, default=None)
 
     @property
     def of_sheets(self) -> list[Row]:
-        """The chosen strategy and that of an ordinary inverter, each once."""
-        return list(dict.fromkeys(row for row in (self.chosen, self.ordinary) if row is not None))
+        """The chosen strategy, and those of an ordinary inverter and of one with speed control, each once."""
+        rows = (self.chosen, self.ordinary, self.speed_controlled)
+        return list(dict.fromkeys(row for row in rows if row is not None))
 
     @property
     def role(self) -> str:

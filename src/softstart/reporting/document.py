@@ -5,11 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
@@ -21,6 +20,7 @@ from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, limit
+from softstart.reporting.inverters import at_inverters, gain_base, inverters, speed_values
 from softstart.reporting.resolution import rated_torque
 from softstart.start import fatigue
 from softstart.start.recommendation import SLOW
@@ -207,7 +207,8 @@ def document(report: Report) -> str:
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
         "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
-        "inverters": inverters(),
+        "inverters": inverters(), "at_inverters": at_inverters, "gain_base": gain_base,
+        "speed_values": speed_values,
         "table": partial(table, comma), "view": partial(view, comma),
         "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
@@ -260,11 +261,6 @@ def maps_figure(report: Report) -> Figure:
             worst = f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
             panel.set_title(f"{verbatim(name)}: {worst}", loc="left", fontsize=SMALL)
     return figure
-
-
-def inverters() -> dict[str, Any]:
-    """Names of functions in manuals, and what a parameter means at an inverter."""
-    return tomllib.loads((HERE / "inverters.toml").read_text("utf-8"))
 
 
 def strategies(report: Report) -> TextTable:

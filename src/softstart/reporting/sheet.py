@@ -16,6 +16,7 @@ from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
+from softstart.reporting.inverters import gain_base
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.results import OneLine
 from softstart.start.batch import prepared
@@ -27,6 +28,8 @@ from softstart.start.simulation import simulate
 from softstart.views.numbers import RPM, decimals_of, digits, fixed, short, unit
 
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
+OFF_AT_0 = ("preload", "filter_time")  # 0 is none of it, not a value that may be half a step off
+GAIN = "N*m*s/rad"  # of a speed controller
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 NEIGHBOURS = 3  # rounded values up to which every combination of steps beside them is tried
@@ -98,6 +101,8 @@ class Setting:
             rated, basis = rated_torque(drive)
             percent = step_multiple(100.0 * self.rounded / rated, self.step and 100.0 * self.step / rated)
             other = f"{percent} % of the {basis}"
+        elif self.unit == GAIN:
+            other = f"{digits(self.rounded / gain_base(drive)[0])} % of torque per % of speed"
         value, exact = factor * self.rounded, short(float(f"{factor * self.exact:.5g}"))
         if self.name in KEPT:
             digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
@@ -186,6 +191,11 @@ class ParameterSheet(OneLine):
         exact = self.exact
         return self.worst_k_dyn * exact.peak_torque / exact.k_dyn if exact.k_dyn > 0.0 else math.nan
 
+    @property
+    def values(self) -> dict[str, float]:
+        """What its numbers are set to, SI."""
+        return {one.name: one.rounded for one in self.settings if isinstance(one.rounded, float)}
+
     def value(self, name: str) -> float:
         """What a setting is set to, SI."""
         return float(next(one.rounded for one in self.settings if one.name == name))
@@ -273,6 +283,10 @@ def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> tuple[
             continue
         number = float(value)
         step = None if name in KEPT else resolution.step(name, unit, rated)
+        if unit == GAIN:  # in shares of per cent of torque per per cent of speed
+            step = resolution.share * gain_base(drive)[0]
+        if name in OFF_AT_0 and number == 0.0:
+            step = None
         if step is None or not math.isfinite(number):
             found.append(Setting(name, meaning, unit, number, number, None))
             continue

@@ -1,0 +1,69 @@
+"""What the settings of a speed ramp are at each family of inverters: names and values of its functions."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from softstart.drive import Drive
+from softstart.reporting.resolution import rated_torque
+from softstart.views.numbers import RPM, short
+
+
+def inverters() -> dict[str, Any]:
+    """Names of functions in manuals, and what a parameter means at an inverter."""
+    return tomllib.loads((Path(__file__).parent / "inverters.toml").read_text("utf-8"))
+
+
+def gain_base(drive: Drive) -> tuple[float, str]:
+    """The gain in N m s/rad that is 1 per cent of torque per per cent of speed, and what 100 % speed is.
+
+    >>> base, what = gain_base(Drive.load("crane-4amtkf"))
+    >>> round(base, 4), what
+    (0.2591, 'rated speed')
+    """
+    rated, torque = drive.rated_speed, rated_torque(drive)[0]
+    if rated is None or not rated > 0.0:
+        return torque / float(drive.target_speed), "target speed"
+    return torque / float(rated), "rated speed"
+
+
+def speed_values(values: Mapping[str, float], drive: Drive) -> dict[str, str]:
+    """The values of a speed ramp in the units of inverters, as the texts of `speed` in the file name them.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> values = {"ramp_time": 0.5, "rounding": 0.2, "kp": 5.18, "tn": 0.08, "torque_limit": 47.75}
+    >>> found = speed_values(values | {"filter_time": 0.002}, crane)
+    >>> [found[name] for name in ("ramp_s", "rounding_s", "kp_percent", "tn_ms", "limit_percent")]
+    ['0.5', '0.1', '19.99', '80', '200']
+    """
+
+    def text(value: float) -> str:
+        return short(float(f"{value:.4g}"))
+
+    ramp, tn = values["ramp_time"], values["tn"]
+    return {
+        "ramp_s": text(ramp),
+        "rate": text(drive.target_speed * RPM / ramp),
+        "target_rpm": text(drive.target_speed * RPM),
+        "rounding_s": text(values["rounding"] * ramp),
+        "rounding_percent": text(100.0 * values["rounding"]),
+        "kp": text(values["kp"]),
+        "kp_percent": text(values["kp"] / gain_base(drive)[0]),
+        "tn_ms": text(1e3 * tn),
+        "tn_s": text(tn),
+        "filter_ms": text(1e3 * values["filter_time"]),
+        "limit_percent": text(100.0 * values["torque_limit"] / rated_torque(drive)[0]),
+    }
+
+
+def at_inverters(values: Mapping[str, float], drive: Drive) -> list[tuple[str, str]]:
+    """Families, as "NAME [n]" with the number of their source, and the speed ramp in their functions."""
+    texts = speed_values(values, drive)
+    return [
+        (f"{family['name']} [{number}]", family["speed"].format(**texts))
+        for number, family in enumerate(inverters()["family"], 1)
+        if "speed" in family
+    ]
