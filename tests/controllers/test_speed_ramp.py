@@ -13,7 +13,9 @@ from tests.twin import plain
 
 from softstart import Drive, InputError, Run, compare, simulate
 from softstart.drive import library
-from softstart.kernel.records import NOTES
+from softstart.kernel.motor import encoder_count
+from softstart.kernel.records import CLOSED, NOTES
+from softstart.start.batch import prepared
 from softstart_controllers import speed_ramp
 from softstart_controllers.speed_ramp import SpeedRamp, open_gap_margin, small_times
 
@@ -63,17 +65,17 @@ def random_starts(seed: int, count: int, encoder: bool) -> list[Run]:
 
 @pytest.mark.parametrize(("seed", "encoder"), [(1, False), (2, True)])
 def test_equals_an_independent_loop_on_an_independent_plant(seed: int, encoder: bool) -> None:
-    run = min(random_starts(seed, 5, encoder), key=lambda run: run.end_time / run.controller.period)
+    run = min(random_starts(seed, 3, encoder), key=lambda run: run.end_time / run.controller.period)
     assert np.abs(against_the_loop(run)).max() < SAME
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "count", "encoder"), [(3, 80, False), (4, 20, True)])
 def test_equals_an_independent_loop_on_many_drives(seed: int, count: int, encoder: bool) -> None:
-    """100 drives; measured: 2e-13."""
+    """100 drives, 20 with encoder and filter; measured: 5e-11, a start time, where the speed grazes."""
     runs = random_starts(seed, count, encoder)
     assert {run.drive.load_kind for run in runs} == {"active", "reactive"}
-    assert sum(run.contacts > 1 for run in runs) > count // 4
+    assert sum(run.contacts > 1 for run in runs) > count // 8
     worst = max(np.abs(against_the_loop(run)).max() for run in runs)
     assert worst < SAME
 
@@ -271,3 +273,81 @@ def test_a_preload_lasts_until_the_motor_has_crossed_the_gap_from_the_other_flan
     assert float(run.at(end + 0.0015)["u"]) != 5.0
     gentle = simulate(CRANE.replace(gap=2.0), "speed-ramp", parameters={"preload": 5.0})
     assert gentle.k_dyn < simulate(CRANE.replace(gap=2.0), "speed-ramp").k_dyn - 0.2
+
+
+# ---- the rule for the gains, over drives that somebody might build --------------------------------------
+
+SHIPPED = {  # K_dyn, settled time s, overshoot, contacts: as in docs/controllers.md
+    "crane-4amtkf": (1.225, 0.496, 0.026, 2),
+    "hoist-15kw": (1.008, 0.254, 0.017, 1),
+    "conveyor-11kw": (0.956, 1.103, 0.011, 1),
+    "long-travel-3kw": (1.059, 1.939, 0.032, 2),
+    "nordin-servo-60kw": (0.983, 2.621, 0.006, 1),
+    "servo-axis-small": (1.334, 0.0583, 0.018, 3),
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_starts_the_shipped_drives_without_rattling(name: str) -> None:
+    run = simulate(name, "speed-ramp")
+    k_dyn, settled, overshoot, contacts = SHIPPED[name]
+    assert run.k_dyn == pytest.approx(k_dyn, abs=6e-4)
+    assert run.settled_time == pytest.approx(settled, rel=2e-3)
+    assert run.overshoot == pytest.approx(overshoot, abs=6e-4)
+    assert run.contacts == contacts
+    assert run.k_dyn < simulate(name, "direct").k_dyn
+
+
+def scanned() -> list[Drive]:
+    """300 random drives."""
+    rng = np.random.default_rng(49)
+    return [random_drive(rng) for _ in range(300)]
+
+
+@pytest.mark.slow
+def test_defaults_have_no_limit_cycle_and_settle() -> None:
+    """Contacts long after the start are a limit cycle, in one drive whose load torque is 0.1 % of Ms.
+
+    The five that do not settle have an encoder too coarse for the band of 2 %.
+    """
+    cycles, unsettled = [], []
+    for drive in scanned():
+        run = simulate(drive, "speed-ramp")
+        late = 10.0 * run.controller.tn + 25.0 * drive.elastic_period
+        longer = simulate(drive, "speed-ramp", until=run.end_time + 2.0 * late)
+        events = longer.trajectory.events
+        if ((events["kind"] == CLOSED) & (events["time"] > longer.end_time - late)).any():
+            cycles.append(drive)
+        if not run.status.success:
+            unsettled.append(encoder_count(drive.encoder_lines) / run.controller.period / drive.target_speed)
+    (cycle,) = cycles
+    assert cycle.Mc < 0.002 * cycle.Ms
+    assert cycle.damping == 0.0
+    assert len(unsettled) == 5
+    assert min(unsettled) > 0.13  # of the target speed is a count in a sample
+
+
+@pytest.mark.slow
+def test_default_gains_are_near_the_best_of_a_grid() -> None:
+    """K_dyn over the lowest of 8 x 5 gains, same ramp, that settle in 1.1 times the time; every 3rd drive.
+
+    Measured over all 300: median 1.05, nine of ten below 1.16, largest 1.37.
+    """
+    S, share = (axis.ravel() for axis in np.meshgrid(
+        [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0], [1.0, 2.0, 4.0, 8.0, 16.0], indexing="ij"
+    ))  # fmt: skip
+    ratios = []
+    for drive in scanned()[::3]:
+        ready = SpeedRamp().fitted(drive)
+        kp, tn = np.append(1.0, 1.0 / S) * ready.kp, np.append(1.0, S * share) * ready.tn
+        tn[1:] /= 4.0
+        same = [drive] * kp.size
+        found = prepared(same).figures(SpeedRamp(kp=kp, tn=tn).set_ups(same), drive.mean_torque, settled=True)
+        k_dyn, settled = found["k_dyn"][0], found["settled_time"][0]
+        quick = settled <= 1.1 * (settled[0] if math.isfinite(settled[0]) else math.inf)
+        if quick.any():
+            ratios.append(k_dyn[0] / k_dyn[quick].min())
+    assert len(ratios) > 95
+    assert np.median(ratios) < 1.07
+    assert np.quantile(ratios, 0.9) < 1.2
+    assert max(ratios) < 1.4
