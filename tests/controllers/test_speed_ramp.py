@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -260,6 +261,16 @@ def test_a_preload_below_the_friction_of_the_motor_is_refused() -> None:
     with pytest.raises(InputError, match="must be above the friction of the motor, 2 N m") as caught:
         simulate(CRANE.replace(motor_friction=2.0), "speed-ramp", parameters={"preload": 1.5})
     assert len(caught.value.sentences) == 1
+
+
+@pytest.mark.parametrize("speed", [185.0, -185.0, "1770 rpm", 1e40])
+def test_a_set_speed_far_beyond_the_rated_speed_is_refused(speed: Any) -> None:
+    """880 rpm are 92.15 rad/s; twice that is allowed."""
+    words = "above 2 times the rated or target speed, 92.15 rad/s"
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        simulate(CRANE, "speed-ramp", commands=[(0.5, 1, speed)], until=1.0)
+    assert len(caught.value.sentences) == 1
+    assert simulate(CRANE, "speed-ramp", commands=[(0.5, 1, 184.0)], until=0.6).end_time == 0.6
 
 
 def test_a_preload_lasts_until_the_motor_has_crossed_the_gap_from_the_other_flank() -> None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from softstart.chain.periodic_torque import PeriodicTorque
 
 DEFAULT_DRIVE = "crane-4amtkf"
+FIELD_WEAKENING = 2.0  # times the rated speed: the largest set speed
 Time = float | str | None  # s, or with a unit
 DriveCommand = tuple[float | str, int, float | str]  # time, run, set speed
 
@@ -207,6 +208,8 @@ def check_commands(
             f"commands: {missing} is missing; commands change what a controller follows until then."
         )
     name, last, changes = label_of(controller), 0.0, list[DriveCommand]()
+    speeds = (machine.target_speed, getattr(machine.motor, "rated_speed", None))
+    known = [speed for speed in speeds if speed is not None]
     for time, run, set_speed in commands:
         where = f"commands: ({show(time)}, {show(run)}, {show(set_speed)})"
         at, speed = number_in("s", time, "commands"), number_in("rad/s", set_speed, "commands")
@@ -218,6 +221,11 @@ def check_commands(
         if (run == 0 and not controller.can_stop) or (reverses and not controller.can_reverse):
             verb = "reverse" if reverses else "stop"
             raise InputError(f"{where}: {name} cannot {verb} the drive; use one that can, as speed-ramp.")
+        if known and abs(speed) > FIELD_WEAKENING * max(known):
+            raise InputError(
+                f"{where}: the set speed is above {FIELD_WEAKENING:g} times the rated or target speed, "
+                f"{max(known):.4g} rad/s; in field weakening the motor lacks the torque assumed here."
+            )
         changes.append((at, int(run), speed))
         last = at
     return changes
