@@ -169,6 +169,19 @@ def test_gives_the_figures_of_an_earlier_independent_study(
     assert 100.0 * run.overshoot == pytest.approx(overshoot, abs=0.2 if S == 0.01 else 0.06)
 
 
+@pytest.mark.parametrize(
+    ("filter_time", "k_dyn", "contacts"),
+    [(0.0, 1.01, 1), (0.002, 1.10, 3), (0.005, 1.31, 3), (0.02, 2.78, 602)],
+)
+def test_a_speed_filter_feeds_the_vibration(filter_time: float, k_dyn: float, contacts: int) -> None:
+    """As in docs/controllers.md: with 20 ms the lags at the elastic frequency are 29, 66 and 6 degrees."""
+    drive = CRANE.replace(damping=0.0, torque_lag=0.005, encoder_lines=1024.0)
+    given = {"ramp_time": 0.5, "kp": 5.25, "tn": 0.08, "filter_time": filter_time}
+    run = simulate(drive, "speed-ramp", parameters=given)
+    assert run.k_dyn == pytest.approx(k_dyn, abs=0.006)
+    assert run.contacts == contacts or min(run.contacts, contacts) > 100  # rattling, every digit counts
+
+
 # ---- default gains --------------------------------------------------------------------------------------
 
 
