@@ -28,8 +28,7 @@ from softstart.drive import Drive
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
-from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
-from softstart.kernel.records import Measured
+from softstart.kernel.records import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE, Measured
 from softstart.quantities import show
 
 
@@ -369,6 +368,12 @@ def _next_sample(controller: PlainController, time: float) -> float:
     period = getattr(controller, "period", None) or math.inf
     # counted, so that rounding does not add up; SAME_SAMPLE: time is a rounding below its sample
     return (math.floor(time / period + SAME_SAMPLE) + 1.0) * period
+
+
+def period_of(controller: Controller) -> float:
+    """The sample period of a controller that is set up, s; 0 of one that is not sampled."""
+    period = getattr(controller, "period", None)
+    return max(float(period), 0.0) if isinstance(period, Real) else 0.0
 
 
 def label_of(controller: Controller | type[Controller]) -> str:

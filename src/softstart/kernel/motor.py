@@ -10,7 +10,8 @@ from numba import types
 
 from softstart.kernel.jit import separately_compiled, compiled, inner
 from softstart.kernel.records import (
-    ASK, BAD_COMMAND, MEASURED, MEASURED_TYPE, MOST_PENDING, QUEUE_FULL, WORK_TYPE, Record, size,
+    ASK, BAD_COMMAND, MEASURED, MEASURED_TYPE, MOST_PENDING, QUEUE_FULL, SEES_LOAD_SPEED, SEES_STAGE,
+    WORK_TYPE, Record, size,
 )  # fmt: skip
 
 # indices of `command`: torque demand, when to be asked again, slope of the demand until then; the new state
@@ -21,8 +22,6 @@ N_MEASURED = size(MEASURED)
     M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M_LOAD_SPEED, M_RUN,
     M_SET_SPEED, M_COMMAND_TIME,
 ) = range(N_MEASURED)  # fmt: skip
-# what a controller may declare to see beyond time, motor angle, speed and torque
-SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
 _A = types.Array(types.float64, 1, "C")
 STEP_SIGNATURE = types.void(_A, _A, _A, _A)
 

@@ -85,6 +85,54 @@ class MachineRecord:
     regulated: float  # 1 where the controller holds the speed: the start ends `dwell` after it has settled
     command_end: float  # when the last command of such a controller has ended, s
     dwell: float  # for how long the load must stay in its band, s
+    guard: float  # GuardLimits
+
+
+class GuardLimits:
+    """What is guarded under a sampled controller; see `kernel.guard`."""
+
+    period: float  # of the samples, s; 0 is not guarded
+    low: float  # limits of the torque, N m
+    high: float
+    lag: float  # of the realised torque, with its decay in a period
+    decay: float
+    rate: float
+    dead_time: float
+    immediate: float  # 1 without lag, rate and dead time
+    tolerance: float  # of the realised torque beside its model, N m
+    count: float  # of the encoder, rad
+    speed: float  # of the motor that is possible from the beginning, rad/s
+    acceleration: float
+    hold: float  # torque that the load and friction may hold, N m
+    inertia: float  # of the whole machine
+    slack: float  # motion of it that a motor may miss, rad
+    brake: float  # 1 with a brake of the motor
+    commanded: float  # 1 where the controller reads its commands
+
+
+class GuardState:
+    """What has been seen so far."""
+
+    fault: float
+    begun: float
+    time: float  # of the last sample, with what was measured
+    angle: float
+    torque: float
+    due: float  # when the next sample is due
+    fastest: float  # speed so far
+    moved: float
+    still_speed: float  # that the machine should have, while the encoder stands still
+    still_way: float
+    window: float  # beginning of the younger of two windows of demands, with their bounds
+    recent_high: float
+    recent_low: float
+    older_high: float
+    older_low: float
+    ref_high: float  # bounds of the output of the slew limiter
+    ref_low: float
+    high: float  # and of the realised torque
+    low: float
+    off: float  # samples in a row in which the torque is beyond them
 
 
 class MassRecord:
@@ -157,6 +205,7 @@ class ResultRecord:
     asked: float
     n_spans: float
     n_events: float
+    fault: float  # 0, or a code of `kernel.guard.FAULTS`
     position: float  # of an unknown one, that with the largest peak: its place in UNKNOWN_POSITIONS
 
 
@@ -244,6 +293,7 @@ class StartState:
     """The rest of the state of a start."""
 
     t_end: float
+    watch: float  # GuardState
     run: float  # commands: 1 run, 0 stop; the set speed is in MachineRecord
     command_since: float  # when they last changed
     highest_speed: float  # of the load so far, in a regulated start
@@ -359,10 +409,12 @@ def _parts() -> dict[str, Part]:
     shapes |= dict.fromkeys(OfSpan.__annotations__, (MOST_MASSES, ORDERS))
     for part in (MassRecord, ShaftRecord, OfMasses, OfShafts):
         shapes = dict.fromkeys(part.__annotations__, MOST_MASSES) | shapes
-    return shapes
+    return shapes | {"guard": GUARD_LIMITS, "watch": GUARD_STATE}
 
 
-MACHINE, MASS, SHAFT, TONE = record(MachineRecord), record(MassRecord), record(ShaftRecord), record(Tone)
+GUARD_LIMITS, GUARD_STATE = record(GuardLimits), record(GuardState)
+MACHINE = record(MachineRecord, guard=GUARD_LIMITS)
+MASS, SHAFT, TONE = record(MassRecord), record(ShaftRecord), record(Tone)
 CURVE = record(Curve, at=MOST_POINTS, torque=MOST_POINTS)
 NOTES, SHAFT_NOTES, EVENT = record(ResultRecord), record(ShaftNotes), record(EventRow)
 MEASURED, ANSWER = record(Measured), record(Reply)
@@ -418,6 +470,14 @@ CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED = _kind
     TOO_STIFF,
 ) = range(10)  # fmt: skip
 SPANS_PER_EVENT = 2.0  # so many times as many spans as events are permitted
+
+# what a controller may declare to see beyond time, motor angle, speed and torque
+SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
+
+# faults
+(
+    NO_FAULT, NOT_FINITE_MEASURED, SAMPLE_LATE, ENCODER_JUMPED, ENCODER_STUCK, TORQUE_OFF, NO_DEMAND,
+) = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)  # fmt: skip
 
 # what a span ends with
 (

@@ -10,19 +10,19 @@ from softstart.arrays import Matrix, Vector
 from softstart.kernel.events import (
     FAINT, LOST, crossing, deviation_bound, next_event, peak_within, rounding_of_twist, set_line, value,
 )  # fmt: skip
+from softstart.kernel.guard import bounded, check, follow
 from softstart.kernel.jit import as_record, compiled_as, inner, separately_compiled
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
-    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue, note_excess,
+    NEW_STATE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue, note_excess,
     sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
     ANSWER, ASK, AT_EVENTS, AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, BEYOND, BUFFER_FULL, CURVE,
     ENDED, EVENT_LIMIT, LOWER, MEASURED, MOST_MASSES, MOST_NOTED, NOTES, NOT_FINITE, NOT_LOCATED, NO_EVENT,
-    N_NOTES,
-    OF_MASS, OF_SHAFT, OPEN, PRESSED, SETTLE, SPANS_PER_EVENT, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF,
-    S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG, TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE,
-    Record,
+    NO_FAULT, N_NOTES, OF_MASS, OF_SHAFT, OPEN, PRESSED, SEES_SHAFT_TORQUE, SETTLE, SPANS_PER_EVENT,
+    S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
+    TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
 )  # fmt: skip
 from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, find_piece, orders
 
@@ -92,6 +92,7 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     s.contact_torque = s.stage_2_end = s.settled = s.overshoot = math.nan
     s.run = 1.0
     s.command_since = 0.0
+    s.watch.fault = s.watch.begun = 0.0
     s.highest_speed = s.w0[s.at_load]
     if s.regulated != 0.0 and s.band_low <= s.highest_speed <= s.band_high:
         s.settled = 0.0
@@ -411,21 +412,34 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
     return float(spring_torque(s, k))
 
 
-@compiled_as(types.void(_A, types.int64, _M, _A))
-def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
-    """What the controller sees now."""
+@compiled_as(types.float64(_A, types.int64, _M, _A))
+def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> float:
+    """What the controller sees now; returns the fault that has been found, 0 without."""
     s = as_record(work, WORK)
     seen = as_record(measured, MEASURED)
     sample(s, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
         seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones)
+    if s.guard.period > 0.0:
+        s.fault = check(s.guard, s.watch, seen, sees)
+    return float(s.fault)
+
+
+@inner
+def guarded_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
+    """Take the controller's answer, or after a fault no torque; returns as `take_answer`."""
+    if s.fault != NO_FAULT:
+        return int(take_answer(s, bounded(0.0, s.u_min, s.u_max), s.time + s.guard.period, 0.0))
+    if s.guard.period > 0.0:
+        follow(s.guard, s.watch, torque, ask_again, slope)
+    return int(take_answer(s, torque, ask_again, slope))
 
 
 @compiled_as(types.int64(_A, types.float64, types.float64, types.float64))
 def take_reply(work: Vector, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken."""
-    return take_answer(as_record(work, WORK), torque, ask_again, slope)
+    return guarded_answer(as_record(work, WORK), torque, ask_again, slope)
 
 
 @compiled_as(types.void(_A, _A))
@@ -456,10 +470,11 @@ def run_start(  # type: ignore[no-untyped-def]
     while True:
         reason = advance(work, tones, spans, events)
         if reason == ASK:
-            measure(work, sees, tones, measured)
+            fault = measure(work, sees, tones, measured)
             reply.slope = 0.0
-            step(parameters, measured, state, command)
-            reason = take_answer(s, reply.torque, reply.ask_again, reply.slope)
+            if fault == NO_FAULT:
+                step(parameters, measured, state, command)
+            reason = guarded_answer(s, reply.torque, reply.ask_again, reply.slope)
         if reason != ASK:
             s.status = reason
             return reason

@@ -135,13 +135,13 @@ class SampledStart:
     def inputs(self) -> tuple[int, ...]:
         """The indices of what is measured that a small motion changes."""
         indices = [exchange.M_MOTOR_ANGLE, exchange.M_MOTOR_SPEED, exchange.M_MOTOR_TORQUE]
-        indices += [exchange.M_SHAFT_TORQUE] * bool(self.sees & exchange.SEES_SHAFT_TORQUE)
-        indices += [exchange.M_LOAD_SPEED] * bool(self.sees & exchange.SEES_LOAD_SPEED)
+        indices += [exchange.M_SHAFT_TORQUE] * bool(self.sees & rec.SEES_SHAFT_TORQUE)
+        indices += [exchange.M_LOAD_SPEED] * bool(self.sees & rec.SEES_LOAD_SPEED)
         return tuple(indices)
 
     def samples(self, until: float, begin: Sample | None = None) -> Iterator[Sample]:
         """The start from its beginning or from a kept sample."""
-        recorder = StartRecorder(self.rows, self.sees | exchange.SEES_SHAFT_TORQUE, 0)
+        recorder = StartRecorder(self.rows, self.sees | rec.SEES_SHAFT_TORQUE, 0)
         recorder.begin(until, bool(self.controller.sensors & Sensor.STAGE))
         now, state = recorder.state, self.first_state
         if begin is not None:
@@ -176,7 +176,7 @@ class SampledStart:
         recorder.measure()
         measured = recorder.measured.copy()
         torque = float(measured[exchange.M_SHAFT_TORQUE])
-        if not self.sees & exchange.SEES_SHAFT_TORQUE:
+        if not self.sees & rec.SEES_SHAFT_TORQUE:
             measured[exchange.M_SHAFT_TORQUE] = math.nan
         if self.differencing and now.asked != 0.0 and now.time > when:
             measured[exchange.M_MOTOR_SPEED] = (measured[exchange.M_MOTOR_ANGLE] - before) / (now.time - when)

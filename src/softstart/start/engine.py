@@ -129,8 +129,9 @@ def _segment(controller: Controller | None, drive: Any, recorder: StartRecorder)
             if reason == rec.BUFFER_FULL:
                 recorder.grow()
             elif reason == rec.ASK and controller:
-                recorder.measure()
-                torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
+                torque, ask_again, slope = 0.0, math.inf, 0.0
+                if recorder.measure() == rec.NO_FAULT:
+                    torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
                 reason = recorder.answer(torque, ask_again, slope)
             if reason not in (rec.ASK, rec.BUFFER_FULL):
                 return reason
@@ -170,7 +171,7 @@ def ended(notes: rec.ResultRecord, reason: int, until: float | None, max_events:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
     status = status_of(reason, notes.reached == 1.0, until is not None, notes.braked == 1.0)
     if status.finished:
-        return status
+        return Status.FAULT if notes.fault != rec.NO_FAULT else status
     remedy = ""
     if status is Status.TOO_MANY_EVENTS:
         remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."

@@ -17,6 +17,7 @@ from softstart.drive import Drive, Machine
 from softstart.drive.machine_table import DriveColumns, each_of
 from softstart.errors import InputError
 from softstart.kernel import records as rec
+from softstart.kernel.guard import guard_limits, guard_samples
 from softstart.kernel.motor import encoder_count
 
 if TYPE_CHECKING:
@@ -94,6 +95,16 @@ class KernelInput:
             (1.0 + sign * band) * columns["target"] for sign in (-1, 1)
         )
         columns["command_end"], columns["dwell"] = end, dwell
+        return replace(self, machines=machines)
+
+    def guarded(self, period: float) -> KernelInput:
+        """The same under a controller that is sampled with this period, s; under one that is not for 0.
+
+        Batches are not guarded: no simulated machine has a fault of its own, and looking takes up to 5 % of
+        their time.
+        """
+        machines = self.machines.copy()
+        guard_samples(machines.view(rec.MACHINE)[:, 0]["guard"], period)
         return replace(self, machines=machines)
 
     def watched(self) -> KernelInput:
@@ -216,6 +227,10 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     shaft["c"], shaft["d"], shaft["half_gap"] = c, column(drive.damping), 0.5 * column(drive.gap)
     shaft["law"], shaft["eta"] = LAWS[drive.contact_law], 1.0
     shaft["theta0"] = column(drive.theta0)
+    hold = np.abs(column(drive.reactive_torque)) + np.abs(column(drive.active_torque)) + friction
+    thrown = np.sqrt(c / J1) * np.abs(shaft["theta0"])
+    speed = np.maximum(np.maximum(target, np.maximum(np.abs(w1), np.abs(w2))), thrown)
+    guard_limits(named["guard"], named, J1, J1 + J2, hold + (b1 + b2) * target, 1.0 / c, speed)
     net = np.maximum(Ms - Mc - (friction + (b1 + b2) * target), 1e-3 * (Ms - Mc))
     return made, np.atleast_1d((J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net)
 
@@ -271,12 +286,34 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, PeriodicTorque]) -> t
     _motor(named, motor)
     named["initial_torque"] = motor.initial_torque
     heavier = 1.0 / arrays.efficiency_from_motor
+    _guard_chain(made, arrays, heavier)
     left = motor.starting_torque - float((arrays.Mc * heavier).sum())
     speeds = float(named["target"][0]) + float(np.abs(arrays.w0).sum())
     inertia = float((arrays.moving_J * heavier).sum())
     if left > 0.0:
         return made, np.array([inertia * speeds / left])
     return made, np.array([inertia * _driven_by_curves(made, left, heavier, speeds)])
+
+
+def _guard_chain(made: KernelInput, arrays: ChainArrays, heavier: Vector) -> None:
+    """The guard of a sampled controller: all that may hold the chain, as if it did so at once."""
+    named = made.machines.view(rec.MACHINE)[:, 0]
+    masses = made.masses.view(rec.MASS)[0, :, 0]
+    target = float(named["target"][0])
+    held = np.abs(masses["Mc"]) + np.abs(masses["active"]) + np.abs(masses["mean"])
+    held += np.where(masses["ground"] > 0.0, masses["ground"] * target, 0.0)
+    for curve in made.curves[0].view(rec.CURVE)[:, 0]:
+        held[int(curve["mass"])] += np.abs(curve["torque"]).max()
+    for tone in made.tones.view(rec.TONE)[:, 0]:
+        held[int(tone["mass"])] += math.hypot(tone["cosine"], tone["sine"])
+    elastic = ~arrays.rigid
+    stiffest = float(arrays.c[elastic].max()) if elastic.any() else 0.0
+    J1 = float(arrays.J[arrays.motor])
+    thrown = math.sqrt(stiffest / J1) * float(np.abs(arrays.theta0).max())
+    speed = max(target, float(np.abs(arrays.w0).max()), thrown)
+    compliance = float((1.0 / arrays.c[elastic]).sum())
+    inertia = float((arrays.moving_J * heavier).sum())
+    guard_limits(named["guard"], named, J1, inertia, float((held * heavier).sum()), compliance, speed)
 
 
 def _driven_by_curves(made: KernelInput, left: float, heavier: Vector, speeds: float) -> float:

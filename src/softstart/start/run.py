@@ -19,6 +19,7 @@ from softstart.drive import Drive, Machine
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.kernel import records as rec
+from softstart.kernel.guard import FAULTS
 from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.engine import run_one
@@ -328,6 +329,11 @@ class Run(Result, view="starts.run_sheet"):
         return bool(self.trajectory.input.machine.regulated)
 
     @property
+    def fault(self) -> str:
+        """The fault at which a sampled controller gave up, after which it demands no torque; "" for none."""
+        return FAULTS[int(self._worst(lambda run: float(run.trajectory.notes.fault)))]
+
+    @property
     def overshoot(self) -> float:
         """Share of the target speed by which the load exceeds it at most; NaN under a torque strategy."""
         return self._worst(lambda run: float(run.trajectory.notes.overshoot))
@@ -580,6 +586,7 @@ class Run(Result, view="starts.run_sheet"):
             "parameters": {} if self.controller is None else self.controller.parameters,
             "status": self.status.name,
             "status_text": self.status.value,
+            **({"fault": self.fault} if self.fault else {}),
             "clipped": self.clipped._asdict(),
             "k_dyn": self.k_dyn if known else None,
             "k_dyn_first_contact": self.k_dyn_first_contact if known else None,

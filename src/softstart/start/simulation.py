@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack, overload
 
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.chain.model import Chain
-from softstart.controller.base import Controller, label_of
+from softstart.controller.base import Controller, label_of, period_of
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError
@@ -174,6 +174,7 @@ def simulate(
     for name, machine_input in inputs.items():
         if regulation is not None:
             machine_input = machine_input.regulated([regulation])  # noqa: PLW2901
+        machine_input = machine_input.guarded(0.0 if ready is None else period_of(ready))  # noqa: PLW2901
         recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
         reason = run_one(ready, design, recorder, until, changes)
         status = ended(recorder.state, reason, until, max_events, start)

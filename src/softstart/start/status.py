@@ -17,12 +17,13 @@ class Status(Enum):
     >>> Status.REACHED.success, Status.REACHED.message
     (True, 'The load reached its target speed.')
     >>> [status.name for status in Status if status.finished]
-    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'NOT_RELEASED']
+    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'FAULT', 'NOT_RELEASED']
     """
 
     REACHED = "The load reached its target speed."
     STOPPED_EARLY = "The run ended at the time asked for, before the load reached its target speed."
     NOT_REACHED = "The load did not reach its target speed within the time limit."
+    FAULT = "The controller found a fault in what it measured, and demanded no torque from then on."
     TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than max_events allows."
     NOT_LOCATED = "The start was given up: an event could not be located to machine precision."
     NOT_FINITE = "The start was given up: a state is no longer a finite number."
@@ -64,7 +65,9 @@ class Status(Enum):
         return self.value
 
 
-_FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED})
+_FINISHED = frozenset(
+    {Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED, Status.FAULT}
+)
 _BROKEN = {
     rec.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
     rec.NOT_LOCATED: Status.NOT_LOCATED,

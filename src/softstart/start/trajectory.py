@@ -70,9 +70,9 @@ class StartRecorder:
             self.grow()
         return T, w
 
-    def measure(self) -> None:
-        """Fill `measured` with what the controller sees now."""
-        start.measure(self.work, self.sees, self.input.tones, self.measured)
+    def measure(self) -> float:
+        """Fill `measured` with what the controller sees now; returns the code of a fault, 0 without."""
+        return float(start.measure(self.work, self.sees, self.input.tones, self.measured))
 
     def answer(self, torque: float, ask_again: float, slope: float) -> int:
         """Take the controller's answer; returns ASK, or why it cannot be taken."""
