@@ -277,7 +277,8 @@ def open_gap_time(ratio: float, lag: float, late: float, filter_time: float) -> 
     while high - low > 1e-9 * high:
         w = 0.5 * (low + high)
         g = math.hypot(1.0, w * lag) * math.hypot(1.0, w * filter_time)
-        x = 1.0 / math.sqrt(8.0 * (math.hypot(1.0, g / (1.0 + ratio)) - 1.0))
+        lost = g / (1.0 + ratio)
+        x = math.sqrt(0.125 * (1.0 + math.hypot(1.0, lost))) / lost
         margin = math.atan(4.0 * x) - math.atan(w * lag) - math.atan(w * filter_time) - w * late
         low, high = (w, high) if margin > LEAST_MARGIN else (low, w)
         S = x / w
