@@ -123,7 +123,7 @@ class SpeedRamp(CompiledController):
     in a sample would cause more than a tenth of Ms (`small_times`).
 
     Source: practice of inverters; gains: symmetrical optimum with a = 2 as in the user's guide of Modelica's
-    library DriveControl, which cites D. Schroeder, Elektrische Antriebe (2009).
+    library DriveControl, which cites Schroeder (2009).
 
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), SpeedRamp(ramp_time=0.5))

@@ -14,6 +14,7 @@ SLOW = (  # those that take longest: `make docs-commands ONLY='-m slow'`
     "docs/benchmarks.md",
     "docs/gaps-and-inertias.md",
     "docs/howto/add-a-controller.md",
+    "docs/howto/set-a-speed-ramp.md",
     "docs/identification.md",
     "docs/optimal-starts.md",
     "docs/paper-r.md",
