@@ -19,7 +19,8 @@ from softstart.kernel.motor import (
 )  # fmt: skip
 from softstart.kernel.records import (
     ANSWER, ASK, AT_EVENTS, AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, BEYOND, BUFFER_FULL, CURVE,
-    ENDED, EVENT_LIMIT, LOWER, MEASURED, MOST_MASSES, MOST_NOTED, NOTES, NOT_FINITE, NOT_LOCATED, NO_EVENT,
+    ENDED, EVENT_LIMIT, LOWER, MEASURED, MEASURED_TYPE, MOST_MASSES, MOST_NOTED, NOTES, NOT_FINITE,
+    NOT_LOCATED, NO_EVENT,
     NO_FAULT, N_NOTES, OF_MASS, OF_SHAFT, OPEN, PRESSED, SEES_SHAFT_TORQUE, SETTLE, SPANS_PER_EVENT,
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
     TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
@@ -412,6 +413,21 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
     return float(spring_torque(s, k))
 
 
+@separately_compiled(types.float64(WORK_TYPE, MEASURED_TYPE, types.int64))
+def check_sample(s: Record, m: Record, sees: int) -> float:
+    """The fault that has been found in what is measured, 0 without."""
+    return float(check(s.guard, s.watch, m, sees))
+
+
+@separately_compiled(types.int64(WORK_TYPE, types.float64, types.float64, types.float64))
+def follow_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
+    """Take the answer of a guarded controller, or after a fault no torque."""
+    if s.fault != NO_FAULT:
+        return int(take_answer(s, bounded(0.0, s.u_min, s.u_max), s.time + s.guard.period, 0.0))
+    follow(s.guard, s.watch, torque, ask_again, slope)
+    return int(take_answer(s, torque, ask_again, slope))
+
+
 @compiled_as(types.float64(_A, types.int64, _M, _A))
 def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> float:
     """What the controller sees now; returns the fault that has been found, 0 without."""
@@ -422,17 +438,15 @@ def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> float:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
         seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones)
     if s.guard.period > 0.0:
-        s.fault = check(s.guard, s.watch, seen, sees)
+        s.fault = check_sample(s, seen, sees)
     return float(s.fault)
 
 
 @inner
 def guarded_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer, or after a fault no torque; returns as `take_answer`."""
-    if s.fault != NO_FAULT:
-        return int(take_answer(s, bounded(0.0, s.u_min, s.u_max), s.time + s.guard.period, 0.0))
     if s.guard.period > 0.0:
-        follow(s.guard, s.watch, torque, ask_again, slope)
+        return int(follow_answer(s, torque, ask_again, slope))
     return int(take_answer(s, torque, ask_again, slope))
 
 
