@@ -23,6 +23,7 @@ from softstart.reporting import choice, limit
 from softstart.reporting.inverters import at_inverters, gain_base, inverters, speed_values
 from softstart.reporting.resolution import rated_torque
 from softstart.start import fatigue
+from softstart.start.comparison import Comparison
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
 from softstart.views import chains, drives, starts, traces
@@ -214,7 +215,8 @@ def document(report: Report) -> str:
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
         "maps_figure": maps_figure, "starts": starts,
         "chains": chains, "lives": lives,
-        "output": "|#at the output, N m" if drive.gear else "", "strategies": strategies,
+        "output": "|#at the output, N m" if drive.gear else "",
+        "strategies": strategies, "equal_time": equal_time,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
         "drive_lines": drives.drive_lines, "curves": list(drives.curves(drive)),
         "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
@@ -274,6 +276,13 @@ def strategies(report: Report) -> TextTable:
     # a digit more than a terminal holds
     exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
     return starts.comparison_table(rows, exact, "Strategies on this drive, by K_dyn")
+
+
+def equal_time(comparison: Comparison) -> TextTable:
+    """The strategies at equal time, by K_dyn, with the values that set their time."""
+    rows = sorted(comparison.rows, key=lambda row: row.run.k_dyn)
+    title = f"At equal time: settled within {comparison.at_time:.4g} s, by K_dyn"
+    return starts.comparison_table(rows, (*starts.PEAK_COLUMNS, *starts.TIME_COLUMNS), title)
 
 
 def functions(report: Report) -> list[tuple[str, str]]:

@@ -31,10 +31,12 @@ from softstart.reporting.resolution import Resolution
 from softstart.reporting.sheet import ParameterSheet, make_sheet
 from softstart.results import Result
 from softstart.start.comparison import (
+    AT_TIME,
     REFERENCE,
     Comparison,
     Uncertain,
     as_far_as_known,
+    compare,
     compared,
     make_controllers,
     set_for_limits,
@@ -98,6 +100,8 @@ class Report(Result):
         Date, versions, file of the drive and command.
     project : Project
         Customer, author, revisions, sources of the data; see `Project`.
+    equal_time : Comparison or None
+        The strategies at equal time, 1.3 times that of direct, each with its time parameter set for it.
 
     Examples
     --------
@@ -121,6 +125,7 @@ class Report(Result):
     resolution: Resolution
     provenance: dict[str, Any]
     project: Project = field(default_factory=Project)
+    equal_time: Comparison | None = None
 
     def __repr__(self) -> str:
         """One line that says which strategy came out."""
@@ -244,6 +249,7 @@ class Report(Result):
             "life": life.summary() if isinstance(life, Fatigue) else life,
             "life_gain": self.life_gain,
             "sheets": [sheet.summary() for sheet in self.sheets],
+            "equal_time": None if self.equal_time is None else self.equal_time.summary(),
             "provenance": self.provenance,
         }
 
@@ -352,8 +358,8 @@ def report(
     if soft is not None:
         ends = [(one, row) for (one, _), row in zip(started, at_soft_end, strict=True)]
         compared_soft, _ = _set_for_limits(soft, ends, soft_reference)
+    as_they_are = [one for one, _ in started]
     comparison, started = _set_for_limits(machine, started, reference, drawn, soft, compared_soft)
-    rows = comparison.rows
     changed = [(one, row) for one, row in started if row.setting and mapped]
     maps |= {row.name: robustness(machine.design_drive, one) for one, row in changed}
     choice = Choice(comparison, maps)
@@ -370,7 +376,7 @@ def report(
     curve = limit(
         machine,
         [row.run.start_time for row in choice.of_sheets if not math.isnan(row.run.start_time)],
-        [row.run.start_time for row in rows if not math.isnan(row.run.start_time)],
+        [row.run.start_time for row in comparison.rows if not math.isnan(row.run.start_time)],
         choice.direct.run.start_time,
         budget,
         lambda share, text: show(0.5 + 0.5 * share, text),
@@ -378,8 +384,18 @@ def report(
     )
     show(1.0, "done")
     return Report(
-        machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about
-    )
+        machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about,
+        _at_equal_time(machine, as_they_are),
+    )  # fmt: skip
+
+
+def _at_equal_time(machine: Machine, controllers: Sequence[Controller]) -> Comparison | None:
+    """The strategies at equal time; None where that has no table to show."""
+    try:
+        found = compare(machine, controllers, at_time=AT_TIME)
+    except (InputError, SimulationError):  # direct does not settle, or a setting cannot be started
+        return None
+    return found if any(row.setting for row in found.rows) else None
 
 
 def _set_for_limits(

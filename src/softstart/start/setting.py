@@ -31,6 +31,7 @@ WIDE: Final = (0.1, 10.0)  # times the default, of a parameter without a range o
 MOST: Final = 4.0  # times the default, of a parameter that is set with it
 COARSE: Final = {1: (64,), 2: (24, 12), 3: (12, 6, 6)}  # values of each parameter, for limits
 FINE: Final = 5  # turns, each with half the steps of the last one
+HOPELESS: Final = 0.1  # of what is missing: a turn that gains less is the last
 KEPT: Final = 2  # settings around which a turn searches
 ENOUGH: Final = 0.1  # share left of the limits beyond which a quicker start is better than more
 NEAR: Final = 1.1  # times the longest time: starts up to there are followed to their end
@@ -241,6 +242,7 @@ def for_limits(
             share[able] = np.minimum(share[able], worst)
         if judge.limits.start_time is None:
             share = np.minimum(share, ENOUGH) - np.where(share > 0.0, judge.haste(figures), 0.0)
+        share = np.maximum(share, 0.4 * IN_THE_WAY)
         score = np.where(able, share, share + IN_THE_WAY)
         known.update(zip(new, zip(score.tolist(), new.values(), strict=True), strict=True))
 
@@ -248,9 +250,13 @@ def for_limits(
     look(np.array(list(product(*(np.linspace(0.0, 1.0, count) for count in counts)))))
     steps = np.array([1.0 / (count - 1) for count in counts])
     for _ in range(FINE):
-        steps = 0.5 * steps
+        steps, before = 0.5 * steps, max(known.values())[0]
         best = sorted(known.values(), key=lambda one: -one[0])[:KEPT]
         moves = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(names)))) * steps
         look(np.clip(np.concatenate([np.array(place) + moves for _, place in best]), 0.0, 1.0))
+        now = max(known.values())[0]
+        missing = -(now if now > 0.5 * IN_THE_WAY else now - IN_THE_WAY)
+        if now - before < HOPELESS * missing:
+            break
     chosen = max(known, key=lambda row: known[row][0])
     return dict(zip(names, map(float, chosen), strict=True))

@@ -29,9 +29,9 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
     assert f"settled after {gentle.settled_time:.4f} s instead of {direct.settled_time:.4f} s" in text
     for run in (ramp, gentle, direct):
         row = re.findall(rf'<tr[^>]*><th scope="row"[^>]*>{run.controller_name}</th>(.*?)</tr>', page)
-        assert len(row) == 5  # page 1, the rule, the strategies, shafts, beside the bound
+        assert len(row) == 6  # page 1, the rule, the strategies, at equal time, shafts, beside the bound
         assert all(f">{run.k_dyn:.3f}<" in row[k] for k in (0, 2))
-        assert re.findall(r">([\d.]+)<", row[3]) == [f"{k:.3f}" for k in run.shaft_factors]
+        assert re.findall(r">([\d.]+)<", row[4]) == [f"{k:.3f}" for k in run.shaft_factors]
     for name in CHAIN.shaft_names:
         assert name in page
     assert f"rise = {gentle.controller.rise:.6g} s" in text  # the parameters of each run
