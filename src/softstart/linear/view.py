@@ -21,7 +21,7 @@ from typing import Any
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
 from softstart.drive.machine import Machine
-from softstart.errors import InputError
+from softstart.errors import InputError, SimulationError
 from softstart.linear.law import SampledRun, SampledStart, operating_point, run_until_steady
 from softstart.linear.limit_cycles import Cycle, limit_cycles
 from softstart.linear.loop import Loop, Margins
@@ -273,6 +273,29 @@ def linear_view(
         kind, why = "events", "has no sampled loop in contact (no new demand at equal periods)"
     notes = (f"{name} {why}: stability margins do not apply.",)
     return LinearView(drive, start.controller, kind, notes, run)
+
+
+def loop_in_words(drive: MachineLike, controller: Controller) -> str:
+    """Of a strategy that holds the speed: what is unstable, or the margins of both loops; "" of others.
+
+    >>> from softstart.controller import make_controller
+    >>> loop_in_words("crane-4amtkf", make_controller("ramp"))
+    ''
+    """
+    machine = as_machine(drive)
+    ready, own = controller.set_up(machine.design_drive)
+    if ready.regulation(own) is None:
+        return ""
+    try:
+        view = linear_view(machine, controller)
+    except SimulationError:
+        return ""
+    if view.loop is None or view.warning:
+        return view.warning
+    closed, alone = (margin_texts(loop.margins) for loop in (view.loop, view.loop.with_gaps_open))
+    names = ("phase margin", "delay margin")
+    each = (", ".join(f"{name} {texts[name]}" for name in names) for texts in (closed, alone))
+    return "Speed loop with the gap closed: {}; open: {}.".format(*each)
 
 
 def _notes(name: str, run: SampledRun, loop: Loop) -> tuple[str, ...]:

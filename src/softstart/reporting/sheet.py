@@ -16,6 +16,7 @@ from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
+from softstart.linear.view import loop_in_words
 from softstart.reporting.inverters import gain_base
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.results import OneLine
@@ -179,6 +180,7 @@ class ParameterSheet(OneLine):
     full_rise: Rise | None = None
     gear_ramp: Rise | None = None
     moved: tuple[str, ...] = ()
+    loop: str = ""  # margins of a speed loop with the rounded values
 
     @property
     def varied(self) -> list[Setting]:
@@ -263,6 +265,7 @@ def make_sheet(
         sheet = replace(
             sheet, settings=settings, moved=moved, rounded=simulate(machine, set_to, fitted_to=own)
         )
+        sheet = replace(sheet, loop=loop_in_words(machine, set_to))
         if sheet.kind in ORDINARY and two_masses:
             sheet = replace(sheet, **_rises(machine, set_to, own, rated, resolution.time))
         if sheet.varied:

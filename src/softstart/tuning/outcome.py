@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -26,6 +27,7 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.linear.view import loop_in_words
 from softstart.results import OneLine, Result
 from softstart.tuning.problem import TuningProblem, given_to
 
@@ -169,6 +171,13 @@ class Tuning(Result, view="tuning.tuning_sheet"):
             "starts": self.starts,
             "seconds": self.seconds,
         }
+
+    @cached_property
+    def robust_loop(self) -> str:
+        """Margins of the robust set on the nominal drive, if its strategy holds the speed; else ""."""
+        if self.robust is None:
+            return ""
+        return loop_in_words(self.robust.controller.nominal, self.robust.controller.controller)
 
     def plot(
         self, what: Literal["gains", "metric", "robust", "price"] | None = None, *, ax: Axes | None = None

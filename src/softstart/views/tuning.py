@@ -232,6 +232,7 @@ def tuning_notes(tuning: Tuning) -> list[str]:
         notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")
     if tuning.robust is not None:
         notes += tuning.robust.controller.controller.doubts(tuning.robust.controller.nominal)
+        notes += [tuning.robust_loop] if tuning.robust_loop else []
     if q.soft is not None:
         notes.append(
             Sentence(

@@ -46,7 +46,7 @@ def test_both_loops_are_those_of_python_control(name):
     # without an encoder the speed is measured as it is, not as a difference of angles
     drive = Drive.load(name).replace(torque_lag=0.003, computing_delay=0.001, encoder_lines=0)
     view = linear_view(drive, "speed-ramp", {"filter_time": 0.004})
-    w = np.geomspace(1.0, 0.99 * math.pi / view.loop.period, 2000)
+    w = np.geomspace(1.0, 0.99 * math.pi / view.loop.period, 1000)
     for loop in (view.loop, view.loop.with_gaps_open):
         L = discrete_loop(drive, view.controller.parameters, loop.open)
         exact = L(np.exp(1j * w * loop.period))
@@ -63,7 +63,7 @@ def test_both_loops_are_those_of_python_control(name):
         assert loop.stable == bool(np.all(np.abs(closed.poles()) < 1.0))
 
 
-def twist_and_torque(drive, cycle, end=4.5):
+def twist_and_torque(drive, cycle, end=3.0):
     """Twist and motor torque over the last half second, from the cycle's speeds in the middle of the gap."""
     rate, share = cycle.amplitude * cycle.frequency, drive.J2 / (drive.J1 + drive.J2)
     held = float(drive.target_speed)
@@ -98,12 +98,12 @@ def test_what_is_unstable_is_said_before_the_table(cycling):
     )
     assert "to a limit cycle of 186.6 rad/s, amplitude of the twist 0.00281 rad" in cycling.warning
     assert cycling.loop.stable
-    calm = linear_view(RIG, "speed-ramp")
-    assert calm.warning == linear_sheet(calm).status == ""
-    assert calm.loop.with_gaps_open.margins.phase_margin > math.radians(30.0)
 
 
 @pytest.mark.slow
 def test_a_loop_that_is_unstable_in_contact_is_said_first():
+    calm = linear_view(RIG, "speed-ramp")
+    assert calm.warning == linear_sheet(calm).status == ""
+    assert calm.loop.with_gaps_open.margins.phase_margin > math.radians(30.0)
     shaking = linear_view(RIG, "speed-ramp", {"kp": 1500.0})
     assert shaking.warning.startswith("Unstable with the gap closed: an oscillation at ")

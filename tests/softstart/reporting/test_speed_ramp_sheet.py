@@ -47,6 +47,7 @@ def test_kp_is_rounded_in_per_cent_per_per_cent_and_started_again():
     assert kp.shown(CRANE)[2].endswith("% of torque per % of speed")
     again = simulate(CRANE, "speed-ramp", parameters=sheet.values)
     assert sheet.rounded.settled_time == again.settled_time
+    assert sheet.loop.startswith("Speed loop with the gap closed: phase margin ")
     assert again.settled_time <= sheet.slowest < 1.1 * again.settled_time
     assert {"preload", "filter_time"}.isdisjoint(one.name for one in sheet.varied)  # what is off stays off
 
