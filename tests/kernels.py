@@ -53,6 +53,7 @@ def plain() -> None:
 PARTS = {
     "start": ((), lambda: compile_now(import_module("softstart.kernel.start"))),
     "steps": ((), steps),
+    "guard": ((), lambda: compile_now(import_module("softstart.kernel.guard"))),
     "replay": (("start",), lambda: compile_now(import_module("softstart.kernel.replay"))),
     "sensitivity": (("replay",), lambda: compile_now(import_module("softstart.kernel.sensitivity"))),
     "controllers": (("replay", "steps"), controllers),
