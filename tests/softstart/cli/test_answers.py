@@ -116,6 +116,16 @@ def test_settings_parameters_and_end_reach_the_start(as_json):
     assert rows[2]["parameters"] == {"share": 0.25}
 
 
+def test_strategies_at_equal_time_as_in_python(as_json):
+    """Without a value the time is 1.3 times that of direct."""
+    wanted = compare(CRANE, ["direct", "ramp"], at_time="1.3x")
+    for given in (("--at-time",), ("--at-time", "1.3x"), ("--at-time", f"{wanted.at_time!r} s")):
+        told = as_json("compare", "--controllers", "direct,ramp", *given)
+        assert told["at_time"] == wanted.at_time
+        assert [row["set_to"] for row in told["strategies"]] == [row.setting for row in wanted.rows]
+        assert [row["k_dyn"] for row in told["strategies"]] == [row.run.k_dyn for row in wanted.rows]
+
+
 def test_a_profile_is_compared_where_its_file_is_given(place, as_json):
     TorqueProfile([0.0], [62.0]).to_csv(place / "full.csv")
     names = [one["controller"] for one in as_json("compare")["strategies"]]
