@@ -16,6 +16,7 @@ from softstart_controllers.sampled import period_parameter, pulling_load
 BAND = 0.02  # of the target speed, in which the load has settled
 SHARE_OF_ELASTIC_PERIOD = 0.36  # least S
 LEAST_MARGIN = math.radians(30.0)  # phase margin with J1 alone
+LITTLE_MARGIN = 30.0  # deg, with J1 + J2: the symmetrical optimum leaves 37
 RIPPLE = 0.1  # of Ms: torque that an encoder count in a sample may cause
 SLEWED_SHARE = 0.25  # of Ms: a torque rate limit counts as the lag in which it slews so much
 RESERVE = 1.3  # ramp time over the shortest one
@@ -201,12 +202,19 @@ class SpeedRamp(CompiledController):
     def doubts(self, drive: Drive) -> list[str]:
         """Gains that are unstable with the gap open, and a ramp that the torque limit does not allow."""
         found = []
-        margin = open_gap_margin(drive, self.kp, self.tn, self.filter_time, self.period)
+        gains = f"kp = {self.kp:.4g} N m s/rad and tn = {self.tn:.4g} s"
+        loop = self.kp, self.tn, self.filter_time, self.period
+        margin = math.degrees(phase_margin(drive, drive.J1, *loop))
         if margin <= 0.0:
             found.append(
-                f"speed-ramp: kp = {self.kp:.4g} N m s/rad and tn = {self.tn:.4g} s are unstable with the "
-                f"gap open, when only J1 = {drive.J1:.4g} kg m2 moves (phase margin "
-                f"{math.degrees(margin):.0f} deg); lower kp, or raise tn."
+                f"speed-ramp: {gains} are unstable with the gap open, when only J1 = {drive.J1:.4g} kg m2 "
+                f"moves (phase margin {margin:.0f} deg); lower kp, or raise tn."
+            )
+        margin = math.degrees(phase_margin(drive, drive.J1 + drive.J2, *loop))
+        if margin < LITTLE_MARGIN:
+            found.append(
+                f"speed-ramp: {gains} leave a phase margin of {margin:.0f} deg with the gap closed, so the "
+                f"speed oscillates about its ramp; raise tn, or kp, for {LITTLE_MARGIN:.0f} deg or more."
             )
         load, most = resistance(drive), self._most(drive)
         accelerating = (drive.J1 + drive.J2) * drive.target_speed / (self.ramp_time * (1.0 - self.rounding))
@@ -267,7 +275,7 @@ def lags(drive: Drive, period: float) -> tuple[float, float]:
 def open_gap_time(ratio: float, lag: float, late: float, filter_time: float) -> float:
     """The S in s that leaves the phase margin LEAST_MARGIN with J1 alone; `ratio` is J2/J1.
 
-    With x = w S and m = 1 + ratio, |L| = 1 in the loop of `open_gap_margin` is m/(2 x) sqrt(1 + 1/(4 x)^2) =
+    With x = w S and m = 1 + ratio, |L| = 1 in the loop of `phase_margin` is m/(2 x) sqrt(1 + 1/(4 x)^2) =
     |1 + jw lag| |1 + jw filter_time|, so that x follows from w. The margin falls with w.
 
     >>> round(open_gap_time(5.0, 0.002, 0.001, 0.0), 5)
@@ -285,21 +293,21 @@ def open_gap_time(ratio: float, lag: float, late: float, filter_time: float) -> 
     return S
 
 
-def open_gap_margin(drive: Drive, kp: float, tn: float, filter_time: float, period: float) -> float:
-    """Phase margin in rad of the speed loop with J1 alone.
+def phase_margin(drive: Drive, J: float, kp: float, tn: float, filter_time: float, period: float) -> float:
+    """Phase margin in rad of the speed loop of a rigid inertia J: J1 with the gap open, or J1 + J2.
 
-    L = kp (1 + 1/(tn s)) exp(-late s)/(J1 s (1 + lag s)(1 + filter_time s)); |L| falls with w. The mean speed
+    L = kp (1 + 1/(tn s)) exp(-late s)/(J s (1 + lag s)(1 + filter_time s)); |L| falls with w. The mean speed
     between two samples, from an encoder, is late by half a period, and so is the torque that is held.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> [round(math.degrees(open_gap_margin(crane, kp, 0.08, 0.0, 0.001))) for kp in (5.2, 100.0)]
+    >>> [round(math.degrees(phase_margin(crane, crane.J1, kp, 0.08, 0.0, 0.001))) for kp in (5.2, 100.0)]
     [77, -74]
     """
     late = drive.computing_delay + (period if drive.encoder_lines > 0.0 else 0.5 * period)
-    lag, low, high = drive.torque_lag, 0.0, 2.0 * (kp / drive.J1 + 1.0 / tn)
+    lag, low, high = drive.torque_lag, 0.0, 2.0 * (kp / J + 1.0 / tn)
     while high - low > 1e-9 * high:
         w = 0.5 * (low + high)
-        gain = kp / (drive.J1 * w) * math.hypot(1.0, 1.0 / (w * tn))
+        gain = kp / (J * w) * math.hypot(1.0, 1.0 / (w * tn))
         above = gain > math.hypot(1.0, w * lag) * math.hypot(1.0, w * filter_time)
         low, high = (w, high) if above else (low, w)
     return math.atan(high * tn) - math.atan(high * lag) - math.atan(high * filter_time) - high * late

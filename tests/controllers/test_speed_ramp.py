@@ -18,7 +18,7 @@ from softstart.kernel.motor import encoder_count
 from softstart.kernel.records import CLOSED, NOTES
 from softstart.start.batch import prepared
 from softstart_controllers import speed_ramp
-from softstart_controllers.speed_ramp import SpeedRamp, open_gap_margin, small_times
+from softstart_controllers.speed_ramp import SpeedRamp, phase_margin, small_times
 
 SAME = 1e-9
 MOST_SAMPLES = 6000  # of an independent start: more take seconds
@@ -207,7 +207,7 @@ def test_each_condition_on_the_small_times_is_met_where_it_decides() -> None:
     heavy = CRANE.replace(torque_lag=0.02, load_inertia=1.0)
     S = small_times(heavy, period, 0.002)
     assert 0.36 * heavy.elastic_period < S
-    found = open_gap_margin(heavy, (heavy.J1 + heavy.J2) / (2.0 * S), 4.0 * S, 0.002, period)
+    found = phase_margin(heavy, heavy.J1, (heavy.J1 + heavy.J2) / (2.0 * S), 4.0 * S, 0.002, period)
     assert found == pytest.approx(margin, rel=1e-6)
     coarse = CRANE.replace(encoder_lines=128.0)
     kp = (coarse.J1 + coarse.J2) / (2.0 * small_times(coarse, period, 0.0))
@@ -226,7 +226,7 @@ def test_the_gap_open_is_unstable_from_a_phase_margin_of_zero_on(encoder: float,
     low, high = 0.1, 1e3
     while high - low > 1e-6 * high:
         kp = math.sqrt(low * high)
-        stable = open_gap_margin(drive, kp, ready.tn, 0.0, ready.period) > 0.0
+        stable = phase_margin(drive, drive.J1, kp, ready.tn, 0.0, ready.period) > 0.0
         low, high = (kp, high) if stable else (low, kp)
     run = simulate(
         drive, "speed-ramp", parameters={"kp": scale * low, "tn": 1.0, "torque_limit": 1e9}, until=2.0

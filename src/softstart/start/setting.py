@@ -226,6 +226,11 @@ def for_limits(
             batch, judge.machine, controller, dict(zip(names, rows.T, strict=True)), own, each, until
         )
 
+    def doubtful(rows: NDArray[np.float64]) -> list[bool]:
+        given = ({name: float(v) for name, v in zip(names, row, strict=True)} for row in rows)
+        set_ups = (replace(controller, **setting).set_up(own.design_drive) for setting in given)
+        return [bool(ready.doubts(drive)) for ready, drive in set_ups]
+
     def look(places: NDArray[np.float64]) -> None:
         columns = [axis.values(column) for axis, column in zip(axes, places.T, strict=True)]
         new = {row: tuple(place) for row, place in zip(zip(*columns, strict=True), places, strict=True)}
@@ -235,6 +240,7 @@ def for_limits(
         rows = np.array(list(new))
         figures = start(rows, np.zeros(1, np.int64), latest)
         share = judge.shares(figures) + judge.flagged(figures)
+        share[doubtful(rows)] += FLAGGED
         able = share >= 0.0
         if able.any() and rest.size:
             until = None if judge.limits.start_time is None else latest
