@@ -136,7 +136,10 @@ def passing_of_a_grid(drive, changed, name, count):
         if one == strategy.time_parameter and unit == "s":
             low, high = 0.02 * limits.start_time, 1.2 * limits.start_time
         axes.append(np.geomspace(low, high, each))
-    rows = np.array(list(itertools.product(*axes)))
+    settings = list(itertools.product(*axes))
+    set_up = [replace(strategy, **dict(zip(free, one, strict=True))).set_up(drive) for one in settings]
+    sound = [not ready.doubts(own) for ready, own in set_up]  # others are not set for limits
+    rows = np.array(list(itertools.compress(settings, sound)))
     for machine in (drive, *changed):
         if rows.size:  # those that have kept the limits so far
             set_ups = replace(strategy, **dict(zip(free, rows.T, strict=True))).set_ups(drive)
