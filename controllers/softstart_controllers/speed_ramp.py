@@ -16,6 +16,7 @@ from softstart_controllers.sampled import period_parameter, pulling_load
 BAND = 0.02  # of the target speed, in which the load has settled
 SHARE_OF_ELASTIC_PERIOD = 0.36  # least S
 LEAST_MARGIN = math.radians(30.0)  # phase margin with J1 alone
+CREEPING = 10.0  # times (J1 + J2)/kp: longer no speed loop swings
 LITTLE_MARGIN = 30.0  # deg, with J1 + J2: the symmetrical optimum leaves 37
 RIPPLE = 0.1  # of Ms: torque that an encoder count in a sample may cause
 SLEWED_SHARE = 0.25  # of Ms: a torque rate limit counts as the lag in which it slews so much
@@ -197,7 +198,11 @@ class SpeedRamp(CompiledController):
         """The speed is held from the end of the ramp on."""
         way = abs(drive.target_speed - drive.initial_motor_speed) / drive.target_speed
         command_end = self._preload_samples(drive) * self.period + self.ramp_time * way
-        return Regulation(BAND, command_end, 2.0 * self.tn + 5.0 * drive.elastic_period)
+        # half a swing of the loop; with a slow integral the speed creeps to its set value and does not swing
+        gain_time = (drive.J1 + drive.J2) / self.kp if self.kp > 0.0 else 0.0
+        swing = max(2.0 * self.tn, math.pi * math.sqrt(gain_time * self.tn))
+        dwell = min(swing, CREEPING * gain_time) + 5.0 * drive.elastic_period
+        return Regulation(BAND, command_end, dwell)
 
     def doubts(self, drive: Drive) -> list[str]:
         """Gains that are unstable with the gap open, and a ramp that the torque limit does not allow."""

@@ -375,3 +375,15 @@ def test_default_gains_are_near_the_best_of_a_grid() -> None:
     assert np.median(ratios) < 1.07
     assert np.quantile(ratios, 0.9) < 1.2
     assert max(ratios) < 1.4
+
+
+@pytest.mark.parametrize(
+    ("name", "tn"), [("servo-axis-small", 0.4), ("conveyor-11kw", 0.3), ("hoist-15kw", 6.0)]
+)
+def test_a_start_does_not_end_within_a_swing(name: str, tn: float) -> None:
+    """A loop with little margin leaves the band again: the run goes on for long enough to see it."""
+    drive = Drive.load(name)
+    gains = {"tn": tn * SpeedRamp().fitted(drive).tn}
+    run = simulate(drive, "speed-ramp", parameters=gains)
+    longer = simulate(drive, "speed-ramp", parameters=gains, until=run.end_time + 3.0 * run.settled_time)
+    assert run.settled_time == pytest.approx(longer.settled_time, rel=1e-12)

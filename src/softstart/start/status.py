@@ -21,7 +21,7 @@ class Status(Enum):
     """
 
     REACHED = "The load reached its target speed."
-    STOPPED_EARLY = "The run ended at the time asked for, before the load reached its target speed."
+    STOPPED_EARLY = "The run ended at the time asked for; the load does not have its target speed."
     NOT_REACHED = "The load did not reach its target speed within the time limit."
     FAULT = "The controller found a fault in what it measured, and demanded no torque from then on."
     TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than max_events allows."
