@@ -34,10 +34,10 @@ def speed_values(values: Mapping[str, float], drive: Drive) -> dict[str, str]:
     """The values of a speed ramp in the units of inverters, as the texts of `speed` in the file name them.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> values = {"ramp_time": 0.5, "rounding": 0.2, "kp": 5.18, "tn": 0.08, "torque_limit": 47.75}
+    >>> values = {"ramp_time": 0.5, "rounding": 0.2, "kp": 5.0, "tn": 0.08, "torque_limit": 47.75}
     >>> found = speed_values(values | {"filter_time": 0.002}, crane)
     >>> [found[name] for name in ("ramp_s", "rounding_s", "kp_percent", "tn_ms", "limit_percent")]
-    ['0.5', '0.1', '19.99', '80', '200']
+    ['0.5', '0.1', '19.3', '80', '200']
     """
 
     def text(value: float) -> str:
