@@ -345,6 +345,36 @@ def test_a_reference_is_kept_drawn_and_cleared(page):
     foot.wait_for(state="hidden")
 
 
+def test_at_equal_time_each_strategy_is_set_and_marked_if_too_slow_until_it_is_switched_off(page):
+    at_rest(page)
+
+    def cell(name, key):
+        return page.locator(f'tr[data-name="{name}"] [data-key="{key}"]')
+
+    as_set = cell("s-curve", "k_dyn").inner_text()
+    switch, time = page.get_by_label("equal time").first, page.get_by_label("equal time", exact=True).last
+    assert time.input_value() == "1.3x"
+    assert not cell("s-curve", "set_to").is_visible()
+    switch.check()
+    comes_to(cell("s-curve", "set_to").inner_text, "time 0.134 s")
+    best = simulate(CRANE, make_controller("s-curve", {"time": 0.134})).k_dyn
+    assert cell("s-curve", "k_dyn").inner_text() == f"{best:.3f}" != as_set
+    time.fill("1.1x")
+    time.press("Enter")
+    comes_to(cell("take-up", "flag").inner_text, "too slow")
+    assert "no value of full_torque" in page.locator('tr[data-name="take-up"]').get_attribute("title")
+    kept(page)
+    page.reload()
+    opened(page)
+    comes_to(switch.is_checked, True)
+    comes_to(cell("take-up", "flag").inner_text, "too slow")
+    switch.uncheck()
+    comes_to(cell("s-curve", "k_dyn").inner_text, as_set)
+    comes_to(cell("s-curve", "set_to").is_visible, False)
+    page.keyboard.press("Control+z")
+    comes_to(switch.is_checked, True)
+
+
 def test_undo_and_redo_by_buttons_and_keys(visit):
     page = visit(select="")  # to select another one would be a step to undo
     first = k_dyn(page)

@@ -63,6 +63,7 @@ class Controls:
             "remove": (session.remove, {"name": str}),
             "fix": (self._fix, {"fixed": bool}),
             "reference": (session.set_reference, {"on": bool}),
+            "at_time": (session.set_at_time, {"text": str}),
             "window": (self._window, {"begin": float, "end": float}),
             "hello": (self._hello, {"stored": object, "link": object}),
         }

@@ -20,7 +20,7 @@ from softstart.kernel import records as rec
 from softstart.page import links, machines
 from softstart.page.machines import STRATEGY, Axes, FormField
 from softstart.page.sentences import Value, differences, sentence_of, written
-from softstart.page.session import Inputs, Reference, Session, Strategy
+from softstart.page.session import EqualTime, Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
@@ -135,6 +135,7 @@ class FrameBuilder:
             "reference": self._reference(),
             "mapped": self.axes is not None,
             "soft": inputs.soft_drive is not None,
+            "at_time": inputs.at_time,
             # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
             "here": inputs.machine.gap_and_inertia,
             "angle": (units.of("rad"), units.size("rad")),
@@ -242,9 +243,14 @@ class FrameBuilder:
                     frame["traces"] = {label: drawn(result, inputs.units, False, self.window)}
                 yield frame
             yield from session.compute_row(label)
+            yield from session.compute_at_equal_time(label)
+            if inputs.at_time:
+                yield {"rows": [row(session, session.result(label))]}
         advice = [session.recommendation().text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
         if inputs.machine.limits:
             advice.append(AS_SET_HERE)
+        if at_equal_time := session.lowest_at_equal_time():
+            advice.append(at_equal_time)
         yield {
             "rows": [row(session, result) for result in session.strategies],
             "recommendation": " ".join(advice),
@@ -406,13 +412,19 @@ def outcomes(result: Strategy) -> Frame:
 
 
 def row(session: Session, result: Strategy) -> Frame:
-    """One line of the table; `worn`, `soft`, times of settling, `limits`, `flag` are empty until computed."""
+    """One line of the table; `worn`, `soft`, times of settling, `limits`, `flag` are empty until computed.
+
+    At equal time it is that of the strategy as it is set for that, empty until that is computed.
+    """
+    known, flag = session.row(result.name), ""
+    if session.inputs.at_time and result.run is not None:
+        known, flag, trouble = session.at_equal_time(result.name) or EqualTime(None)
+        result = Strategy(result.name, None if known is None else known.run, trouble)
     time = math.nan if result.run is None else result.run.limited_time
     line = outcomes(result) | {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
-    known = session.row(result.name)
     if known is None:
         empty = dict.fromkeys(("worn", "soft", "settled", "settled_lost", "overshoot"))
-        return line | empty | {"limits": "", "flag": ""}
+        return line | empty | {"limits": "", "flag": flag, "set_to": ""}
     return line | {
         "worn": json_number(known.k_dyn_worn_gap),
         "soft": json_number(known.cases[SOFT_END].k_dyn) if SOFT_END in known.cases else None,
@@ -420,6 +432,7 @@ def row(session: Session, result: Strategy) -> Frame:
         "settled_lost": json_number(known.settled_lost),
         "overshoot": json_number(100.0 * known.run.overshoot),
         "limits": known.against_limits,
+        "set_to": known.set_to,
         "flag": ", ".join(flag.word for flag in known.flags),
         "trouble": line["trouble"] or "; ".join(flag.text for flag in known.flags),
     }

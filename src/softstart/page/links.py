@@ -20,7 +20,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.errors import InputError, Mistakes
 from softstart.page.machines import machine_from, startable
-from softstart.page.session import SOFT, Inputs, Reference, Session
+from softstart.page.session import LONGEST_TIME, SOFT, Inputs, Reference, Session
 from softstart.plugins import controller_names
 
 MAX_STORED = 64  # inputs of tabs that may be reloaded
@@ -67,6 +67,7 @@ def link_of(inputs: Inputs) -> str:
         "selected": inputs.selected,
         "drawn": sorted(inputs.visible),
         "soft": dict(inputs.soft_end),
+        "at_time": inputs.at_time,
         "reference": None if reference is None or reference.label not in installed else {
             "drive": reference.machine.to_toml(), "label": reference.label,
             "parameters": _settings(reference.controller),
@@ -124,6 +125,7 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         visible & controllers.keys(),
         reference,
         soft_end,
+        str(content.get("at_time", ""))[:LONGEST_TIME],
     )
 
 

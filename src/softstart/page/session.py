@@ -11,8 +11,8 @@ import secrets
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.chain.machines import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
@@ -24,7 +24,17 @@ from softstart.hints import nearest
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, sentence_of
 from softstart.quantities import Units
-from softstart.start.comparison import REFERENCE, SOFT_END, as_far_as_known, changed_case
+from softstart.start.comparison import (
+    REFERENCE,
+    SOFT_END,
+    Comparison,
+    TooSlow,
+    as_far_as_known,
+    changed_case,
+    compared,
+    equal_time,
+    row_at_time,
+)
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
 from softstart.views.numbers import cut, units_of
@@ -38,6 +48,9 @@ SOFT = ("stiffness", "damping")  # what differs at the soft end of an unknown st
 MAX_STRATEGIES = 24
 MAX_UNDO = 200
 PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are one step
+MAX_AT_TIME = 10.0  # times the settled time of direct: a longer time sets nothing else
+MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that takes 64 of them
+LONGEST_TIME = 40  # characters
 MAX_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
 
 
@@ -77,6 +90,14 @@ class Strategy:
         return self.trouble if self.run is None else outcome(self.run)
 
 
+class EqualTime(NamedTuple):
+    """A strategy set for a given time: its row, or a word and the sentence that say why there is none."""
+
+    row: Row | None
+    flag: str = ""
+    trouble: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Reference:
     """A start that stays drawn while machine and strategies change: as they were when it was chosen."""
@@ -97,6 +118,7 @@ class Inputs:
     visible: frozenset[str]  # labels of the strategies that are drawn beside it
     reference: Reference | None = None  # what all strategies are compared with
     soft_end: Mapping[str, float] = field(default_factory=dict)  # of a drive loaded without stiffness: SOFT
+    at_time: str = ""  # within which the strategies of the table are set to settle, "1.3x"; "" as they are
 
     @cached_property
     def units(self) -> Units:
@@ -193,6 +215,7 @@ class Session:
         # what was computed last, by label, and for what; `ready` and `row` say whether it is still valid
         self._results: dict[str, tuple[Machine, Controller, Strategy]] = {}
         self._rows: dict[str, Row] = {}
+        self._at_equal_time: dict[str, tuple[Machine, Controller, str, EqualTime]] = {}
         self._direct: tuple[Machine, Run | None] | None = None
         self._reference: tuple[Reference, Strategy] | None = None
 
@@ -357,6 +380,25 @@ class Session:
         if new is not self.inputs.reference:
             self._change(reference=new)
 
+    def set_at_time(self, text: str) -> None:
+        """Set each strategy of the table for this time, "1.3x" of that of direct or "0.3 s"; "" as they are.
+
+        >>> session = Session(controllers=["direct", "s-curve"])
+        >>> session.set_at_time("1.3x")
+        >>> list(session.compute_at_equal_time("s-curve"))
+        [None]
+        >>> session.at_equal_time("s-curve").row.set_to
+        'time 0.134 s'
+        """
+        text = " ".join(text.split())
+        if text == self.inputs.at_time:
+            return
+        if len(text) > LONGEST_TIME:
+            raise InputError(f"equal time: the text has more than {LONGEST_TIME} characters; write 1.3x.")
+        if text:
+            self._equal_time(text)
+        self._change(at_time=text)
+
     def select_lowest_k_dyn(self) -> None:
         """Select the strategy with the lowest K_dyn of those that settle in good time."""
         latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.settled_time)
@@ -423,6 +465,52 @@ class Session:
         self._rows[label] = Row(run, self.direct(), cases, tuple(cases), label)
         _ = run.settled_time, self._rows[label].flags  # computed here, kept in the runs
 
+    def at_equal_time(self, label: str) -> EqualTime | None:
+        """A strategy set for the time of the inputs, if it is computed, see `compute_at_equal_time`."""
+        machine, controller, at_time, known = self._at_equal_time.get(label, (None, None, "", None))
+        inputs = self.inputs
+        same = machine is inputs.machine and controller is inputs.controllers.get(label)
+        return known if same and at_time == inputs.at_time else None
+
+    def compute_at_equal_time(self, label: str) -> Iterator[None]:
+        """Set a strategy for the time of the inputs, as `compare` does; not where there is none."""
+        inputs, run = self.inputs, self.result(label).run
+        if not inputs.at_time or run is None or self.at_equal_time(label) is not None:
+            return
+        yield None
+        machine, controller = inputs.machine, inputs.controllers[label]
+        try:
+            at, direct = self._equal_time(inputs.at_time)
+            if run.trajectory.events.size > MAX_EVENTS_SET:
+                raise InputError(f"{label}: its starts take too long here; use softstart compare --at-time.")
+            start = partial(compared, machine, direct=direct, soft=inputs.soft_drive)
+            found = row_at_time(machine, controller, direct, at, None, start)
+            if isinstance(found, TooSlow):
+                result = EqualTime(None, "too slow", found._replace(name=label).within(at))
+            else:
+                result = EqualTime(replace(found, label=label))
+        except Exception as error:  # a controller is anyone's code
+            result = EqualTime(None, "", sentence_of(error))
+        self._at_equal_time[label] = machine, controller, inputs.at_time, result
+
+    def lowest_at_equal_time(self) -> str:
+        """The lowest K_dyn of each class of effort at equal time; "" where none is computed."""
+        known = [self.at_equal_time(label) for label in self.inputs.controllers]
+        rows = tuple(one.row for one in known if one is not None and one.row is not None)
+        if not rows:
+            return ""
+        at, _ = self._equal_time(self.inputs.at_time)
+        return Comparison(self.inputs.machine, rows, at_time=at).at_equal_time
+
+    def _equal_time(self, text: str) -> tuple[float, Run]:
+        """The time in s, and the direct start of which it is a multiple."""
+        direct = self.direct()
+        if direct is None or math.isnan(direct.settled_time):
+            raise InputError("equal time: direct does not settle on this machine; it sets the time scale.")
+        if not (at := equal_time(text, direct)) <= MAX_AT_TIME * direct.settled_time:
+            raise InputError(f'equal time = "{text}": give at most {MAX_AT_TIME:g}x.')
+        return at, direct
+
     def recommendation(self) -> Recommendation:
         """What is recommended among the strategies, and why: the text of `softstart.compare`."""
         for label in self.inputs.controllers:
@@ -445,7 +533,9 @@ class Session:
 
     def close(self) -> None:
         """Release all results and listeners: the user has gone."""
-        for kept in (self._listeners, self._results, self._rows, self._past, self._future):
+        for kept in (
+            self._listeners, self._results, self._rows, self._at_equal_time, self._past, self._future
+        ):  # fmt: skip
             kept.clear()
         self._reference = None
 

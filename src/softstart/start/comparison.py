@@ -326,7 +326,7 @@ def compare(
         )
     if at_time is not None:
         at = equal_time(at_time, direct)
-        found = [_at_time(drive, one, direct, at, fitted_to, start) for one in made]
+        found = [row_at_time(drive, one, direct, at, fitted_to, start) for one in made]
         rows = tuple(one for one in found if isinstance(one, Row))
         too_slow = tuple(one for one in found if isinstance(one, TooSlow))
         if not rows:
@@ -350,7 +350,7 @@ def equal_time(at_time: float | str, direct: Run) -> float:
     return time_above_0(at_time, "at_time", advice)
 
 
-def _at_time(
+def row_at_time(
     drive: Machine,
     controller: Controller,
     direct: Run,

@@ -492,7 +492,7 @@ def test_fields_take_values_at_the_output_of_a_gear_and_its_permissible_torque()
 
 WHATS = [
     "slide", "edit", "reset", "jump", "select", "show", "fix", "remove", "undo", "redo", "hello", "window",
-    "?",
+    "at_time", "?",
 ]  # fmt: skip
 KEYS = [
     "path", "text", "position", "gap", "inertia", "name", "visible", "fixed", "on", "stored",

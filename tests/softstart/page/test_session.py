@@ -15,6 +15,7 @@ from softstart.controller import Command, PlainController, make_controller
 from softstart.drive.data_sheet import UnknownStiffness
 from softstart.page import links
 from softstart.page.frames import FrameBuilder
+from softstart.page.frames import row as row_of_table
 from softstart.page.links import inputs_of, link_of
 from softstart.page.session import MAX_STRATEGIES, Session
 from softstart.start.comparison import SOFT_END
@@ -209,6 +210,57 @@ def test_a_link_brings_back_drive_strategies_and_selection():
     assert (other.inputs.selected, other.inputs.controllers["shaped"].shaper) == ("shaped", "zvd")
     assert set(other.inputs.drawn) == {*session.inputs.drawn} - {"mine"}
     assert other.result("shaped").k_dyn == session.result("shaped").k_dyn
+
+
+def test_at_equal_time_the_table_is_that_of_compare_and_switching_off_restores_it():
+    """Each figure to the bit; the switch is a step to undo and travels in the link."""
+    names = ["direct", "s-curve", "take-up"]
+    session = Session(controllers=names)
+    as_set = table(session)
+    session.set_at_time("1.1x")
+    assert all(line["k_dyn"] is None for line in table(session))  # until it is computed
+    list(FrameBuilder(session).idle_frames())
+    comparison = compare(session.inputs.machine, names, at_time="1.1x")
+    assert [one.name for one in comparison.too_slow] == ["take-up"]
+    lines = {line["name"]: line for line in table(session)}
+    for expected in comparison.rows:
+        line = lines[expected.name]
+        assert (line["k_dyn"], line["set_to"]) == (expected.run.k_dyn, expected.set_to)
+        assert line["worn"] == expected.k_dyn_worn_gap
+        assert line["settled"] <= comparison.at_time
+    slow = lines["take-up"]
+    assert (slow["k_dyn"], slow["flag"]) == (None, "too slow")
+    assert slow["trouble"] == comparison.too_slow[0].within(comparison.at_time)
+    assert session.lowest_at_equal_time() == comparison.at_equal_time
+    other = Session(controllers=names)
+    other.restore(inputs_of(link_of(session.inputs), other.inputs))
+    assert other.inputs.at_time == "1.1x"
+    session.undo()
+    assert [line["k_dyn"] for line in table(session)] == [line["k_dyn"] for line in as_set]
+    session.redo()
+    assert table(session) == list(lines.values())  # still known
+    session.set("gap", 1.0)
+    assert table(session)[1]["k_dyn"] is None  # of another machine
+    session.set_at_time("")
+    assert table(session)[1]["k_dyn"] == simulate(session.inputs.machine, "s-curve").k_dyn
+
+
+def table(session):
+    return [row_of_table(session, result) for result in session.strategies]
+
+
+@pytest.mark.parametrize("text", ["soon", "0x", "-1 s", "0.3 m", "11x", "1e9 s", "nan", "1" * 50])
+def test_a_time_that_sets_nothing_is_refused_and_in_a_link_it_is_said(text):
+    session = Session(controllers=["s-curve"])
+    with pytest.raises(InputError):
+        session.set_at_time(text)
+    assert (session.inputs.at_time, session.steps) == ("", (0, 0))
+    content = unpacked(link_of(session.inputs)) | {"at_time": text}
+    session.restore(inputs_of(packed(content), session.inputs))
+    list(FrameBuilder(session).idle_frames())
+    line = table(session)[0]
+    assert line["k_dyn"] is None
+    assert line["trouble"]
 
 
 def test_a_reference_stays_while_drive_and_strategies_change_and_travels_in_the_link():

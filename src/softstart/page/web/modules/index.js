@@ -72,9 +72,9 @@ export class Instrument {
     }
     if (order) {
       for (const known of [state.rows, state.traces]) for (const name of known.keys()) if (!order.includes(name)) known.delete(name);
-      const { shown, added, changed, selected, stamp, here, angle } = frame;
+      const { shown, added, changed, selected, stamp, here, angle, at_time } = frame;
       const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
-      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference, soft: frame.soft });
+      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference, at_time, soft: frame.soft });
       this.plotted = false;
       this.steps.show(frame.steps);
       this.controls.build(frame);

@@ -13,6 +13,7 @@ const COLUMNS = [
   ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed: within 2 % (strategies that hold the speed), not below 99.9 % (torque strategies)"],
   ["settled_lost", "later, s", "", (row) => fixed(row.settled_lost, 4), "How much later than with direct the load has settled"],
   ["overshoot", "overshoot, %", "", (row) => fixed(row.overshoot, 1), "By how much the load exceeds its target speed at most, under a strategy that holds the speed"],
+  ["set_to", "set to", "", (row) => row.set_to ?? "", "Value of the time parameter with the lowest K of those that settle within the equal time; figure and plots are of the strategy as it is set by its fields"],
 ];
 const FIGURES = COLUMNS.slice(1);
 const cells = () => FIGURES.map(([key]) => element("td", { class: "number", "data-key": key }));
@@ -25,13 +26,35 @@ export class Table {
       element("button", { type: "button", title: `${meaning}; press to sort`, onclick: () => this.sort(key) }, text, ...(sub ? [element("sub", {}, sub)] : []))));
     const first = element("th", { scope: "col", class: "eye", "aria-label": "drawn" });
     const last = element("th", { scope: "col", class: "bar-head" }, "K (line: 1)");
-    place.append(element("table", {}, element("thead", {}, element("tr", {}, first, ...this.heads, last)), this.body, this.foot()));
+    place.append(element("table", {}, this.equal(), element("thead", {}, element("tr", {}, first, ...this.heads, last)), this.body, this.foot()));
   }
 
   sort(key) {
     this.by = this.by === key ? "" : key;
     this.sorted = undefined;
     if (this.state) this.show(this.state);
+  }
+
+  // each strategy as it is set by its fields, or by its time parameter for the same time
+  equal() {
+    const ask = (on) => (this.equalAsked = this.say({ what: "at_time", text: on ? this.time.value.trim() || (this.time.value = "1.3x") : "" }));
+    this.equalAsked = -1;
+    this.on = element("input", { type: "checkbox", onchange: () => ask(this.on.checked) });
+    this.time = element("input", {
+      type: "text", value: "1.3x", spellcheck: "false", autocomplete: "off", "aria-label": "equal time",
+      title: "A multiple of the settled time of direct, as 1.3x, or a time, as 300 ms", onchange: () => this.on.checked && ask(true),
+    });
+    const meaning = "Set each strategy by its time parameter for the lowest K of those that settle within this time";
+    return element("caption", {}, element("label", { title: meaning }, this.on, " equal time"), " ", this.time);
+  }
+
+  // the switch as the server knows it, once it knows of what was pressed last
+  switched({ at_time: time, stamp }) {
+    this.body.parentNode.classList.toggle("equal", Boolean(time));
+    if (this.equalAsked > stamp) return;
+    this.equalAsked = -1;
+    this.on.checked = Boolean(time);
+    if (time && document.activeElement !== this.time) this.time.value = time;
   }
 
   // all values are those of the drive at rest
@@ -42,6 +65,7 @@ export class Table {
   show(state) {
     this.state = state;
     this.arrange(state);
+    this.switched(state);
     this.compare(state.reference);
     this.body.parentNode.classList.toggle("ends", Boolean(state.soft));
     this.body.parentNode.classList.toggle("held", [...state.rows.values()].some((row) => row.overshoot != null));
