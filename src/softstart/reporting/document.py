@@ -271,7 +271,7 @@ def strategies(report: Report) -> TextTable:
     output = DataColumn("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
     shown = (
         *starts.PEAK_COLUMNS, *([output] if gear else []), *starts.of_the_unknown(rows),
-        starts.START_TIME, *starts.TIME_COLUMNS, starts.SETTLED_LATER, starts.CONTACTS,
+        starts.START_TIME, *starts.TIME_COLUMNS, starts.CONTACTS,
     )  # fmt: skip
     # a digit more than a terminal holds
     exact = [one._replace(digits=one.digits + 1) if one.decimals is None else one for one in shown]
