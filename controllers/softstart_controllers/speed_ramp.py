@@ -221,6 +221,12 @@ class SpeedRamp(CompiledController):
                 f"speed-ramp: {gains} leave a phase margin of {margin:.0f} deg with the gap closed, so the "
                 f"speed oscillates about its ramp; raise tn, or kp, for {LITTLE_MARGIN:.0f} deg or more."
             )
+        friction = resistance(drive) - pulling_load(drive)
+        if (held := drive.Mc + friction) < drive.minimum_torque:
+            found.append(
+                f"speed-ramp: the load drives the motor with {-held:.4g} N m at the target speed, and "
+                f"motor.minimum_torque = {drive.minimum_torque:.4g} N m cannot hold it; lower that."
+            )
         load, most = resistance(drive), self._most(drive)
         accelerating = (drive.J1 + drive.J2) * drive.target_speed / (self.ramp_time * (1.0 - self.rounding))
         if accelerating + load > most * (1.0 + ROUNDING):

@@ -12,7 +12,7 @@ from tests.controllers.speed_loop import of_run
 from tests.controllers.starts import CRANE, random_drive
 from tests.twin import plain
 
-from softstart import Drive, InputError, Run, compare, simulate
+from softstart import Drive, InputError, Run, Status, compare, simulate
 from softstart.drive import library
 from softstart.kernel.motor import encoder_count
 from softstart.kernel.records import CLOSED, NOTES
@@ -387,3 +387,18 @@ def test_a_start_does_not_end_within_a_swing(name: str, tn: float) -> None:
     run = simulate(drive, "speed-ramp", parameters=gains)
     longer = simulate(drive, "speed-ramp", parameters=gains, until=run.end_time + 3.0 * run.settled_time)
     assert run.settled_time == pytest.approx(longer.settled_time, rel=1e-12)
+
+
+def test_a_load_that_runs_away_is_said_and_not_waited_for() -> None:
+    drive = Drive.load("crane-4amtkf").replace(load_torque=-6.0)  # the motor cannot brake: minimum_torque 0
+    run = simulate(drive, "speed-ramp")
+    assert run.status is Status.NOT_REACHED
+    assert math.isnan(run.settled_time)
+    assert run.end_time < 10.0
+    assert "motor.minimum_torque = 0 N m cannot hold it" in run.doubts[0]
+    assert simulate(drive, "speed-ramp", time_limit=20.0).end_time == 20.0
+    slow = simulate("crane-4amtkf", "speed-ramp", parameters={"ramp_time": 60.0})  # beyond the usual limit
+    assert 58.0 < slow.settled_time < 60.0
+    held = simulate(drive.replace(minimum_torque=-62.0), "speed-ramp")
+    assert held.settled_time < 1.0
+    assert held.doubts == []

@@ -43,6 +43,7 @@ class Batch:
     starts: KernelInput
     permissible: Matrix  # torques of the shafts of each machine, N m
     limits: Limits  # with an array for each limit
+    limited: bool = False  # whether a time limit was given
 
     def results(
         self,
@@ -67,7 +68,8 @@ class Batch:
         if time_limit is not None:
             chosen = (starts.with_limits(time_limit) for starts in chosen)
         if ready.regulations:
-            chosen = (starts.regulated(ready.regulations) for starts in chosen)
+            given = self.limited or time_limit is not None
+            chosen = (starts.regulated(ready.regulations, given) for starts in chosen)
         if settled:
             chosen = (starts.watched() for starts in chosen)
         results = [run_set_ups(starts, ready, until, workers) for starts in chosen]
@@ -157,7 +159,8 @@ def prepared(machines: Machines, time_limit: float | None = None, max_events: in
         place[:] = first + np.minimum(k, positions - 1) * np.repeat(counts, counts)
     starts = concatenate([placed for positions in inputs for placed in positions])
     permissible = np.concatenate([np.atleast_2d(part.permissible_torques) for part in parts])
-    return Batch(parts[0].shaft_names, places, positions, starts, permissible, _limits_of(parts))
+    limits, limited = _limits_of(parts), time_limit is not None
+    return Batch(parts[0].shaft_names, places, positions, starts, permissible, limits, limited)
 
 
 def _limits_of(parts: Sequence[Machine]) -> Limits:

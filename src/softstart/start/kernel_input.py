@@ -32,7 +32,10 @@ MAX_EVENTS: Final = 1_000_000  # events and control instants of one start
 # many elastic periods after the start time
 SETTLED_BAND: Final = 0.001
 SETTLING_PERIODS: Final = 5.0
-NOT_REGULATED: Final = (math.nan, 0.0, 0.0)
+# a start under a speed controller is given up after so many times its commanded time, and this share of the
+# time limit of other starts more
+PATIENT: Final = 3.0
+SLOW_SHARE: Final = 0.1
 SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
 
 
@@ -84,17 +87,23 @@ class KernelInput:
             columns["event_cap"] = max_events
         return replace(self, machines=machines)
 
-    def regulated(self, regulations: Sequence[Regulation | None]) -> KernelInput:
-        """The same under controllers that hold the speed, one for each start or as many in a row."""
+    def regulated(self, regulations: Sequence[Regulation], given: bool) -> KernelInput:
+        """The same under controllers that hold the speed, one for each start or as many in a row.
+
+        `given`: the time limit was asked for, and stays.
+        """
         machines = self.machines.copy()
         columns = machines.view(rec.MACHINE)[:, 0]
-        each = np.array([NOT_REGULATED if one is None else one for one in regulations], dtype=np.float64)
+        each = np.array(regulations, dtype=np.float64)
         band, end, dwell = np.repeat(each, len(machines) // len(each), axis=0).T
-        columns["regulated"] = np.isfinite(band)
+        columns["regulated"] = 1.0
         columns["band_low"], columns["band_high"] = (
             (1.0 + sign * band) * columns["target"] for sign in (-1, 1)
         )
         columns["command_end"], columns["dwell"] = end, dwell
+        if not given:  # a loop that has not settled by then swings for ever, or the load runs away
+            latest = PATIENT * (end + dwell) + SLOW_SHARE * columns["time_limit"]
+            columns["time_limit"] = np.minimum(latest, columns["longest"])
         return replace(self, machines=machines)
 
     def guarded(self, period: float) -> KernelInput:

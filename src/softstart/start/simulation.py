@@ -173,7 +173,7 @@ def simulate(
     regulation = None if ready is None or design is None else ready.regulation(design)
     for name, machine_input in inputs.items():
         if regulation is not None:
-            machine_input = machine_input.regulated([regulation])  # noqa: PLW2901
+            machine_input = machine_input.regulated([regulation], time_limit is not None)  # noqa: PLW2901
         machine_input = machine_input.guarded(0.0 if ready is None else period_of(ready))  # noqa: PLW2901
         recorder = StartRecorder(machine_input, 0 if ready is None else int(ready.sensors))
         reason = run_one(ready, design, recorder, until, changes)
