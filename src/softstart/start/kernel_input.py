@@ -101,7 +101,7 @@ class KernelInput:
             (1.0 + sign * band) * columns["target"] for sign in (-1, 1)
         )
         columns["command_end"], columns["dwell"] = end, dwell
-        if not given:  # a loop that has not settled by then swings for ever, or the load runs away
+        if not given:  # a loop that has not settled by then keeps oscillating, or the load runs away
             latest = PATIENT * (end + dwell) + SLOW_SHARE * columns["time_limit"]
             columns["time_limit"] = np.minimum(latest, columns["longest"])
         return replace(self, machines=machines)

@@ -66,6 +66,7 @@ export class Instrument {
       this.plotted = false;
     }
     if (figure) {
+      state.figure = figure;
       // a quick frame has shown it already, unless the start was too long for one
       if (this.version !== frame.version || !this.figure.figure.reached) this.figure.show(figure);
       Object.assign(this, { version: frame.version, stamp: frame.stamp });

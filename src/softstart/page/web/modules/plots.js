@@ -294,7 +294,7 @@ export class Plots {
 
   startLine(panel) {
     const { state } = this;
-    const start = state.rows.get(state.selected)?.start_time;
+    const start = state.figure?.start_time; // of the start that is drawn; the rows may be set to an equal time
     if (typeof start === "number") this.upright(panel, start, this.theme.colours.quiet, [2, 3]);
   }
 
