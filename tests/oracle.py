@@ -77,6 +77,7 @@ class ChainOracle:
     ):
         self.g, self.path, self.target, self.rtol, self.release = given, path, target, rtol, release
         self.most = most  # events
+        self.latest = math.inf  # no leap goes beyond
         self.n, self.load = given.J.size, given.load % given.J.size
         self.t, self.leaps, self.span = 0.0, 0, path.spans[0]
         self.y = np.concatenate([given.theta0, given.w0, [0.0]]).astype(float)
@@ -315,7 +316,7 @@ class ChainOracle:
         """Go on in the present mode until an event changes it or the torque span ends."""
         self.set_mode()
         self.note(self.y)
-        end = self.span[1]
+        end = min(self.span[1], self.latest)
         inputs = self.inputs(self.t, self.y)
         before = self.E @ self.y + self.F @ inputs
         rounding = 1e-11 * (np.abs(self.E) @ np.abs(self.y) + np.abs(self.F) @ np.abs(inputs))

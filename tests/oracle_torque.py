@@ -12,9 +12,20 @@ import numpy as np
 
 
 class TorquePath:
-    """Motor torque: demand, slew limiter, first-order lag; straight or exponential between borders."""
+    """Motor torque: demand, slew limiter, first-order lag; straight or exponential between borders.
 
-    def __init__(self, pieces: list[Any], lag: float, rate: float, u0: float, t_end: float):
+    `limited` is what leaves the limiter at the beginning, if it is not u0, the torque behind the lag.
+    """
+
+    def __init__(
+        self,
+        pieces: list[Any],
+        lag: float,
+        rate: float,
+        u0: float,
+        t_end: float,
+        limited: float | None = None,
+    ):
         self.lag, self.t_end = lag, t_end
         spans = []  # start, reference there, slope of the reference
         pieces = sorted(
@@ -22,7 +33,7 @@ class TorquePath:
         )
         if not pieces or pieces[0][0] > 0:
             pieces = [(0.0, u0, 0.0), *pieces]
-        r = u0
+        r = u0 if limited is None else limited
         for (start, demand, rise), end in zip(pieces, [p[0] for p in pieces[1:]] + [math.inf], strict=True):
             if math.isinf(rate):
                 r = demand
