@@ -26,7 +26,10 @@ from softstart.controller import compiled_step as compiled_step
 from softstart.controller import make_controller as make_controller
 from softstart.controller import parameter as parameter
 from softstart.drive import Drive as Drive
+from softstart.drive import Duty as Duty
+from softstart.drive import DutyStep as DutyStep
 from softstart.drive import Machine as Machine
+from softstart.drive import Shift as Shift
 from softstart.drive.data_sheet import DataSheet as DataSheet
 from softstart.drive.machine_table import MachineTable as MachineTable
 from softstart.errors import InputError as InputError

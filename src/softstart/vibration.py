@@ -27,6 +27,7 @@ import numpy as np
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
 from softstart.drive.checks import elastic_frequency
+from softstart.drive.model import BRAKE
 from softstart.errors import InputError
 from softstart.results import Result
 
@@ -361,6 +362,7 @@ class Reduction(Result, view="chains.reduction_sheet"):
             target_speed=chain.target_speed,
             initial_motor_speed=speed,
             initial_load_speed=speed,
+            **({name: getattr(chain, name) for name in BRAKE} if chain.brake == "motor" else {}),
         )
 
     def summary(self) -> dict[str, object]:

@@ -22,10 +22,10 @@ from softstart.chain.arrays import ChainArrays, arrays_at
 from softstart.chain.checks import BRANCHES, mistakes_of, no_such_mass, warnings_of
 from softstart.chain.elements import LIBRARY, Mass, Motor, Shaft
 from softstart.chain.unreduced import Unreduced
-from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits, Machine, Position
+from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Duty, Limits, Machine, Position
 from softstart.drive.checks import wrong_units
 from softstart.drive.machine import TwoMasses
-from softstart.drive.model import BY_PATH
+from softstart.drive.model import BY_PATH, has_brake
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, document_text
@@ -34,6 +34,7 @@ from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import (
     MaybeNumber,
+    Number,
     ParameterSet,
     Rows,
     component,
@@ -88,6 +89,11 @@ class Chain(ParameterFile, Machine):
         Which values are assumed; it is printed with every output.
     units : str, optional
         Units in which page and report show angles and speeds, as "deg, rpm"; by default as they were given.
+    brake_torque, closing_delay, opening_delay : float or str, optional
+        Brake on the mass of the motor: torque with which it slips, N m (infinite: an ideal lock), and times
+        from a command until it is closed and open, s. Any of them above 0 means that there is one.
+    duty : Duty, optional
+        The cycle of steps that the chain repeats.
 
     Raises
     ------
@@ -108,8 +114,6 @@ class Chain(ParameterFile, Machine):
     WHAT: ClassVar[str] = "a chain"
     LIBRARY: ClassVar[Library] = LIBRARY
     # as a drive has it
-    brake: ClassVar[str] = "none"
-    release_time: ClassVar[float] = 0.0
     position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
     gear: ClassVar[None] = None  # masses and shafts are given at their own shafts
     KIND: ClassVar[str] = "chain"
@@ -130,15 +134,28 @@ class Chain(ParameterFile, Machine):
     assumed: str = parameter("assumed", "", "list of the values that are assumed", '"all stiffnesses"',
         default="")
     units: str = like(Drive, "units")
+    brake_torque: Number = like(Drive, "brake_torque")
+    closing_delay: Number = like(Drive, "closing_delay")
+    opening_delay: Number = like(Drive, "opening_delay")
+    duty: Duty | None = component(Duty, default=None)
     # fmt: on
 
     def _fill(self, given: Mapping[str, object], *rest: Any) -> None:
         super()._fill(_completed(given), *rest)
+        if self.brake_torque is None:  # an ideal lock, or none
+            vars(self)["brake_torque"] = math.inf if self.brake == "motor" else 0.0
+        if self.brake == "motor" and "position" not in vars(self)["_given"] and self._hangs:
+            vars(self)["position"] = "hanging"
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         if {"masses", "shafts", "load_mass"} <= values.keys():
             parts = values["masses"], values["shafts"], values.get("motor"), values["load_mass"]
             yield from (wording.before + sentence for sentence in mistakes_of(*parts))
+            held = values["motor"].mass if values.get("motor") and has_brake(values) else ""
+            for mass in values["masses"]:
+                if mass.name == held and mass.initial_speed != 0.0:
+                    reason = "the brake holds the motor, which stands still; leave it out, or [brake]"
+                    yield wording.sentence(f"initial_speed = {mass.initial_speed!r}", reason)
         yield from wrong_units(values, self.PARAMETERS["units"], wording)
 
     # ---- where chains come from --------------------------------------------------------------------------
@@ -158,8 +175,8 @@ class Chain(ParameterFile, Machine):
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
         blocks = {path: (table, _without_defaults(table, holder)) for path, table, holder in self.blocks()}
         numbers = range(1, len(self.masses) + 1)  # masses and shafts alternate, as they are joined
-        joined = [f"{kind}[{i}]" for i in numbers for kind in ("mass", "shaft")]
-        return document_text(blocks[path] for path in ("", *joined, "motor", "start") if path in blocks)
+        paths = ["", *(f"{kind}[{i}]" for i in numbers for kind in ("mass", "shaft")), "motor", "start"]
+        return document_text(blocks[path] for path in dict.fromkeys([*paths, *blocks]) if path in blocks)
 
     # ---- places ------------------------------------------------------------------------------------------
 
@@ -203,6 +220,22 @@ class Chain(ParameterFile, Machine):
     @property
     def load_index(self) -> int:
         return self.index(self.load_mass)
+
+    @property
+    def brake(self) -> str:
+        """As of a drive: "motor" with a table [brake], which holds the motor's mass, else "none"."""
+        return "motor" if self.motor is not None and has_brake(vars(self)) else "none"
+
+    @property
+    def release_time(self) -> float:
+        """When the brake is open, s: `opening_delay` after the command of the start, 0 without a brake."""
+        return self.opening_delay if self.brake == "motor" else 0.0
+
+    @property
+    def _hangs(self) -> bool:
+        """Whether an active load that friction does not hold acts on the chain."""
+        at = arrays_at(self, self.motor_index)  # not `at_motor_shaft`, which keeps the position
+        return bool(abs(at.active.sum()) > at.friction.sum())
 
     @property
     def mass_names(self) -> tuple[str, ...]:
@@ -669,8 +702,12 @@ def _completed(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_defaults(table: DocumentTable, holder: ParameterSet) -> dict[str, object]:
-    values = holder.values()
-    return {p.name: values[p.name] for p in table.parameters if values[p.name] != p.default}
+    values, given = holder.values(), holder.given()
+    return {
+        p.name: values[p.name]
+        for p in table.parameters
+        if values[p.name] != p.default and (p.name in given or p.follows)
+    }
 
 
 class Aggregate(NamedTuple):

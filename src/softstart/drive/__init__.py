@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from softstart.drive.checks import FRICTIONS
 from softstart.drive.data_sheet import DataSheet
+from softstart.drive.duty import Duty, DutyStep, Shift
 from softstart.drive.limits import INFORMATIVE_TABLES, Limit, Limits, SNCurve
-from softstart.drive.machine import Machine
+from softstart.drive.machine import LoadKind, Machine
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
     UNKNOWN_POSITIONS,
     ContactLaw,
     Drive,
-    LoadKind,
     Position,
     library,
 )  # fmt: skip
@@ -31,11 +31,14 @@ __all__ = [
     "ContactLaw",
     "DataSheet",
     "Drive",
+    "Duty",
+    "DutyStep",
     "Limit",
     "Limits",
     "LoadKind",
     "Machine",
     "Position",
     "SNCurve",
+    "Shift",
     "library",
 ]  # fmt: skip

@@ -105,9 +105,16 @@ def _symbols(values: Values) -> SimpleNamespace:
         output=get("permissible_output_torque"), gear_ratio=get("gear_ratio"),
         slow=(left > 0.0) & ((b1 + b2) * get("target_speed") >= left),
         busy=get("permissible_start_time") * get("starts_per_hour"),  # s in an hour
+        opening_late=_opening_late(values),
         reactive=values.get("load_kind") == "reactive", braked=values.get("brake") == "motor",
         hangs=isinstance(where, str) and where == "hanging",
     )  # fmt: skip
+
+
+def _opening_late(values: Values) -> Any:
+    """Whether the release of a brake at a time has an opening delay besides."""
+    release, delay = values.get("release"), values.get("opening_delay", 0.0)
+    return not isinstance(release, str | None) and (delay > 0.0) & (release != delay)
 
 
 VISCOUS = "at {other} this takes more torque than the motor has left; lower the one or the other"
@@ -146,6 +153,8 @@ RULES: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
      'only an active load hangs; friction holds a reactive one where it stands, write "unknown"'),
     ("initial_motor_speed", "brake", lambda v: v.braked & (abs(v.w1) > 0.0),
      'a motor that is held stands still; leave the speed out, or write brake "none"'),
+    ("release", "opening_delay", lambda v: v.opening_late,
+     "a release at a time counts from the start, and {other} from the command of the start; leave one out"),
     ("load_torque", "starting_torque",
      lambda v: (v.push > v.Mc) & ((v.push + v.Mc * v.ratio) / (1.0 + v.ratio) <= 0.0),
      "against {other} this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), to "

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softstart.input.parameters import Parameter, Wording
 
-INFORMATIVE_TABLES = ("limits", "limits.fatigue", "gear")  # what stands there changes no start
+# what stands there changes no start
+INFORMATIVE_TABLES = ("limits", "limits.fatigue", "gear", "duty", "shift")
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 from softstart.arrays import Vector
 from softstart.drive.limits import Limits
 from softstart.input.gear import Gear
 from softstart.input.parameters import Parameter, ParameterValue
+
+LoadKind = Literal["active", "reactive"]
 
 
 class TwoMasses(NamedTuple):
@@ -60,6 +62,12 @@ class Machine(ABC):
         The object that has the parameters of the motor; None for a chain without one.
     brake : str
         "motor" where a brake holds the motor until its release, else "none".
+    brake_torque : float
+        Torque with which the closed brake slips, N m; infinite for an ideal lock, 0 without a brake.
+    closing_delay, opening_delay : float
+        Time from a command to the brake until it acts, s.
+    duty : Duty or None
+        The cycle of steps that the machine repeats.
     initial_motor_speed, initial_load_speed : float
         Speeds at the start, rad/s.
 
@@ -95,6 +103,14 @@ class Machine(ABC):
         def motor(self) -> Any: ...  # what has its parameters: a Drive, a Motor, or None
         @property
         def brake(self) -> str: ...
+        @property
+        def brake_torque(self) -> float: ...
+        @property
+        def closing_delay(self) -> float: ...
+        @property
+        def opening_delay(self) -> float: ...
+        @property
+        def duty(self) -> Any: ...  # a Duty, which reads this module, or None
         @property
         def initial_motor_speed(self) -> float: ...
         @property

@@ -11,8 +11,9 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, mean_torque_of, wrong_units
+from softstart.drive.duty import Duty
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
-from softstart.drive.machine import Machine, TwoMasses
+from softstart.drive.machine import LoadKind, Machine, TwoMasses
 from softstart.errors import InputError
 from softstart.input.files import Library
 from softstart.input.gear import NO_GEAR, Gear
@@ -22,13 +23,13 @@ from softstart.input.parameter_set import (
     MaybeSeries,
     Number,
     NumberOrWord,
+    component,
     parameter,
     read_settings,
 )  # fmt: skip
 from softstart.input.parameters import Parameter, ParameterValue, Wording, read_value
 from softstart.quantities import RefusedError, show
 
-LoadKind = Literal["active", "reactive"]
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
 Position = Literal["mid-gap", "driving-flank", "opposite-flank", "hanging", "unknown"]
 Brake = Literal["none", "motor"]
@@ -36,11 +37,18 @@ Brake = Literal["none", "motor"]
 UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
 SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
 LOAD: Final = ("load_torque", "load_friction")  # the parts of the load torque
+BRAKE: Final = ("brake_torque", "closing_delay", "opening_delay")
 
 # documents of another kind from which a drive follows: a test for them, and the drive; see `DataSheet`
 OTHER_DOCUMENTS: list[tuple[Callable[[Mapping[str, Any]], bool], Callable[[dict[str, Any], str], Drive]]] = []
 
 library = Library("softstart.drive", "a drive", "drives")
+
+
+def has_brake(values: Mapping[str, Any]) -> bool:
+    """Whether the parameters of [brake] describe one: any of them is above 0."""
+    given = (values.get(name) for name in BRAKE)
+    return any(value is not None and np.any(np.asarray(value) > 0.0) for value in given)
 
 
 def _rests(values: Mapping[str, Any]) -> Any:
@@ -66,6 +74,8 @@ class Drive(ParameterFile, Machine):
     Parameters
     ----------
     {parameters}
+    duty : Duty, default None
+        The cycle of steps that the machine repeats.
 
     Raises
     ------
@@ -193,6 +203,13 @@ class Drive(ParameterFile, Machine):
     initial_motor_speed: Number = parameter("start.initial_motor_speed", "rad/s",
         "speed of the motor at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
 
+    brake_torque: Number = parameter("brake.torque", "N*m",
+        "torque with which the brake of the motor slips; without it the brake never does", '"40 N*m"',
+        "0 or more", default=None, infinite=True)
+    closing_delay: Number = parameter("brake.closing_delay", "s",
+        "time from the command until the brake is closed", '"60 ms"', "0 or more", default=0.0)
+    opening_delay: Number = parameter("brake.opening_delay", "s",
+        "time from the command until the brake is open", '"100 ms"', "0 or more", default=0.0)
     permissible_torque: MaybeNumber = parameter("limits.shaft_torque", "N*m",
         "permissible peak of the shaft torque at the motor shaft", '"130 N*m"', "above 0", default=None,
         at_output="limit")
@@ -213,6 +230,7 @@ class Drive(ParameterFile, Machine):
     fatigue_cycles: MaybeSeries = parameter("limits.fatigue.cycles", "1",
         "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True,
         label="S-N cycles")
+    duty: Duty | None = component(Duty, default=None)
     # fmt: on
 
     def _fill(self, given: Mapping[str, object], *rest: Any) -> None:
@@ -220,17 +238,25 @@ class Drive(ParameterFile, Machine):
         vars(self).update(self._derived(vars(self)))
 
     def _derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Where and how fast the start begins, if that is not given: by brake, load and reversal.
+        """Brake, and where and how fast the start begins, if not given: by [brake], load and reversal.
 
         An array of initial speeds counts as motion, so that no start of a batch depends on those beside it.
         """
         given, derived = vars(self)["_given"], dict[str, Any]()
+        braked = has_brake(values)
+        if braked and "brake" not in given:
+            derived["brake"] = "motor"
+            if "release" not in given:  # opened by the command of a start
+                derived["release"] = values.get("opening_delay", 0.0)
+        brake = derived.get("brake", values.get("brake"))
+        if "brake_torque" not in given:
+            derived["brake_torque"] = math.inf if brake == "motor" or braked else 0.0
         reversal = isinstance(values.get("initial_speed"), str)
         if reversal and values.get("target_speed") is not None:
-            derived = {name: -values["target_speed"] for name in SPEEDS if name not in given}
+            derived |= {name: -values["target_speed"] for name in SPEEDS if name not in given}
         if "start_position" not in given:
             rests = np.all(_rests(values))
-            hangs = values.get("brake") == "motor" and not rests
+            hangs = brake == "motor" and not rests
             gap = np.asarray(values.get("gap", 0.0))
             anywhere = rests and np.any(gap > 0.0)
             moves = any(np.ndim(values.get(name, 0.0)) or values.get(name, 0.0) != 0.0 for name in SPEEDS)
@@ -261,7 +287,8 @@ class Drive(ParameterFile, Machine):
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         derived = self._derived(values)
-        yield from contradictions({**values, **derived}, self.PARAMETERS, wording)
+        seen = {**values, **derived, "release": values.get("release")}  # as it is given
+        yield from contradictions(seen, self.PARAMETERS, wording)
         rests = np.asarray(_rests(values))
         if "start_position" in derived and rests.any() != rests.all():
             label = wording.label(self.PARAMETERS["start_position"])

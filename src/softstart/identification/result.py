@@ -217,7 +217,8 @@ class Identification(Result, view="identification.identification_sheet"):
             percent = 100.0 * one.half_width if one.value and self.stated else None
             estimates.append(plain_fields(one) | ends | {"half_width_percent": percent})
         return {
-            "drive": self.drive.given() | {"name": self.drive.name},
+            "drive": {name: value for name, value in self.drive.given().items() if name in PARAMETERS}
+            | {"name": self.drive.name},
             "estimates": estimates,
             "correlations": self.correlations.tolist(),
             "ripple": self.ripple,

@@ -30,7 +30,7 @@ class DocumentTable:
     """One table of a document: `name` as in [name], "" for the keys above the first table.
 
     With `many` it is a list of tables, [[name]], of at least `least` entries. A single one that is not
-    `required` may be left out as a whole.
+    `required` may be left out as a whole. For keys of other tables only the `suggested` ones are proposed.
     """
 
     name: str
@@ -38,6 +38,7 @@ class DocumentTable:
     many: bool = False
     least: int = 0
     required: bool = True
+    suggested: bool = True
 
     def __post_init__(self) -> None:
         parameters = (p if p.table == self.name else replace(p, table=self.name) for p in self.parameters)
@@ -203,7 +204,7 @@ def _unknown(
     wording: Wording,
 ) -> Mistake:
     """That a table has no such key, and those that were probably meant, in this table or in others."""
-    everywhere = [p for one in tables for p in one.parameters]
+    everywhere = [p for one in tables if one.suggested or one == table for p in one.parameters]
     meant = meant_by(key.removeprefix(f"{table.name}_"), everywhere, table.parameters)
     brackets = {one.name: one.bracket for one in tables}
 

@@ -19,7 +19,7 @@ from softstart.stopping import at_stop
 
 
 class Library:
-    """The TOML files in the folder `library` of a package; `what` and `plural` as "a clutch", "clutches".
+    """The TOML files in a folder of a package; `what` and `plural` as "a clutch", "clutches".
 
     >>> drives = Library("softstart.drive", "a drive", "drives")
     >>> drives.names()[1], drives.find("crane-4amtkf")[1]
@@ -28,8 +28,8 @@ class Library:
     # The crane drive of [G] with J2 = 5 J1 and a gap of 0.5 rad.
     """
 
-    def __init__(self, package: str, what: str, plural: str) -> None:
-        self.package, self.what, self.plural = package, what, plural
+    def __init__(self, package: str, what: str, plural: str, folder: str = "library") -> None:
+        self.package, self.what, self.plural, self.folder = package, what, plural, folder
 
     def names(self) -> tuple[str, ...]:
         """The names of the shipped files, in order."""
@@ -37,7 +37,7 @@ class Library:
 
     @cached_property
     def _folder(self) -> Traversable:
-        return resources.files(self.package).joinpath("library")
+        return resources.files(self.package).joinpath(self.folder)
 
     @cached_property
     def _names(self) -> tuple[str, ...]:

@@ -70,7 +70,9 @@ class ParameterFile(ParameterSet):
         field_of = {table.name: name for name, part in self.PARTS.items() for table in part.tables}
         for table in self.TABLES:
             holder = getattr(self, field_of[table.name]) if table.name in field_of else self
-            if isinstance(holder, tuple):
+            if isinstance(holder, ParameterFile) and holder is not self:  # of several tables, as a duty
+                yield from (block for block in holder.blocks() if block[1].name == table.name)
+            elif isinstance(holder, tuple):
                 yield from ((f"{table.name}[{i}]", table, row) for i, row in enumerate(holder, 1))
             elif holder is not None:
                 yield table.name, table, holder

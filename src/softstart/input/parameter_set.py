@@ -10,7 +10,7 @@ documentation.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, dataclass_transform
 
@@ -96,13 +96,26 @@ class Component:
     def tables(self) -> tuple[DocumentTable, ...]:
         """Its tables in the file of the whole."""
         required, tables = self.default is REQUIRED, self.kind.TABLES
+        if self.kind.PARTS:  # of several tables, as a duty
+            return tuple(replace(one, required=False, suggested=False) for one in tables)
         return tuple(
             replace(one, many=self.many, least=self.least, required=required and one.required)
             for one in tables
         )
 
+    def misfits(self, name: str, value: object) -> Iterator[tuple[str, str]]:
+        """Subject and reason for a value of another kind."""
+        for one in value if isinstance(value, tuple) else [value]:
+            if not isinstance(one, self.kind) and not (one is None and self.default is None):
+                yield (
+                    f"{name} = {show(one)}",
+                    f"it takes {self.kind.WHAT}, which {self.kind.__name__}(...) makes",
+                )
+
     def read(self, content: Mapping[str, Any], wording: Wording) -> tuple[list[ParameterSet], list[Mistake]]:
         """Those in the tables of a document, by name, and what is wrong with them."""
+        if self.kind.PARTS:
+            return self._read_parts(content, wording)
         if not self.many:
             tables = [content[one.name] for one in self.tables if one.name in content]
             rows = [{key: value for table in tables for key, value in table.items()}]
@@ -110,6 +123,23 @@ class Component:
         name = self.tables[0].name
         rows = content[name] or []
         return self._read_rows(rows, [replace(wording, row=f"[{name}] {i + 1}, ") for i in range(len(rows))])
+
+    def _read_parts(
+        self, content: Mapping[str, Any], wording: Wording
+    ) -> tuple[list[ParameterSet], list[Mistake]]:
+        """One that is itself made of several tables; none where the document has none of them."""
+        if not any(content.get(table.name) for table in self.tables):
+            return [], []
+        given, mistakes = dict[str, object](), list[Mistake]()
+        for name, part in self.kind.PARTS.items():
+            parts, wrong = part.read(content, wording)
+            mistakes += wrong
+            if parts:
+                given[name] = parts if part.many else parts[0]
+        try:
+            return ([] if mistakes else [self.kind._made(given, wording, [])]), mistakes
+        except InputError as error:
+            return [], [Mistake(sentence) for sentence in error.sentences]
 
     def _read_rows(
         self, rows: list[dict[str, object]], wordings: list[Wording]
@@ -166,10 +196,14 @@ class ParameterSet:
             for name, one in declared.items()
         }
         cls.FIELDS = {**cls.PARTS, **cls.PARAMETERS}
-        everyone, tables = cls.PARAMETERS.values(), [table for p in cls.PARTS.values() for table in p.tables]
+        everyone, tables = cls.PARAMETERS.values(), list[DocumentTable]()
+        for part in cls.PARTS.values():
+            tables += () if part.kind.PARTS else part.tables
         for table in dict.fromkeys(p.table for p in everyone):
             keys = tuple(p for p in everyone if p.table == table)
             tables.append(DocumentTable(table, keys, required=any(p.required for p in keys)))
+        for part in cls.PARTS.values():  # what is a file by itself, as a duty, comes last
+            tables += part.tables if part.kind.PARTS else ()
         cls.TABLES = tuple(sorted(tables, key=lambda table: bool(table.name)))  # "" first
         cls.__replace__ = cls.replace  # type: ignore[attr-defined]  # copy.replace of Python 3.13
         arguments = [_argument(name, one) for name, one in cls.FIELDS.items()]
@@ -206,6 +240,7 @@ class ParameterSet:
         for name, part in self.PARTS.items():
             if name in given:
                 values[name] = tuple(given[name]) if part.many else given[name]  # type: ignore[arg-type]
+                found += [Mistake(wording.sentence(*one)) for one in part.misfits(name, values[name])]
             elif part.default is not REQUIRED:
                 values[name] = part.default
             elif not mistakes:  # else it may have been there, and wrong

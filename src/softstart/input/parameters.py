@@ -22,7 +22,7 @@ LONGEST_LINE = 120  # characters of a name: more leave no room for the figure be
 
 Limit = Literal[
     "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "above 0 and at most 1",
-    "a whole number, 0 or more", "one line", "from 0 to 0.5",
+    "a whole number, 0 or more", "a whole number, 1 or more", "one line", "from 0 to 0.5",
 ]  # fmt: skip
 
 # each holds for a number and, element by element, for an array
@@ -34,6 +34,7 @@ LIMITS: dict[str, Callable[[Any], Any]] = {
     "from 0 to 1": lambda x: (x >= 0.0) & (x <= 1.0),
     "above 0 and at most 1": lambda x: (x > 0.0) & (x <= 1.0),
     "a whole number, 0 or more": lambda x: (x >= 0.0) & (x % 1.0 == 0.0),
+    "a whole number, 1 or more": lambda x: (x >= 1.0) & (x % 1.0 == 0.0),
 }
 
 

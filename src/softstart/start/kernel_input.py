@@ -293,6 +293,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, PeriodicTorque]) -> t
     if motor is None:
         return made, np.array([math.inf])
     _motor(named, motor)
+    named["release_at"] = chain.release_time
     named["initial_torque"] = motor.initial_torque
     heavier = 1.0 / arrays.efficiency_from_motor
     _guard_chain(made, arrays, heavier)

@@ -119,14 +119,16 @@ def controllers_set_up(machine: Machine | None, fitted_to: Machine) -> str:
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
     'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
-    here, there = {} if machine is None else machine.parameters_by_path(), fitted_to.parameters_by_path()
+    here, there = (
+        {path: one for path, one in given.items() if one[0].table not in INFORMATIVE_TABLES}
+        for given in ({} if machine is None else machine.parameters_by_path(), fitted_to.parameters_by_path())
+    )
     found = [
         f"{path} {_set(there[path][1])} there, {_set(value)} here"
         for path, (parameter, value) in here.items()
         if here.keys() == there.keys()
         and there[path][1] != value
         and parameter.name not in ("name", "source", "assumed", "units")
-        and parameter.table not in INFORMATIVE_TABLES
     ]
     more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
     differs = ": " + "; ".join(found[:MOST]) + more if found else ""

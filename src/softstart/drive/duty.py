@@ -1,0 +1,285 @@
+"""A duty: one cycle of starts, stops, reversals, jogs and load changes, and how often it is repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, Final, Literal, get_args
+
+from softstart.drive.machine import LoadKind
+from softstart.input.files import Library
+from softstart.input.parameter_file import ParameterFile
+from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, Rows, component, parameter
+from softstart.quantities import show
+
+Do = Literal["start", "stop", "hold", "reverse", "jog", "load", "brake"]
+StopBy = Literal["strategy", "torque", "coast", "brake"]
+
+STOP_KEYS: Final = ("by", "braking_torque", "brake_speed", "brake_time")
+LOAD_KEYS: Final = ("torque", "kind", "inertia", "friction")
+# the keys that each kind of step has
+KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "start": ("set_speed", "repeat"),
+    "stop": STOP_KEYS,
+    "hold": ("time", "angle", "set_speed"),
+    "reverse": ("set_speed",),
+    "jog": ("time", "set_speed", *STOP_KEYS, "repeat"),
+    "load": (*LOAD_KEYS, "mass"),
+    "brake": (),
+}
+ENDS: Final = ("stop", "brake")  # steps that end a motion
+
+library = Library("softstart.drive", "a duty", "duties", folder="duties")
+
+
+class DutyStep(ParameterSet):
+    """One step of a duty.
+
+    Angles, speeds and torques are at the motor shaft, torque, friction and inertia of a load of a chain at
+    the shaft of its mass.
+
+    `do` is one of
+
+    - "start": start from rest, by the strategy, to `set_speed` (negative: backwards). With `repeat` all steps
+      up to and including the stop that ends it are repeated so many times.
+    - "stop": until all masses stand, `by` the strategy, the motor's `braking_torque`, coasting or the brake.
+      The brake, if there is one, closes at standstill, or at `brake_speed` or `brake_time`.
+    - "hold": go on for `time`, or until the load has travelled `angle`; at standstill a pause. A new
+      `set_speed` needs a strategy that holds the speed.
+    - "reverse": start in the other direction, out of the motion.
+    - "jog": start for `time`, then a stop; `repeat` times in a row.
+    - "load": change the load at rest: `torque`, `kind`, `inertia`, `friction`, of a chain those of `mass`.
+    - "brake": close the brake at once, motor off, until all masses stand.
+
+    Parameters
+    ----------
+    {parameters}
+
+    Raises
+    ------
+    InputError
+        With a sentence for each mistake, also for keys that do not belong to the step.
+
+    Examples
+    --------
+    >>> DutyStep("jog", time="200 ms", repeat=3).time
+    0.2
+    >>> DutyStep("start", torque=5.0)
+    Traceback (most recent call last):
+    softstart.errors.InputError: torque = 5.0: a step "start" has no torque; it has set_speed and repeat.
+
+    References
+    ----------
+    docs/reference/drive-file.md.
+    """
+
+    WHAT: ClassVar[str] = "a step of a duty"
+
+    # fmt: off
+    do: Do = parameter("duty.do", "", "kind of the step", '"start"', choices=get_args(Do), kw_only=False)
+    set_speed: MaybeNumber = parameter("duty.set_speed", "rad/s",
+        "speed that the load is to reach, negative backwards", '"-880 rpm"', default=None)
+    time: MaybeNumber = parameter("duty.time", "s", "time of the step", '"2 s"', "above 0", default=None)
+    angle: MaybeNumber = parameter("duty.angle", "rad", "travel of the load in the step", '"5 turn"',
+        "above 0", default=None)
+    repeat: Number = parameter("duty.repeat", "1", "number of times in a row", "3",
+        "a whole number, 1 or more", default=1.0)
+    by: StopBy | None = parameter("duty.by", "", "way of the stop", '"coast"', default=None,
+        choices=get_args(StopBy))
+    braking_torque: MaybeNumber = parameter("duty.braking_torque", "N*m", "braking torque of the motor",
+        '"20 N*m"', "above 0", default=None)
+    brake_speed: MaybeNumber = parameter("duty.brake_speed", "rad/s",
+        "speed of the motor at which the brake is closed", '"50 rpm"', "0 or more", default=None)
+    brake_time: MaybeNumber = parameter("duty.brake_time", "s",
+        "time after which the brake is closed", '"0.5 s"', "0 or more", default=None)
+    torque: MaybeNumber = parameter("duty.torque", "N*m", "torque of the load", '"7.16 N*m"', default=None)
+    kind: LoadKind | None = parameter("duty.kind", "", "kind of the load torque", '"active"', default=None,
+        choices=get_args(LoadKind))
+    inertia: MaybeNumber = parameter("duty.inertia", "kg*m^2", "inertia of the load", '"0.175 kg*m^2"',
+        "above 0", default=None)
+    friction: MaybeNumber = parameter("duty.friction", "N*m",
+        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=None)
+    mass: str | None = parameter("duty.mass", "", "name of the mass of a chain whose load changes",
+        '"hook"', default=None)
+    # fmt: on
+
+    def contradictions(self) -> Iterator[str]:
+        """Sentences on keys that do not belong to the step, and on those that it lacks."""
+        keys, given = KEYS[self.do], self.given()
+        listed = f"it has {_joined(keys)}" if keys else "it has no other keys"
+        for key in [one for one in given if one not in ("do", *keys)]:
+            yield f'{key} = {show(given[key])}: a step "{self.do}" has no {key}; {listed}.'
+        if self.set_speed == 0.0 and "set_speed" in keys:
+            yield 'set_speed = 0: a set speed is not 0; use a step "stop" to stand still.'
+        if self.brake_speed is not None and self.brake_time is not None:
+            yield (
+                f"brake_speed = {self.brake_speed!r} and brake_time = {self.brake_time!r}: both say when the "
+                "brake closes; leave one out."
+            )
+        if self.braking_torque is not None and "by" in keys and self.by != "torque":
+            by = "" if self.by is None else f', and by = "{self.by}"'
+            yield (
+                f'braking_torque = {self.braking_torque!r}: only a stop by = "torque" has one{by}; write '
+                'by = "torque", or leave it out.'
+            )
+        if self.do == "hold":
+            if self.time is None and self.angle is None:
+                yield 'time is missing: a hold takes a time or an angle; write for example time = "2 s".'
+            elif self.time is not None and self.angle is not None:
+                yield (
+                    f"time = {self.time!r} and angle = {self.angle!r}: both end the step; leave one out, or "
+                    "make two steps."
+                )
+        if self.do == "jog" and self.time is None:
+            yield 'time is missing: a jog is a start of given time; write for example time = "200 ms".'
+        if self.do == "load" and not given.keys() & set(LOAD_KEYS):
+            yield f'a step "load" changes {_joined(LOAD_KEYS, "or")} of the load; give at least one.'
+
+    @property
+    def direction(self) -> float:
+        """1.0 forward, -1.0 backwards, by the sign of its set speed."""
+        return -1.0 if self.set_speed is not None and self.set_speed < 0.0 else 1.0
+
+
+class Shift(ParameterSet):
+    """How often a duty is repeated.
+
+    Parameters
+    ----------
+    {parameters}
+
+    Examples
+    --------
+    >>> shift = Shift(cycles_per_hour=50)
+    >>> shift.cycles_per_hour * shift.hours * shift.shifts_per_year
+    100000.0
+
+    References
+    ----------
+    docs/reference/drive-file.md.
+    """
+
+    WHAT: ClassVar[str] = "a shift"
+
+    # fmt: off
+    cycles_per_hour: Number = parameter("shift.cycles_per_hour", "1", "number of cycles in an hour", "50",
+        "above 0")
+    hours: Number = parameter("shift.hours", "1", "number of hours of a shift", "8", "above 0", default=8.0)
+    shifts_per_year: Number = parameter("shift.shifts_per_year", "1", "number of shifts in a year", "250",
+        "above 0", default=250.0)
+    # fmt: on
+
+
+class Duty(ParameterFile):
+    """One cycle of steps, which a machine repeats.
+
+    Parameters
+    ----------
+    steps : iterable of DutyStep
+        The steps in their order; the machine stands before the first.
+    shift : Shift, optional
+        How often the cycle is repeated, for a life in shifts and years.
+
+    Raises
+    ------
+    InputError
+        With a sentence for each step that cannot follow those before it.
+
+    Examples
+    --------
+    >>> duty = Duty([DutyStep("start", repeat=2), DutyStep("stop", by="coast"), DutyStep("hold", time=5)])
+    >>> [(index, step.do) for index, step in duty.expanded()]
+    [(0, 'start'), (1, 'stop'), (0, 'start'), (1, 'stop'), (2, 'hold')]
+    >>> Duty([DutyStep("stop")])
+    Traceback (most recent call last):
+    softstart.errors.InputError: [duty] 1, do = "stop": the machine stands; a step "start" comes before it.
+
+    References
+    ----------
+    docs/reference/drive-file.md.
+    """
+
+    WHAT: ClassVar[str] = "a duty"
+    LIBRARY: ClassVar[Library] = library
+
+    # fmt: off
+    steps: Rows[DutyStep] = component(DutyStep, least=0, default=(), kw_only=False)
+    shift: Shift | None = component(Shift, default=None)
+    # fmt: on
+
+    def contradictions(self) -> Iterator[str]:
+        """Sentences on steps that cannot follow those before them."""
+        if not self.steps:
+            yield '[[duty]] is missing: a duty has steps; write for example [[duty]] and do = "start" below.'
+        started, direction = 0, 1.0  # number of the step that set the machine in motion, 0 at standstill
+        for number, step in enumerate(self.steps, start=1):
+            yield from (f"[duty] {number}, {sentence}" for sentence in _misplaced(step, started, direction))
+            if step.do == "start" and step.repeat > 1.0 and self._end_of(number - 1) is None:
+                yield (
+                    f"[duty] {number}, repeat = {step.repeat:g}: no step stops the machine again, so nothing "
+                    'can be repeated; add a step "stop", or leave repeat out.'
+                )
+            if step.do == "start" and not started:
+                started, direction = number, step.direction
+            elif step.do == "reverse" and started:
+                direction = -direction
+            elif step.do in ENDS:
+                started = 0
+
+    def _end_of(self, index: int) -> int | None:
+        """The index of the step that ends the motion which the start at this index begins."""
+        later = range(index + 1, len(self.steps))
+        end = next((i for i in later if self.steps[i].do in (*ENDS, "start")), None)
+        return None if end is None or self.steps[end].do == "start" else end
+
+    def expanded(self) -> tuple[tuple[int, DutyStep], ...]:
+        """All steps of one cycle in their order, repetitions too, each with its index in `steps`."""
+        steps, cycle, index = self.steps, list[tuple[int, DutyStep]](), 0
+        while index < len(steps):
+            step = steps[index]
+            end = self._end_of(index) if step.do == "start" and step.repeat > 1.0 else None
+            last = index if end is None else end
+            cycle += [(i, steps[i]) for i in range(index, last + 1)] * int(step.repeat)
+            index = last + 1
+        return tuple(cycle)
+
+    @property
+    def ends_moving(self) -> bool:
+        """Whether the last step leaves the machine in motion, so that the cycle cannot be repeated.
+
+        >>> Duty([DutyStep("start")]).ends_moving
+        True
+        """
+        moves = [step.do for step in self.steps if step.do in ("start", *ENDS)]
+        return bool(moves) and moves[-1] == "start"
+
+
+def _joined(words: tuple[str, ...], last: str = "and") -> str:
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _misplaced(step: DutyStep, started: int, direction: float) -> Iterator[str]:
+    """Why a step cannot stand here: the machine is in motion since step `started`, or stands (0)."""
+    subject = f'do = "{step.do}"'
+    if started and step.do in ("start", "jog", "load"):
+        what = {"start": "starts", "jog": "is jogged", "load": "changes its load"}[step.do]
+        remedy = 'add a step "stop" before it' + ', or write "reverse"' * (step.do == "start")
+        yield f"{subject}: the machine {what} at rest, and it runs since step {started}; {remedy}."
+    if not started and step.do in (*ENDS, "reverse"):
+        yield f'{subject}: the machine stands; a step "start" comes before it.'
+    if step.do == "hold" and not started:
+        for key in ("angle", "set_speed"):
+            if (value := getattr(step, key)) is not None:
+                yield f"{key} = {value!r}: the machine stands; give a time, or start it before."
+    if started and step.set_speed is not None:
+        same = step.direction == direction
+        running = "forward" if direction > 0.0 else "backwards"
+        if step.do == "reverse" and same:
+            yield (
+                f"set_speed = {step.set_speed!r}: the machine runs {running} already; a reversal has a set "
+                "speed of the other sign."
+            )
+        if step.do == "hold" and not same:
+            yield (
+                f"set_speed = {step.set_speed!r}: the machine runs {running}; a step of the other direction "
+                'is "reverse".'
+            )

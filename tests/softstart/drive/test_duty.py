@@ -1,0 +1,186 @@
+"""Duties: their files, what machines keep of them, and one sentence for every step that cannot be."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softstart import Chain, Drive, Duty, DutyStep, InputError, Machine, Shift, machine_table, simulate
+
+CRANE = Drive.load("crane-4amtkf")
+CHAIN = Chain.load("crane-4-mass")
+HOIST = Drive.load("hoist-15kw")
+SHIFT = Duty.load("travel-crane")
+
+
+def sentences(steps: str, machine: str = "", where: str = "my.toml") -> list[str]:
+    """The sentences on a file with these steps, "do key=value key=value; do ..."."""
+    tables = []
+    for step in steps.split("; "):
+        do, *pairs = step.split()
+        lines = [f'do = "{do}"', *(pair.replace("=", " = ") for pair in pairs)]
+        tables.append("\n".join(["[[duty]]", *lines]))
+    kind = type(CRANE) if machine else Duty
+    with pytest.raises(InputError) as error:
+        kind.from_toml("\n".join([machine, *tables]), where=where)
+    assert all(one.startswith(f"{where}: ") for one in error.value.sentences)
+    return [one.removeprefix(f"{where}: ") for one in error.value.sentences]
+
+
+# ---- reading and writing --------------------------------------------------------------------------------
+
+
+def test_the_shift_of_a_travel_crane() -> None:
+    """400 starts, 400 stops and 150 jogs in eight hours, counted from the expanded cycle."""
+    assert SHIFT.shift is not None
+    cycles = SHIFT.shift.cycles_per_hour * SHIFT.shift.hours
+    counts = [cycles * sum(s.do == do for _, s in SHIFT.expanded()) for do in ("start", "stop", "jog")]
+    assert counts == [400.0, 400.0, 150.0]
+
+
+def test_repeats_are_expanded_up_to_the_stop() -> None:
+    duty = Duty(
+        [
+            DutyStep("start", repeat=2),
+            DutyStep("hold", time=1),
+            DutyStep("stop"),
+            DutyStep("jog", time="0.1 s", repeat=3),
+            DutyStep("start"),
+        ]
+    )
+    assert [index for index, _ in duty.expanded()] == [0, 1, 2, 0, 1, 2, 3, 3, 3, 4]
+    assert all(step is duty.steps[index] for index, step in duty.expanded())
+    assert duty.ends_moving
+    assert not SHIFT.ends_moving
+
+
+@pytest.mark.parametrize("machine", [CRANE, CHAIN, HOIST], ids=["drive", "chain", "hoist"])
+def test_a_machine_keeps_its_duty(machine: Machine) -> None:
+    duty = SHIFT.replace(steps=[*SHIFT.steps, DutyStep("load", torque="5 N*m", kind="reactive")])
+    assert machine.duty is None
+    one = machine.replace(duty=duty, brake_torque="300 N*m", opening_delay="20 ms")
+    for same in (type(machine).from_toml(one.to_toml()), pickle.loads(pickle.dumps(one)), one.replace()):
+        assert same == one
+        assert hash(same) == hash(one)
+        assert same.duty == duty
+    assert one.replace(duty=None, brake_torque=None, opening_delay=0) == machine
+    assert one.with_gap_and_inertia(0.2, 1.0).duty == duty
+    assert all(at.duty == duty for at in one.positions.values())
+
+
+def test_a_table_keeps_the_duty() -> None:
+    table = machine_table(CRANE.replace(duty=SHIFT), gap=[0.1, 0.5])
+    assert [one.duty for one in table.elements()] == [SHIFT, SHIFT]
+
+
+def test_a_duty_in_a_file_of_its_own(tmp_path: Path) -> None:
+    assert Duty.from_toml(SHIFT.to_toml()) == SHIFT
+    (tmp_path / "shift.toml").write_text(SHIFT.to_toml(), encoding="utf-8")
+    assert Duty.load(tmp_path / "shift.toml") == SHIFT
+    assert Drive.from_toml(CRANE.to_toml() + SHIFT.to_toml()) == CRANE.replace(duty=SHIFT)
+
+
+def test_units_of_steps() -> None:
+    step = DutyStep("hold", angle="2 turn", set_speed="-60 rpm")
+    assert (step.angle, step.set_speed) == pytest.approx((4.0 * math.pi, -2.0 * math.pi))
+    assert Shift(cycles_per_hour=50) == Shift(cycles_per_hour=50.0, hours=8, shifts_per_year=250)
+
+
+# ---- the brake ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("machine", [CRANE, CHAIN], ids=["drive", "chain"])
+def test_a_brake_opens_after_its_delay(machine: Machine) -> None:
+    """Without [brake] there is none; one opens `opening_delay` after the command of the start."""
+    assert (machine.brake, machine.brake_torque, machine.release_time) == ("none", 0.0, 0.0)
+    braked = machine.replace(brake_torque="90 N*m", opening_delay="100 ms", closing_delay="60 ms")
+    assert (braked.brake, braked.brake_torque, braked.closing_delay) == ("motor", 90.0, 0.06)
+    assert (braked.opening_delay, braked.release_time) == (0.1, 0.1)
+    assert machine.replace(closing_delay="60 ms").brake_torque == math.inf  # an ideal lock
+    run = simulate(braked, "direct")
+    assert run.release_time == 0.1
+    held, free = (run.at(time)["w1" if machine.KIND == "drive" else "w"] for time in (0.0999, 0.1001))
+    assert np.ravel(held)[0] == 0.0 < np.ravel(free)[0]
+    assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
+
+
+def test_the_load_hangs_behind_the_brake() -> None:
+    """Wound up by its torque, as the shaft of the same two masses as a drive is."""
+    braked = CHAIN.replace(brake_torque=90.0)
+    assert braked.position == "hanging"
+    torques = braked.at_motor_shaft()
+    twist = torques.theta0 - 0.5 * torques.gap
+    assert twist * torques.c == pytest.approx([7.16] * 3, rel=1e-12)
+    masses = [mass.replace(kind="reactive") for mass in CHAIN.masses]
+    assert CHAIN.replace(brake_torque=90.0, masses=masses).position == "mid-gap"
+
+
+def test_torque_proving_and_a_release_at_a_time_stay_as_they_are() -> None:
+    proving = HOIST.replace(brake_torque="300 N*m", opening_delay="50 ms")
+    assert HOIST.release_time == proving.release_time == math.inf
+    timed = HOIST.replace(brake_torque="300 N*m", release="0.2 s")
+    assert timed.release_time == 0.2
+    with pytest.raises(InputError, match=r"^release = 0\.2 s: .*opening_delay = 0\.05 s .*leave one out"):
+        timed.replace(opening_delay="50 ms")
+    assert CRANE.replace(brake="none", brake_torque=90.0).release_time == 0.0  # open at the start
+
+
+# ---- one sentence for each mistake ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("steps", "sentence"),
+    [
+        ("stop", '[duty] 1, do = "stop": the machine stands; a step "start" comes before it.'),
+        ("start; stop; brake", '[duty] 3, do = "brake": the machine stands; a step "start"'),
+        ("reverse", '[duty] 1, do = "reverse": the machine stands; a step "start" comes before it.'),
+        ("hold angle=3", "[duty] 1, angle = 3.0: the machine stands; give a time, or start it before."),
+        ("start; start", '[duty] 2, do = "start": the machine starts at rest, and it runs since step 1'),
+        ("start; jog time=1", '[duty] 2, do = "jog": the machine is jogged at rest, and it runs'),
+        ("start; load torque=1", '[duty] 2, do = "load": the machine changes its load at rest, and it'),
+        ("jog", "[duty] 1, time is missing: a jog is a start of given time"),
+        ("jog time=0", "[duty] 1, time = 0: the time of the step must be above 0."),
+        ("start; hold", "[duty] 2, time is missing: a hold takes a time or an angle"),
+        ("start; hold time=1 angle=2", "[duty] 2, time = 1.0 and angle = 2.0: both end the step"),
+        ("start torque=5", '[duty] 1, torque = 5.0: a step "start" has no torque; it has set_speed and'),
+        ("start; brake by='coast'", '[duty] 2, by = "coast": a step "brake" has no by; it has no other'),
+        ("start; stop repeat=2", '[duty] 2, repeat = 2.0: a step "stop" has no repeat; it has by, '),
+        ("start repeat=2; hold time=1", "[duty] 1, repeat = 2: no step stops the machine again"),
+        ("start repeat=1.5; stop", "[duty] 1, repeat = 1.5: the number of times in a row must be a whole"),
+        ("start; stop brake_speed=1 brake_time=1", "[duty] 2, brake_speed = 1.0 and brake_time = 1.0: both"),
+        ("start; stop braking_torque=9", '[duty] 2, braking_torque = 9.0: only a stop by = "torque" has one'),
+        ("start set_speed=0", '[duty] 1, set_speed = 0: a set speed is not 0; use a step "stop"'),
+        ("start; reverse set_speed=9", "[duty] 2, set_speed = 9.0: the machine runs forward already"),
+        ("start set_speed=-9; reverse set_speed=-9", "[duty] 2, set_speed = -9.0: the machine runs back"),
+        ("start set_speed=-9; hold time=1 set_speed=9", "[duty] 2, set_speed = 9.0: the machine runs backw"),
+        ("start; reverse; hold time=1 set_speed=9", "[duty] 3, set_speed = 9.0: the machine runs backwards"),
+        ("load", '[duty] 1, a step "load" changes torque, kind, inertia or friction of the load'),
+        ("strat", '[duty] 1, do = "strat": the kind of the step is "start", "stop", '),
+        ("jog tiem=3", "[duty] 1, tiem = 3: [duty] has no key tiem; did you mean time?"),
+    ],
+)  # fmt: skip
+def test_one_sentence_for_each_step_that_cannot_be(steps: str, sentence: str) -> None:
+    found = sentences(steps)
+    assert any(one.startswith(sentence) for one in found), found
+
+
+def test_all_mistakes_at_once_also_those_of_the_machine() -> None:
+    text = CRANE.to_toml().replace("gap = 0.5 ", "gap = -1 ")
+    assert [one.split(":")[0] for one in sentences("stop; start; start", machine=text)] == [
+        "[duty] 1, do = \"stop\"",
+        "[duty] 3, do = \"start\"",
+        "[shaft] gap = -1",
+    ]  # fmt: skip
+
+
+def test_a_shift_without_steps_and_things_of_another_kind() -> None:
+    with pytest.raises(InputError, match=r"^\[\[duty\]\] is missing: a duty has steps"):
+        Drive.from_toml(CRANE.to_toml() + "[shift]\ncycles_per_hour = 3")
+    with pytest.raises(InputError, match=r'^duty = "stop": it takes a duty, which Duty\(...\) makes.$'):
+        CRANE.replace(duty="stop")
+    with pytest.raises(InputError, match=r'^steps = "start": it takes a step of a duty'):
+        Duty(["start"])
