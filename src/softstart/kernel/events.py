@@ -16,8 +16,8 @@ from softstart.arrays import Vector
 from softstart.kernel.jit import separately_compiled, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
-    MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
-    SWITCH, TURNED, UNSOLVED, UPPER, WORK_TYPE, Record,
+    MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, SLOWED,
+    STOP, SWITCH, TRAVELLED, TURNED, UNSOLVED, UPPER, WORK_TYPE, Record,
 )  # fmt: skip
 from softstart.kernel.series import gear_friction
 
@@ -431,12 +431,20 @@ def next_event(s: Record, h: float, n: int) -> int:
             if event == UNSOLVED:
                 return first
     load = s.at_load
-    if math.isnan(s.start_time) and deviation_bound(s.speed[load], n) >= s.target - s.w[load]:
-        set_line(s.f, s.speed[load], n, s.target, -1.0)
+    if math.isnan(s.start_time) and deviation_bound(s.speed[load], n) >= s.target - s.toward * s.w[load]:
+        set_line(s.f, s.speed[load], n, s.target, -s.toward)
         x = first_root(s, n, s.event_share, 0, ROUNDING * s.target, 0.0)
         first, s.event_share = event_at(x, REACHED, first, s.event_share)
         if first == REACHED:
             s.event_place = load
+    if not math.isnan(s.slow) and first != UNSOLVED:
+        set_line(s.f, s.speed[s.at_motor], n, -s.slow, s.toward)
+        x = first_root(s, n, s.event_share, 0, ROUNDING * s.target, 0.0)
+        first, s.event_share = event_at(x, SLOWED, first, s.event_share)
+    if not math.isnan(s.travel_end) and first != UNSOLVED:
+        set_line(s.f, s.angle_u, n, s.travel_end, -s.toward)
+        x = first_root(s, n, s.event_share, 0, ROUNDING * abs(s.travel_end), 0.0)
+        first, s.event_share = event_at(x, TRAVELLED, first, s.event_share)
     return first
 
 

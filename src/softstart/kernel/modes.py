@@ -12,8 +12,8 @@ from softstart.kernel.jit import separately_compiled, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EXIT, IMPACT, JOINED,
     LET_GO, LOWER, MODELICA, MOST_NOTED, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN,
-    RELEASE, RELEASED, SETTLE, SETTLED, STARTS, STOP, STOPS, SWITCH, TARGET_REACHED, TURNED, UPPER, WELDED,
-    WORK_TYPE, Record,
+    RELEASE, RELEASED, SETTLE, SETTLED, SLOWED, STARTS, STOP, STOPS, SWITCH, TARGET_REACHED, TRAVELLED,
+    TURNED, UPPER, WELDED, WORK_TYPE, Record,
 )  # fmt: skip
 from softstart.kernel.series import find_piece, set_piece
 
@@ -306,7 +306,13 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
     elif event in (BREAK_FORWARD, BREAK_BACK):
         set_friction_state(s, k, 1.0 if event == BREAK_FORWARD else -1.0)
     elif event == LET_GO:
-        release(s)
+        s.release_at = s.time + s.opening_delay
+        if s.opening_delay == 0.0:
+            release(s)
+    elif event in (SLOWED, TRAVELLED):
+        s.t_end = s.time
+        s.slow = s.travel_end = math.nan
+        s.modes_changed = 0.0
     elif event in (POINT_ABOVE, POINT_BELOW):
         s.events += 1.0
         s.passed[k] = 1 if event == POINT_ABOVE else -1
@@ -318,7 +324,9 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         if s.regulated == 0.0:
             if not math.isnan(s.band_low):  # it is judged from here on
                 s.settled = s.time
-            if s.t_end == math.inf:  # without `until` a run goes on for one elastic period
+            if s.ends_at_target != 0.0:
+                s.t_end = s.time
+            elif s.t_end == math.inf:  # without `until` a run goes on for one elastic period
                 s.t_end = s.time + s.period
     else:
         if event == REJOIN:

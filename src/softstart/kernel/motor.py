@@ -102,6 +102,8 @@ def next_in_queue(s: Record) -> None:
 @inner
 def put(s: Record, at: float, demand: float, slope: float) -> bool:
     """A demand that takes effect at this instant, now or later; False if too many wait."""
+    demand *= s.sense
+    slope *= s.sense
     if at <= s.time:
         s.pending = 0.0
         take_demand(s, demand, slope)
@@ -176,7 +178,8 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     angle = s.phi
     for k in range(s.path, s.path_end):
         angle += s.theta[k] if s.at_motor < s.at_load else -s.theta[k]
-    speed = s.w[s.at_motor]
+    angle *= s.sense
+    speed = s.sense * s.w[s.at_motor]
     count = s.encoder
     if count > 0.0:
         edge = s.encoder_phase + 0.5
@@ -188,12 +191,12 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     measured.time = s.time
     measured.motor_angle = angle
     measured.motor_speed = speed
-    measured.motor_torque = s.u
+    measured.motor_torque = s.sense * s.u
     if s.torque_noise > 0.0:
         measured.motor_torque += s.torque_noise * gauss(s.noise_seed, s.asked)
     measured.stage = s.stage if sees & SEES_STAGE else math.nan
     measured.shaft_torque = math.nan
-    measured.load_speed = s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
+    measured.load_speed = s.sense * s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
     measured.run = s.run
     measured.set_speed = s.set_speed
     measured.command_time = s.time - s.command_since
@@ -227,7 +230,7 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
     s.asked += 1.0
     if s.contacts == 1.0 and math.isnan(s.contact_torque):  # the start is in contact
         immediate = s.lag == 0.0 and s.rate == math.inf and s.dead_time == 0.0
-        s.contact_torque = demand if immediate else s.u
+        s.contact_torque = s.sense * demand if immediate else s.u
     return ASK
 
 

@@ -70,6 +70,7 @@ class MachineRecord:
     noise_seed: float
     dead_time: float
     release_at: float  # when the motor's brake is released: 0 no brake, inf by torque proving
+    opening_delay: float  # for how long the brake still holds after torque proving, s
     initial_torque: float
     target: float
     period: float  # of the first natural frequency with all gaps closed; 0 where every joint is rigid
@@ -255,6 +256,8 @@ class OfMasses:
     offset: float  # the curve is offset + incline * (speed or angle) there
     incline: float
     passed: float  # +1 or -1: a point has just been passed upwards or downwards
+    new_friction: float  # 1 where there was no friction before
+    still_since: float  # since when the speed is in the band of rest; NaN where it is not
 
 
 class OfShafts:
@@ -296,7 +299,14 @@ class StartState:
     watch: float  # GuardState
     run: float  # commands: 1 run, 0 stop; the set speed is in MachineRecord
     command_since: float  # when they last changed
-    highest_speed: float  # of the load so far, in a regulated start
+    highest_speed: float  # of the load so far, in a regulated start, in the direction `toward`
+    # of a step of a duty; in a start 1, 1, 0, NaN, NaN, 0
+    sense: float  # -1 where a controller runs backwards: it sees and demands everything with the other sign
+    toward: float  # direction in which the load passes its target speed
+    ends_at_target: float  # 1: the step ends there
+    slow: float  # it ends when the speed of the motor times `toward` has fallen to this, rad/s
+    travel_end: float  # or when the angle of the load times `toward` has come to this, rad
+    still: float  # band of rest, rad/s: the step ends once all masses have been in it for a period
     phi: float  # angle of the load
     u: float  # its realised torque
     u_ref: float  # the demand after the slew limiter
@@ -482,5 +492,5 @@ SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
 # what a span ends with
 (
     NO_EVENT, UPPER, LOWER, REJOIN, BACK, EXIT, SWITCH, SETTLE, RELEASE, BREAK_FORWARD, BREAK_BACK, STOP,
-    REACHED, UNSOLVED, TURNED, POINT_ABOVE, POINT_BELOW, LET_GO,
-) = range(18)  # fmt: skip
+    REACHED, UNSOLVED, TURNED, POINT_ABOVE, POINT_BELOW, LET_GO, SLOWED, TRAVELLED,
+) = range(20)  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import types
 
 from softstart.arrays import Matrix, Vector
@@ -91,8 +92,9 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     s.t_end = until if until == math.inf else min(until, s.longest)
     s.start_time = s.release_time = s.first_contact = s.impact_speed = math.nan
     s.contact_torque = s.stage_2_end = s.settled = s.overshoot = math.nan
-    s.run = 1.0
-    s.command_since = 0.0
+    s.run = s.sense = s.toward = 1.0
+    s.command_since = s.ends_at_target = s.still = 0.0
+    s.slow = s.travel_end = math.nan
     s.watch.fault = s.watch.begun = 0.0
     s.highest_speed = s.w0[s.at_load]
     if s.regulated != 0.0 and s.band_low <= s.highest_speed <= s.band_high:
@@ -110,9 +112,15 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
         find_piece(s, i)
     s.phi = 0.0
     s.u = s.u_ref = s.demand = s.initial_torque
-    s.stage = 1.0
     s.modes_changed = 1.0
-    if path_closed(s, -1):  # a start in contact begins with stage 2
+    begin_stage(s)
+
+
+@inner
+def begin_stage(s: Record) -> None:
+    """The first stage: a start in contact begins with stage 2."""
+    s.stage = 1.0
+    if path_closed(s, -1):
         s.stage = 2.0
         s.contacts = 1.0
         s.first_contact = 0.0
@@ -123,26 +131,112 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
 
 
-@separately_compiled(types.float64(WORK_TYPE, types.int64, types.float64, types.float64))
-def leaves_band(s: Record, n: int, begin: float, end: float) -> float:
-    """The first share of the span, in [begin, end], at which the load speed leaves its band; -1 without."""
-    speed = s.speed[s.at_load]
-    set_line(s.f, speed, n, -s.band_low, 1.0)
+@inner
+def begin_step(s: Record, begins: bool) -> None:
+    """The next step of a duty, from the state that is left; the machine may have changed.
+
+    Where a controller begins with it, time and angle of the load begin at 0.
+    """
+    for i in range(s.n):
+        if s.has_friction[i] == 0.0:
+            s.direction[i] = 1.0
+        elif s.new_friction[i] != 0.0:
+            s.direction[i] = np.sign(s.w[i])
+    for k in range(s.n - 1):
+        s.peak[k] = s.first_peak[k] = s.impulse[k] = 0.0
+        s.peak_time[k] = s.time
+    if begins:
+        for i in range(int(s.pending)):
+            s.due_time[i] -= s.time
+        for k in range(s.n - 1):
+            s.last_impact_time[k] -= s.time
+            s.peak_time[k] = 0.0
+        s.time = s.phi = s.ask_at = s.sample_angle = s.sample_time = s.command_since = s.asked = 0.0
+        s.ask_on_gap = 0.0
+    s.start_time = s.release_time = s.first_contact = s.impact_speed = s.contact_torque = math.nan
+    s.stage_2_end = s.settled = s.overshoot = s.slow = s.travel_end = math.nan
+    s.excess = s.excess_time = s.gap_events = s.contacts = s.events = s.n_spans = s.n_events = 0.0
+    s.reached = s.still = s.ends_at_target = s.beyond_limits = 0.0
+    s.noted = 0
+    s.modes_changed = 1.0
+    if begins:
+        begin_stage(s)
+        s.contacts = 0.0
+
+
+@inner
+def watch_from_here(s: Record) -> None:
+    """Whether load and masses are in their bands as a step begins."""
+    s.highest_speed = s.toward * s.w[s.at_load]
+    if s.band_low <= s.w[s.at_load] <= s.band_high:
+        s.settled = s.time
+    for i in range(s.n):
+        s.still_since[i] = s.time if abs(s.w[i]) <= s.still else math.nan
+
+
+@separately_compiled(types.float64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 4))
+def leaves_band(s: Record, i: int, n: int, low: float, high: float, begin: float, end: float) -> float:
+    """The first share of the span, in [begin, end], at which the speed of mass i leaves a band; -1 without."""
+    speed = s.speed[i]
+    set_line(s.f, speed, n, -low, 1.0)
     below = crossing(s, 0, n, begin, end)
-    if s.band_high == math.inf:
+    if high == math.inf:
         return below
-    set_line(s.f, speed, n, s.band_high, -1.0)
+    set_line(s.f, speed, n, high, -1.0)
     above = crossing(s, 0, n, begin, end)
     return above if below < 0.0 or 0.0 <= above < below else below
+
+
+@separately_compiled(types.float64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 5))
+def watch_band(
+    s: Record, i: int, n: int, low: float, high: float, since: float, end: float, h: float
+) -> float:
+    """Since when the speed of mass i is in a band, up to a share of the span, if it was `since` before.
+
+    NaN where it is not, LOST if an instant is not located. The span is not cut: what is watched keeps its
+    bits.
+    """
+    speed = s.speed[i]
+    deviation = deviation_bound(speed, n)
+    if speed[0] < low or speed[0] > high:
+        since = math.nan
+    elif math.isnan(since):
+        since = s.time  # after an impact the speed has jumped
+    if low + deviation < speed[0] < high - deviation:
+        return since
+    x = 0.0
+    while True:
+        if math.isnan(since):
+            if value(speed, n, x) < 0.5 * (low + high):
+                set_line(s.f, speed, n, low, -1.0)
+            else:
+                set_line(s.f, speed, n, -high, 1.0)
+            x = crossing(s, 0, n, x, end)
+        else:
+            x = leaves_band(s, i, n, low, high, x, end)
+        if x < 0.0:
+            return LOST if x == LOST else since
+        since = s.time + x * h if math.isnan(since) else math.nan
+
+
+@inner
+def rest_since(s: Record) -> float:
+    """Since when all masses are in the band of rest; NaN where one is not."""
+    since = 0.0
+    for i in range(s.n):
+        if math.isnan(s.still_since[i]):
+            return math.nan
+        since = max(since, s.still_since[i])
+    return since
 
 
 @inner
 def note_highest_speed(s: Record, n: int, end: float) -> bool:
     """Note the largest speed of the load up to the share `end` of the span; False if it is not located."""
     speed = s.speed[s.at_load]
-    s.highest_speed = max(s.highest_speed, value(speed, n, end))
+    s.highest_speed = max(s.highest_speed, s.toward * value(speed, n, end))
     for o in range(n):
-        s.f[o] = (o + 1.0) * speed[o + 1]  # the acceleration
+        s.f[o] = s.toward * (o + 1.0) * speed[o + 1]  # the acceleration
     x = 0.0
     while x < end:
         if value(s.f, n - 1, x) <= 0.0:  # it slows down: on to where it speeds up again
@@ -151,7 +245,7 @@ def note_highest_speed(s: Record, n: int, end: float) -> bool:
         x = crossing(s, 0, n - 1, x, end)
         if x < 0.0:
             return x != LOST
-        s.highest_speed = max(s.highest_speed, value(speed, n, x))
+        s.highest_speed = max(s.highest_speed, s.toward * value(speed, n, x))
         x += ACROSS * end
     return True
 
@@ -160,32 +254,19 @@ def note_highest_speed(s: Record, n: int, end: float) -> bool:
 def watch_speed(s: Record, n: int, end: float, h: float) -> int:
     """Note since when the load speed is in its band, and its largest value, up to a share of the span.
 
-    0 if an instant is not located, else 1. The span is not cut: a start that is watched keeps its bits.
+    Of a stop, since when each mass is in the band of rest. 0 if an instant is not located, else 1.
     """
-    speed = s.speed[s.at_load]
-    deviation = deviation_bound(speed, n)
-    located = True
-    if s.regulated != 0.0 and speed[0] + deviation > s.highest_speed:
-        located = note_highest_speed(s, n, end)
-    if speed[0] < s.band_low or speed[0] > s.band_high:
-        s.settled = math.nan
-    elif math.isnan(s.settled):
-        s.settled = s.time  # after an impact the speed has jumped
-    if s.band_low + deviation < speed[0] < s.band_high - deviation:
+    load, located = s.at_load, True
+    if s.still > 0.0:
+        for i in range(s.n):
+            s.still_since[i] = watch_band(s, i, n, -s.still, s.still, s.still_since[i], end, h)
+            located = located and s.still_since[i] != LOST
+    if math.isnan(s.band_low) or (s.regulated == 0.0 and math.isnan(s.start_time)):
         return 1 if located else 0
-    x = 0.0
-    while True:
-        if math.isnan(s.settled):
-            if value(speed, n, x) < 0.5 * (s.band_low + s.band_high):
-                set_line(s.f, speed, n, s.band_low, -1.0)
-            else:
-                set_line(s.f, speed, n, -s.band_high, 1.0)
-            x = crossing(s, 0, n, x, end)
-        else:
-            x = leaves_band(s, n, x, end)
-        if x < 0.0:
-            return 1 if located and x != LOST else 0
-        s.settled = s.time + x * h if math.isnan(s.settled) else math.nan
+    if s.regulated != 0.0 and s.toward * s.speed[load, 0] + deviation_bound(s.speed[load], n) > s.highest_speed:
+        located = note_highest_speed(s, n, end) and located
+    s.settled = watch_band(s, load, n, s.band_low, s.band_high, s.settled, end, h)
+    return 1 if located and s.settled != LOST else 0
 
 
 @inner
@@ -278,6 +359,9 @@ def rate_of(s: Record) -> float:
 @inner
 def last_instant(s: Record) -> float:
     """When the start ends, or is given up because its target speed is not reached."""
+    if s.still > 0.0:
+        since = rest_since(s)
+        return s.t_end if math.isnan(since) else min(since + s.period, s.t_end)
     if s.regulated != 0.0 and s.t_end == math.inf:
         settled = max(s.settled, s.command_end) + s.dwell
         return s.time_limit if math.isnan(s.settled) else settled
@@ -361,8 +445,8 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         if x > 0.0:
             if spans.shape[0] > 0:
                 note_span(s, spans[int(s.n_spans)])
-            begun = s.regulated != 0.0 or not math.isnan(s.start_time)
-            if begun and not math.isnan(s.band_low) and watch_speed(s, n, x, h) == 0:
+            watched = s.still > 0.0 or not math.isnan(s.band_low)
+            if watched and watch_speed(s, n, x, h) == 0:
                 return NOT_LOCATED
             advance_state(s, n, x, x * h)
             if spans.shape[0] > 0:
@@ -436,7 +520,7 @@ def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> float:
     sample(s, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
-        seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones)
+        seen.shaft_torque = s.sense * sign * torque_now(s, s.motor_shaft, tones)
     if s.guard.period > 0.0:
         s.fault = check_sample(s, seen, sees)
     return float(s.fault)
@@ -472,6 +556,24 @@ def begin(
     """A start of this machine, at t = 0."""
     set_machine(work, machine, masses, shafts, curves, tones)
     begin_start(work, until, on_gap)
+
+
+@compiled_as(types.void(_A, _A, _M, _M, _M, _M, types.boolean))
+def go_on(
+    work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix, begins: bool
+) -> None:
+    """The next step of a duty of this machine, changed or not; where a controller `begins`, at t = 0."""
+    s = as_record(work, WORK)
+    for i in range(s.n):
+        s.new_friction[i] = 1.0 - s.has_friction[i]
+    set_machine(work, machine, masses, shafts, curves, tones)
+    begin_step(s, begins)
+
+
+@compiled_as(types.void(_A))
+def watch_step(work: Vector) -> None:
+    """Begin to watch the bands that have been set for a step."""
+    watch_from_here(as_record(work, WORK))
 
 
 @compiled_as(types.int64(STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A))

@@ -88,7 +88,7 @@ def run_one(
     recorder.begin(changes[0][0] if changes else end, on_gap)
     if controller is None:
         recorder.state.ask_at = math.inf
-    segment = _segment(controller, drive, recorder)
+    segment = segment_of(controller, drive, recorder)
     reason = segment()
     ends = [*(at for at, *_ in changes[1:]), end]
     for (_, run, set_speed), following in zip(changes, ends, strict=False):
@@ -101,7 +101,7 @@ def run_one(
     return reason
 
 
-def _segment(controller: Controller | None, drive: Any, recorder: StartRecorder) -> Callable[[], int]:
+def segment_of(controller: Controller | None, drive: Any, recorder: StartRecorder) -> Callable[[], int]:
     """A function that goes on to the end that is set in the recorder, and returns why it came back."""
     if isinstance(controller, CompiledController):
         numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()  # writable, for the kernel

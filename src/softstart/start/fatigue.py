@@ -19,6 +19,7 @@ from softstart.results import OneLine, Result
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
+from softstart.start.trajectory import Trajectory
 
 AnyMachine = TypeVar("AnyMachine", bound=Machine)
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
@@ -337,7 +338,12 @@ def impacts(run: Run, shaft: int = 0) -> Vector:
     >>> impacts(simulate("hoist-15kw", "direct")).size
     0
     """
-    trajectory, rows = run.trajectory, run.trajectory.input
+    return impact_energies(run.trajectory, shaft)
+
+
+def impact_energies(trajectory: Trajectory, shaft: int) -> Vector:
+    """The same of what is recorded of a start, or of a step of a duty."""
+    rows = trajectory.input
     side, w = trajectory.of_shafts("side")[:, shaft], trajectory.of_masses("speed")
     closed = np.isin(trajectory.of_shafts("mode")[:, shaft], [rec.CONTACT, rec.DOUBLED])
     meets = (closed[1:] > closed[:-1]).nonzero()[0] + 1

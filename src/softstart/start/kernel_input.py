@@ -208,6 +208,7 @@ def _motor(named: Any, motor: Any, column: Any = np.float64) -> None:
         named[name] = column(values)
     # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
     lag = column(motor.torque_lag)
+    named["opening_delay"] = getattr(motor, "opening_delay", 0.0)
     named["lag"] = np.where(lag > 1e-12 * named["period"], lag, 0.0)
 
 

@@ -44,6 +44,14 @@ class StartRecorder:
         """The state at t = 0; without an end `until` is infinite."""
         start.begin(self.work, *self.input.first, until, on_gap)
 
+    def go_on(self, begins: bool) -> None:
+        """The next step of a duty, of the machine that is now `input`; see `kernel.start.go_on`."""
+        start.go_on(self.work, *self.input.first, begins)
+
+    def watch(self) -> None:
+        """Begin to watch the bands that are set in the state."""
+        start.watch_step(self.work)
+
     def advance(self) -> int:
         """To the next control instant, the end, or a full record; returns which."""
         return int(start.advance(self.work, self.input.tones, self.spans, self.events))

@@ -1,0 +1,353 @@
+"""A machine through a duty of starts, stops, reversals, jogs and load changes: `run_duty`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softstart import formulas
+from softstart.arrays import Matrix, Vector
+from softstart.chain.machines import MachineLike, as_machine
+from softstart.controller.base import Controller, label_of
+from softstart.drive import Machine
+from softstart.drive.duty import Duty, DutyStep, check_duty
+from softstart.errors import InputError
+from softstart.quantities import whole_number
+from softstart.results import OneLine, Result
+from softstart.start.demand import ControllerLike, as_controller
+from softstart.start.duty_cycle import DutyCycle, Phase
+from softstart.start.fatigue import STILL, impact_energies
+from softstart.start.metrics import REFERENCE
+
+KEPT_CYCLES = 2  # whose trace is kept
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StepRun(OneLine):
+    """A step of a duty as it was carried out. Torques and angles are at the motor shaft, in SI.
+
+    Attributes
+    ----------
+    number : int
+        The step in the file, from 1.
+    step : DutyStep
+        What was asked for.
+    cycle : int
+        In which cycle, from 1.
+    how : str
+        How the strategy, or the stop in its place, did it: "strategy", "strategy, anew in the other
+        direction", "torque", "coast", "brake", ...
+    begin, end : float
+        Its first and last instant, s of the duty.
+    time : float
+        How long it took, s: of a stop until all masses stand.
+    start_time : float
+        Of a start or a reversal the time from its command until the load has its set speed, s: settled where
+        the strategy holds the speed; else NaN.
+    angle : float
+        Angle by which the load turned, rad.
+    largest, smallest : array of shape (n - 1,)
+        Largest and smallest torque of each shaft, N m, signed.
+    contacts : int
+        How often the gaps between motor and load came to be closed.
+    impact_energy : array of shape (n - 1,)
+        Kinetic energy of the relative motion at all impacts of each shaft, J.
+    impulses : array of shape (n - 1,)
+        Largest impulse of each rigid gap, N m s.
+    phases : tuple of Phase
+        What is recorded of it; empty beyond the first cycles.
+    """
+
+    number: int
+    step: DutyStep
+    cycle: int
+    how: str
+    begin: float
+    end: float
+    time: float
+    start_time: float
+    angle: float
+    largest: Vector
+    smallest: Vector
+    contacts: int
+    impact_energy: Vector
+    impulses: Vector
+    phases: tuple[Phase, ...] = ()
+
+    @property
+    def peak_torques(self) -> Vector:
+        """Largest |T| of each shaft, N m."""
+        return np.maximum(self.largest, -self.smallest)
+
+    @property
+    def peak_torque(self) -> float:
+        """Largest |T| of all shafts, N m."""
+        return float(self.peak_torques.max())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DutyRun(Result, view="duties.duty_sheet"):
+    """A machine through some cycles of a duty. It is returned by `run_duty`.
+
+    Attributes
+    ----------
+    drive : Drive or Chain
+        The machine, with its first load.
+    controller : Controller
+        The strategy as it was set up.
+    duty : Duty
+        One cycle.
+    base : Drive, Chain or None
+        The machine to whose mean torque K_dyn refers, if not `drive`.
+    cycles : int
+        How many were computed: one where the duty ends in motion.
+    repeated : bool
+        Whether the machine stands at the end of a cycle, so that it can be repeated.
+    executed : tuple of StepRun
+        Each step of each cycle, in order of time.
+    turning_points : tuple of array of shape (k, 2)
+        Of each shaft time, s, and torque, N m, at the reversals of its torque, from the second cycle on; of
+        the only one if there is one.
+
+    Examples
+    --------
+    >>> from softstart import Duty, DutyStep, run_duty
+    >>> duty = Duty(steps=[DutyStep(do="start"), DutyStep(do="hold", time=1), DutyStep(do="stop")])
+    >>> run = run_duty("conveyor-11kw", "ramp", duty)
+    >>> [row.step.do for row in run.rows], run.worst.step.do
+    """
+
+    drive: Any  # a Machine
+    controller: Controller
+    duty: Duty
+    stop: str
+    base: Machine | None
+    cycles: int
+    repeated: bool
+    executed: tuple[StepRun, ...]
+    turning_points: tuple[Matrix, ...]
+
+    @property
+    def controller_name(self) -> str:
+        """Name of the controller."""
+        return label_of(self.controller)
+
+    @property
+    def base_torque(self) -> float:
+        """The mean torque to which K_dyn refers, N m: M12avg of a start under the full starting torque."""
+        return float((self.base or self.drive).mean_torque)
+
+    def k_dyn_of(self, step: StepRun) -> float:
+        """Largest |T| of a step over `base_torque`."""
+        return float(formulas.dynamic_coefficient(step.peak_torque, self.base_torque))
+
+    @cached_property
+    def rows(self) -> tuple[StepRun, ...]:
+        """Each step of the file as it was carried out with the largest |T|, of all cycles and repetitions."""
+        of_step: dict[int, StepRun] = {}
+        for one in self.executed:
+            if one.number not in of_step or one.peak_torque > of_step[one.number].peak_torque:
+                of_step[one.number] = one
+        return tuple(of_step[number] for number in sorted(of_step))
+
+    @property
+    def worst(self) -> StepRun:
+        """The step with the largest |T|."""
+        return max(self.executed, key=lambda one: one.peak_torque)
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the worst step."""
+        return self.k_dyn_of(self.worst)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """What is recorded, in order of time: of the first two cycles."""
+        return tuple(phase for one in self.executed for phase in one.phases)
+
+    @property
+    def cycle_time(self) -> float:
+        """How long the last cycle took, s."""
+        last = [one for one in self.executed if one.cycle == self.cycles]
+        return last[-1].end - last[0].begin
+
+    def at(self, times: ArrayLike) -> dict[str, Vector]:
+        """States at any instants of the first two cycles: phi, w of masses, twist, T of shafts, and u.
+
+        A last axis is of masses or shafts. Where something jumps the value is the one after the jump.
+        """
+        when = np.asarray(times, dtype=np.float64).ravel()
+        phases = self.phases
+        begins = np.array([phase.begin for phase in phases])
+        if when.size and not (when.min() >= 0.0 and when.max() <= phases[-1].end * (1.0 + 1e-12)):
+            raise ValueError(f"times must lie within the recorded cycles, 0 to {phases[-1].end:.6g} s.")
+        which = (np.searchsorted(begins, when, side="right") - 1).clip(0)
+        states: dict[str, Vector] = {}
+        for j in np.unique(which).tolist():
+            phase, own = phases[j], which == j
+            found = phase.trajectory.at(when[own] - phase.time)
+            found["phi"] = found["phi"] + phase.angle
+            for name, values in found.items():
+                whole = states.setdefault(name, np.empty((when.size, *values.shape[1:])))
+                whole[own] = values
+        return states
+
+
+def run_duty(
+    drive: MachineLike,
+    controller: ControllerLike = REFERENCE,
+    duty: Duty | str | None = None,
+    *,
+    stop: str | None = None,
+    cycles: int = 2,
+    parameters: Mapping[str, object] | None = None,
+    fitted_to: MachineLike | None = None,
+    base: MachineLike | None = None,
+) -> DutyRun:
+    """A machine through cycles of a duty, exactly: each step begins in the state that the last has left.
+
+    Start and reversal follow the strategy. One that cannot reverse is started anew in the other direction, in
+    motion. Backwards a torque strategy sees and demands everything with the other sign. Where the load has its
+    set speed such a strategy is over: its torque goes in a straight line, in one elastic period, to the one
+    that holds the load. A stop is by the strategy, if it can, or by a torque, by coasting, or by the brake; it
+    ends when all masses stand: within 1 % of the target speed for one elastic period. An unknown start
+    position is tried for the first step only; the duty goes on from the one with the largest |T|.
+
+    Parameters
+    ----------
+    drive : Drive, Chain, str or path
+        The machine.
+    controller : str, Controller, ...
+        The strategy, as in `simulate`.
+    duty : Duty or path, optional
+        One cycle; by default that of the machine's file.
+    stop : str, optional
+        "strategy", "torque", "coast" or "brake", for steps that do not say it: by default the strategy if it
+        can stop, else torque if the motor has a negative smallest torque, else coast.
+    cycles : int
+        How often the cycle is carried out, one behind the other; once if it ends in motion.
+    parameters, fitted_to, base : as in `simulate`.
+
+    Returns
+    -------
+    DutyRun
+
+    Raises
+    ------
+    InputError
+        For bad input; all its mistakes at once.
+    SimulationError
+        If a step cannot be finished, or does not end.
+
+    Examples
+    --------
+    >>> from softstart import Drive, Duty, DutyStep, run_duty
+    """
+    machine = as_machine(drive)
+    strategy = as_controller(controller, parameters)
+    cycle = machine.duty if duty is None else duty if isinstance(duty, Duty) else Duty.load(duty)
+    if cycle is None:
+        raise InputError(
+            f"duty is missing: {machine.name} has no [[duty]]; add one to its file, or give one of its own."
+        )
+    count = whole_number(cycles, "cycles", 1)
+    ready, design = strategy.set_up((as_machine(fitted_to) if fitted_to else machine).design_drive)
+    stop_by = stop or default_stop(machine, ready)
+    holds = ready.regulation(design) is not None
+    check_duty(machine, cycle, stop_by, ready.can_stop, ready.can_reverse, holds, label_of(ready))
+    steps = cycle.expanded()
+    moving = ends_moving(cycle)
+    count = 1 if moving else count
+    reference = None if base is None else as_machine(base, "base")
+    still = STILL * float((reference or machine).mean_torque)
+    executed, points = list[StepRun](), list[list[Matrix]]()
+    runner: DutyCycle | None = None
+    for k in range(count):
+        for j, (index, step) in enumerate(steps):
+            last = moving and j == len(steps) - 1
+            if runner is None:  # an unknown position is tried from each side
+                tried = [DutyCycle(one, ready, design, stop_by) for one in machine.positions.values()]
+                done = [_carry_out(one, step, index, 0, last, still) for one in tried]
+                hardest = max(range(len(done)), key=lambda i: done[i][0].peak_torque)
+                runner, (ran, turns) = tried[hardest], done[hardest]
+                ran = _worst_of(ran, [one for one, _ in done])
+            else:
+                ran, turns = _carry_out(runner, step, index, k, last, still)
+            executed.append(ran if k < KEPT_CYCLES else replace(ran, phases=()))
+            if k > 0 or count == 1:
+                points.append(turns)
+    shafts = range(len(machine.shaft_names))
+    whole = tuple(np.concatenate([turns[s] for turns in points]) for s in shafts)
+    return DutyRun(machine, ready, cycle, stop_by, reference, count, not moving, tuple(executed), whole)
+
+
+def _carry_out(
+    runner: DutyCycle, step: DutyStep, index: int, cycle: int, last: bool, still: float
+) -> tuple[StepRun, list[Matrix]]:
+    """A step, and the turning points of each shaft in it."""
+    runner.step, runner.cycle = index, cycle
+    anew = step.do == "reverse" and not runner.controller.can_reverse
+    phases = runner.carry_out(step, last)
+    shafts = range(runner.rows.count - 1)
+    turns = []
+    for s in shafts:
+        of_phases = [phase.trajectory.turning_points(s, still) + [phase.time, 0.0] for phase in phases]
+        turns.append(np.concatenate(of_phases))
+    how = "strategy, anew in the other direction" if anew else "strategy"
+    if step.do in ("stop", "jog"):
+        how = step.by or runner.stop_by
+    elif step.do in ("brake", "hold", "load"):
+        how = {"brake": "brake", "hold": "strategy" if runner.go else "holding torque", "load": ""}[step.do]
+    begin, end = phases[0].begin, phases[-1].end
+    rests = [phase.rest for phase in phases if not math.isnan(phase.rest)]
+    first = phases[0]
+    notes = first.trajectory.notes
+    name = "settled" if runner.regulation is not None else "start_time"
+    starts = step.do in ("start", "reverse")
+    energies = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
+    run = StepRun(
+        index + 1, step, cycle + 1, how, begin, end,
+        (rests[0] if rests and step.time is None else end) - begin,
+        first.time + float(notes[name]) - begin if starts else math.nan,
+        float(sum(phase.travel for phase in phases)),
+        np.array([turn[:, 1].max() for turn in turns]),
+        np.array([turn[:, 1].min() for turn in turns]),
+        int(sum(phase.trajectory.notes.contacts for phase in phases)),
+        np.sum(energies, axis=0),
+        np.max([phase.trajectory.shafts["impulse"] for phase in phases], axis=0),
+        tuple(phases),
+    )  # fmt: skip
+    return run, turns
+
+
+def _worst_of(shown: StepRun, each: Sequence[StepRun]) -> StepRun:
+    """A step from several positions: the figures of `shown`, and of each shaft the largest torques of all."""
+    return replace(
+        shown,
+        largest=np.max([one.largest for one in each], axis=0),
+        smallest=np.min([one.smallest for one in each], axis=0),
+        impact_energy=np.max([one.impact_energy for one in each], axis=0),
+        impulses=np.max([one.impulses for one in each], axis=0),
+        start_time=max(one.start_time for one in each),
+    )
+
+
+def default_stop(machine: Machine, controller: Controller) -> str:
+    """How a duty stops where nothing is said."""
+    if controller.can_stop:
+        return "strategy"
+    return "torque" if machine.motor is not None and machine.motor.minimum_torque < 0.0 else "coast"
+
+
+def ends_moving(duty: Duty) -> bool:
+    """Whether a cycle ends in motion."""
+    moving = False
+    for _, step in duty.expanded():
+        moving = step.do in ("start", "reverse") or (moving and step.do == "hold")
+    return moving
