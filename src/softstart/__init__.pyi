@@ -55,6 +55,8 @@ from softstart.reporting.result import report as report
 from softstart.start.block import control_block as control_block
 from softstart.start.comparison import Comparison as Comparison
 from softstart.start.comparison import compare as compare
+from softstart.start.duty import DutyRun as DutyRun
+from softstart.start.duty import run_duty as run_duty
 from softstart.start.fatigue import Fatigue as Fatigue
 from softstart.start.fatigue import fatigue as fatigue
 from softstart.start.run import Run as Run

@@ -18,13 +18,13 @@ STOP_KEYS: Final = ("by", "braking_torque", "brake_speed", "brake_time")
 LOAD_KEYS: Final = ("torque", "kind", "inertia", "friction")
 # the keys that each kind of step has
 KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "start": ("set_speed", "repeat"),
-    "stop": STOP_KEYS,
+    "start": ("set_speed", "time", "angle", "repeat"),
+    "stop": (*STOP_KEYS, "time"),
     "hold": ("time", "angle", "set_speed"),
-    "reverse": ("set_speed",),
+    "reverse": ("set_speed", "time", "angle"),
     "jog": ("time", "set_speed", *STOP_KEYS, "repeat"),
-    "load": (*LOAD_KEYS, "mass"),
-    "brake": (),
+    "load": (*LOAD_KEYS, "mass", "time"),
+    "brake": ("time",),
 }
 ENDS: Final = ("stop", "brake")  # steps that end a motion
 

@@ -329,9 +329,9 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if s.braked != 0.0 and s.body[s.at_motor] == i:
         if s.release_at < math.inf:  # released by time
             return event, end
-        if s.net_torque[i, 0] >= -noise:  # a torque that just holds the load is proved
+        if s.toward * s.net_torque[i, 0] >= -noise:  # a torque that just holds the load is proved
             return LET_GO, 0.0
-        set_line(s.f, s.net_torque[i], n, 0.0, -1.0)
+        set_line(s.f, s.net_torque[i], n, 0.0, -s.toward)
         return event_at(first_root(s, n, end, 0, noise, noise), LET_GO, event, end)
     if s.friction_count[i] == 0:
         return event, end

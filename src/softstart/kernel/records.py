@@ -85,7 +85,7 @@ class MachineRecord:
     band_high: float
     regulated: float  # 1 where the controller holds the speed: the start ends `dwell` after it has settled
     command_end: float  # when the last command of such a controller has ended, s
-    dwell: float  # for how long the load must stay in its band, s
+    dwell: float  # for how long the load must stay in its band, s; of a stop, all masses in that of rest
     guard: float  # GuardLimits
 
 
@@ -306,7 +306,7 @@ class StartState:
     ends_at_target: float  # 1: the step ends there
     slow: float  # it ends when the speed of the motor times `toward` has fallen to this, rad/s
     travel_end: float  # or when the angle of the load times `toward` has come to this, rad
-    still: float  # band of rest, rad/s: the step ends once all masses have been in it for a period
+    still: float  # band of rest, rad/s: the step ends once all masses have been in it for `dwell`
     phi: float  # angle of the load
     u: float  # its realised torque
     u_ref: float  # the demand after the slew limiter

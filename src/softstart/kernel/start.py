@@ -176,7 +176,7 @@ def watch_from_here(s: Record) -> None:
 
 @separately_compiled(types.float64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 4))
 def leaves_band(s: Record, i: int, n: int, low: float, high: float, begin: float, end: float) -> float:
-    """The first share of the span, in [begin, end], at which the speed of mass i leaves a band; -1 without."""
+    """The first share of the span from `begin` on at which the speed of mass i leaves a band; -1 without."""
     speed = s.speed[i]
     set_line(s.f, speed, n, -low, 1.0)
     below = crossing(s, 0, n, begin, end)
@@ -263,7 +263,8 @@ def watch_speed(s: Record, n: int, end: float, h: float) -> int:
             located = located and s.still_since[i] != LOST
     if math.isnan(s.band_low) or (s.regulated == 0.0 and math.isnan(s.start_time)):
         return 1 if located else 0
-    if s.regulated != 0.0 and s.toward * s.speed[load, 0] + deviation_bound(s.speed[load], n) > s.highest_speed:
+    highest = s.toward * s.speed[load, 0] + deviation_bound(s.speed[load], n)
+    if s.regulated != 0.0 and highest > s.highest_speed:
         located = note_highest_speed(s, n, end) and located
     s.settled = watch_band(s, load, n, s.band_low, s.band_high, s.settled, end, h)
     return 1 if located and s.settled != LOST else 0
@@ -361,7 +362,7 @@ def last_instant(s: Record) -> float:
     """When the start ends, or is given up because its target speed is not reached."""
     if s.still > 0.0:
         since = rest_since(s)
-        return s.t_end if math.isnan(since) else min(since + s.period, s.t_end)
+        return s.t_end if math.isnan(since) else min(since + s.dwell, s.t_end)
     if s.regulated != 0.0 and s.t_end == math.inf:
         settled = max(s.settled, s.command_end) + s.dwell
         return s.time_limit if math.isnan(s.settled) else settled

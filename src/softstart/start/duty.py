@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,8 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
 from softstart.drive import Machine
-from softstart.drive.duty import Duty, DutyStep, check_duty
+from softstart.drive.duty import Duty, DutyStep
 from softstart.errors import InputError
-from softstart.quantities import whole_number
 from softstart.results import OneLine, Result
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.duty_cycle import DutyCycle, Phase
@@ -80,6 +80,25 @@ class StepRun(OneLine):
     impulses: Vector
     phases: tuple[Phase, ...] = ()
 
+    def summary(self) -> dict[str, object]:
+        """The figures under the names used everywhere."""
+        return {
+            "step": self.number,
+            "do": self.step.do,
+            "cycle": self.cycle,
+            "how": self.how,
+            "peak_torque": self.peak_torque,
+            "largest_torques": self.largest.tolist(),
+            "smallest_torques": self.smallest.tolist(),
+            "impact_energies": self.impact_energy.tolist(),
+            "impulses": self.impulses.tolist(),
+            "contacts": self.contacts,
+            "begin": self.begin,
+            "time": self.time,
+            "start_time": self.start_time,
+            "angle": self.angle,
+        }
+
     @property
     def peak_torques(self) -> Vector:
         """Largest |T| of each shaft, N m."""
@@ -120,7 +139,8 @@ class DutyRun(Result, view="duties.duty_sheet"):
     >>> from softstart import Duty, DutyStep, run_duty
     >>> duty = Duty(steps=[DutyStep(do="start"), DutyStep(do="hold", time=1), DutyStep(do="stop")])
     >>> run = run_duty("conveyor-11kw", "ramp", duty)
-    >>> [row.step.do for row in run.rows], run.worst.step.do
+    >>> [(row.step.do, round(run.k_dyn_of(row), 3)) for row in run.rows]
+    [('start', 1.154), ('hold', 1.0), ('stop', 0.215)]
     """
 
     drive: Any  # a Machine
@@ -177,6 +197,22 @@ class DutyRun(Result, view="duties.duty_sheet"):
         last = [one for one in self.executed if one.cycle == self.cycles]
         return last[-1].end - last[0].begin
 
+    def summary(self) -> dict[str, object]:
+        """All figures under the names used everywhere (JSON, tables, docs)."""
+        return {
+            **self.drive.identity,
+            "controller": self.controller_name,
+            "parameters": self.controller.parameters,
+            "stop": self.stop,
+            "cycles": self.cycles,
+            "cycle_time": self.cycle_time,
+            "base": None if self.base is None else self.base.name,
+            "base_torque": self.base_torque,
+            "k_dyn": self.k_dyn,
+            "worst_step": self.worst.number,
+            "steps": [{**row.summary(), "k_dyn": self.k_dyn_of(row)} for row in self.rows],
+        }
+
     def at(self, times: ArrayLike) -> dict[str, Vector]:
         """States at any instants of the first two cycles: phi, w of masses, twist, T of shafts, and u.
 
@@ -212,12 +248,12 @@ def run_duty(
 ) -> DutyRun:
     """A machine through cycles of a duty, exactly: each step begins in the state that the last has left.
 
-    Start and reversal follow the strategy. One that cannot reverse is started anew in the other direction, in
-    motion. Backwards a torque strategy sees and demands everything with the other sign. Where the load has its
-    set speed such a strategy is over: its torque goes in a straight line, in one elastic period, to the one
-    that holds the load. A stop is by the strategy, if it can, or by a torque, by coasting, or by the brake; it
-    ends when all masses stand: within 1 % of the target speed for one elastic period. An unknown start
-    position is tried for the first step only; the duty goes on from the one with the largest |T|.
+    Start and reversal follow the strategy. One that cannot reverse is started anew in the other direction,
+    in motion. Backwards a torque strategy sees and demands everything with the other sign. Where the load has
+    its set speed such a strategy is over: its torque goes in a straight line, in one elastic period, to the
+    one that holds the load. A stop is by the strategy, if it can, or by a torque, by coasting, or by the
+    brake; it ends when all masses stand: within 1 % of the target speed for one elastic period. An unknown
+    start position is tried for the first step only; the duty goes on from the one with the largest |T|.
 
     Parameters
     ----------
@@ -247,7 +283,14 @@ def run_duty(
 
     Examples
     --------
-    >>> from softstart import Drive, Duty, DutyStep, run_duty
+    >>> from softstart import Duty, DutyStep, run_duty
+    >>> jog = Duty(steps=[DutyStep(do="jog", time="200 ms", by="coast")])
+    >>> run_duty("conveyor-11kw", "direct", jog, cycles=3).worst.cycle
+    3
+
+    References
+    ----------
+    K_dyn: [G] (16). Rainflow counting: ASTM E1049.
     """
     machine = as_machine(drive)
     strategy = as_controller(controller, parameters)
@@ -256,14 +299,13 @@ def run_duty(
         raise InputError(
             f"duty is missing: {machine.name} has no [[duty]]; add one to its file, or give one of its own."
         )
-    count = whole_number(cycles, "cycles", 1)
+    if isinstance(cycles, bool) or not isinstance(cycles, Integral) or cycles < 1:
+        raise InputError(f"cycles = {cycles}: the number of cycles is a whole number of 1 or more.")
     ready, design = strategy.set_up((as_machine(fitted_to) if fitted_to else machine).design_drive)
     stop_by = stop or default_stop(machine, ready)
-    holds = ready.regulation(design) is not None
-    check_duty(machine, cycle, stop_by, ready.can_stop, ready.can_reverse, holds, label_of(ready))
     steps = cycle.expanded()
-    moving = ends_moving(cycle)
-    count = 1 if moving else count
+    moving = cycle.ends_moving
+    count = 1 if moving else int(cycles)
     reference = None if base is None else as_machine(base, "base")
     still = STILL * float((reference or machine).mean_torque)
     executed, points = list[StepRun](), list[list[Matrix]]()
@@ -297,7 +339,9 @@ def _carry_out(
     shafts = range(runner.rows.count - 1)
     turns = []
     for s in shafts:
-        of_phases = [phase.trajectory.turning_points(s, still) + [phase.time, 0.0] for phase in phases]
+        of_phases = [
+            phase.trajectory.turning_points(s, still) + np.array([phase.time, 0.0]) for phase in phases
+        ]
         turns.append(np.concatenate(of_phases))
     how = "strategy, anew in the other direction" if anew else "strategy"
     if step.do in ("stop", "jog"):
@@ -308,13 +352,13 @@ def _carry_out(
     rests = [phase.rest for phase in phases if not math.isnan(phase.rest)]
     first = phases[0]
     notes = first.trajectory.notes
-    name = "settled" if runner.regulation is not None else "start_time"
     starts = step.do in ("start", "reverse")
+    reached = notes.start_time if runner.regulation is None else notes.settled
     energies = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
     run = StepRun(
         index + 1, step, cycle + 1, how, begin, end,
         (rests[0] if rests and step.time is None else end) - begin,
-        first.time + float(notes[name]) - begin if starts else math.nan,
+        first.time + float(reached) - begin if starts else math.nan,
         float(sum(phase.travel for phase in phases)),
         np.array([turn[:, 1].max() for turn in turns]),
         np.array([turn[:, 1].min() for turn in turns]),
@@ -343,11 +387,3 @@ def default_stop(machine: Machine, controller: Controller) -> str:
     if controller.can_stop:
         return "strategy"
     return "torque" if machine.motor is not None and machine.motor.minimum_torque < 0.0 else "coast"
-
-
-def ends_moving(duty: Duty) -> bool:
-    """Whether a cycle ends in motion."""
-    moving = False
-    for _, step in duty.expanded():
-        moving = step.do in ("start", "reverse") or (moving and step.do == "hold")
-    return moving

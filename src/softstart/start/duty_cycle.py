@@ -1,9 +1,9 @@
-"""The steps of a duty, one after the other on one machine: each begins in the state that the last has left."""
+"""The steps of a duty, one after the other: each begins in the state that the last has left."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -78,6 +78,8 @@ class DutyCycle:
         self.sense = 1.0  # frame of the controller
         self.speed = 0.0  # commanded speed, rad/s; 0 at standstill
         self.time = self.angle = 0.0  # of the duty at the zero of the recorder
+        self.began = 0.0  # when the phase began, of the recorder
+        self.since = np.full(self.rows.count, math.nan)  # since when each mass stands, in a stop
         self.starts = self.step = self.cycle = 0
 
     @property
@@ -121,7 +123,7 @@ class DutyCycle:
         return replace(self.rows, machines=machines, masses=masses)
 
     def _encoder_phase(self, count: float, begins: bool) -> float:
-        """The phase with which the edges stay where they are when the frame turns or the angle begins at 0."""
+        """The phase with which the edges stay in place when the frame turns or the angle begins at 0."""
         state = self.recorder.state
         flip = self.sense * state.sense
         if count == 0.0 or (flip > 0.0 and not begins):
@@ -132,7 +134,7 @@ class DutyCycle:
 
     def phase(
         self, what: str, go: Go | list[Line], until: float, *, begins: bool = False, release_at: float = 0.0,
-        **fields: float,
+        fields: Mapping[str, float] = {},
     ) -> Phase:  # fmt: skip
         """Go on to an instant of the recorder, or to an event of the step; SimulationError if that fails.
 
@@ -152,6 +154,7 @@ class DutyCycle:
                 self.time, self.angle = self.time + self.now, self.angle + float(recorder.state.phi)
             recorder.go_on(begins)
         state = recorder.state
+        self.began = float(state.time)
         state.sense, state.t_end = self.sense, until
         if self.speed != 0.0:
             state.toward = self.forward
@@ -171,10 +174,16 @@ class DutyCycle:
         status = status_of(reason, True, True)
         if not status.finished:
             raise SimulationError(f"{status.value} {self.where}, {what}.")
-        rest = math.nan
-        if state.still > 0.0 and state.time < until:
-            rest = self.time + float(state.still_since[: self.rows.count].max())
+        rest = self._rested(self.now < until) if state.still > 0.0 else math.nan
         return Phase(what, self.step, self.cycle, self.time, self.angle, recorder.finished(), rest)
+
+    def _rested(self, ended: bool) -> float:
+        """Since when all masses stand, s of the duty; NaN where one does not, or has not for long enough."""
+        state, count = self.recorder.state, self.rows.count
+        since = self.time + state.still_since[:count]
+        before = since > self.time + self.began  # a mass that stood as the phase began has stood for longer
+        self.since = np.where(before | np.isnan(self.since) | np.isnan(since), since, self.since)
+        return float(self.since.max()) if ended else math.nan
 
     def _along(self, lines: list[Line]) -> Go:
         """The motor torque along lines, the last one to the end."""
@@ -199,7 +208,7 @@ class DutyCycle:
         return f"{self.machine.name}, {label_of(self.controller)}, cycle {self.cycle + 1} of the duty"
 
     def _give_up(self, step: DutyStep, why: str) -> NoReturn:
-        raise SimulationError(f'[[duty]], do = "{step.do}": {why} ({self.where}).')
+        raise SimulationError(f'[duty] {self.step + 1}, do = "{step.do}": {why} ({self.where}).')
 
     # ---- motion ------------------------------------------------------------------------------------------
 
@@ -231,20 +240,20 @@ class DutyCycle:
         if step.angle is not None:
             until = min(until, began + self._journey(step.angle))
         command = {"run": 1.0, "set_speed": self.sense * self.speed, "command_since": began}
-        fields = {"begins": begins, "release_at": release, **command, **travel}
+        fields = {**command, **travel}
+        held = not (last and math.isinf(until))
         if self.regulation is not None:
             fields |= self._settling(self.regulation, began, abs(self.speed - before) / self.target)
-            phase = self.phase(step.do, self.go, until, **fields)
-            yield phase
-            if math.isinf(until) and math.isnan(phase.trajectory.notes.settled):
-                self._give_up(step, f"the load does not settle at its set speed within {self.now - began:.4g} s")
         else:
-            held = not (last and math.isinf(until))
-            limit = began + self.patience
-            phase = self.phase(
-                step.do, self.go, until, ends_at_target=1.0 if held else 0.0, time_limit=limit, **fields
-            )
-            yield phase
+            fields |= {"ends_at_target": 1.0 if held else 0.0, "time_limit": began + self.patience}
+        phase = self.phase(step.do, self.go, until, begins=begins, release_at=release, fields=fields)
+        yield phase
+        if self.regulation is not None:
+            if math.isinf(until) and math.isnan(phase.trajectory.notes.settled):
+                self._give_up(
+                    step, f"the load does not settle at its set speed within {self.now - began:.4g} s"
+                )
+        else:
             reached = not math.isnan(phase.trajectory.notes.start_time)
             if math.isinf(until) and not reached:
                 self._give_up(step, f"the load does not reach its set speed within {self.patience:.4g} s")
@@ -284,7 +293,7 @@ class DutyCycle:
         lines = [(hold, math.inf, 0.0)]
         if torque != hold and period > 0.0:
             lines.insert(0, (torque, period, (hold - torque) / period))
-        return self.phase("hold", lines, until, **travel)
+        return self.phase("hold", lines, until, fields=travel)
 
     def _hold(self, step: DutyStep) -> Iterator[Phase]:
         if self.speed == 0.0:  # a pause, without torque, or held by the strategy
@@ -301,15 +310,16 @@ class DutyCycle:
         else:
             command = {} if self.speed == before else {"command_since": began}
             fields = {"set_speed": self.sense * self.speed, **command, **travel}
-            yield self.phase("hold", self.go, until, **fields, **self._settling(self.regulation, began, 1.0))
+            fields |= self._settling(self.regulation, began, 1.0)
+            yield self.phase("hold", self.go, until, fields=fields)
         self._check_travel(step)
 
     def _load(self, step: DutyStep) -> Iterator[Phase]:
         speeds = self.recorder.state.w[: self.rows.count] if self.begun else np.zeros(1)
         if np.abs(speeds).max() > STANDING * self.target:
             raise InputError(
-                f'[[duty]], do = "load": the machine still moves when its load changes ({self.where}); let '
-                "the stop before it end by itself, without a time."
+                f'[duty] {self.step + 1}, do = "load": the machine still moves when its load changes '
+                f"({self.where}); let the stop before it end by itself, without a time."
             )
         self.machine = with_load(self.machine, step)
         self.rows = kernel_input(next(iter(self.machine.positions.values())))
@@ -324,7 +334,8 @@ class DutyCycle:
             self.go = None
         elif self.go is None:  # it has handed over
             self._give_up(step, f"{label_of(self.controller)} is not in command")
-        stopping = {"run": 0.0, "command_since": command} if by == "strategy" else {}
+        self.since = np.full(self.rows.count, math.nan)
+        stopping = self._watched() | ({"run": 0.0, "command_since": command} if by == "strategy" else {})
         torque = -float(step.braking_torque or -self.machine.motor.minimum_torque) if by == "torque" else 0.0
         go: Go | list[Line] = self.go or [(torque, math.inf, 0.0)]
         slow = 0.0 if step.brake_speed is None else step.brake_speed
@@ -333,20 +344,26 @@ class DutyCycle:
         motor_speed = self.forward * float(self.recorder.state.w[int(self.rows.machine.motor)])
         if timed or (slows and motor_speed > slow):
             until = command + (self.patience if step.brake_time is None else step.brake_time)
-            yield self.phase("stop", go, until, **stopping, **({} if timed else {"slow": slow}))
-            if slows and not math.isnan(self.recorder.state.slow):
+            yield self.phase("stop", go, until, fields=stopping | ({} if timed else {"slow": slow}))
+            if slows and not math.isnan(self.recorder.state.slow) and self.now >= until:
                 self._give_up(step, f"the motor does not come to a standstill within {self.patience:.4g} s")
         stopped = timed or slows or by == "brake"
         if stopped and self.braked:
             yield from self._close(step)
-        yield from self._rest(step, command, time, **({} if stopped else stopping))
+        yield from self._rest(step, command, time, {} if stopped else stopping)
         if self.braked and not self.closed:
             yield from self._close(step)
+
+    def _watched(self, dwell: float | None = None) -> dict[str, float]:
+        """That a phase ends once all masses have stood for an elastic period, or are watched only."""
+        period = float(self.rows.machine.period)
+        return {"still": STANDING * self.target, "dwell": period if dwell is None else dwell}
 
     def _close(self, step: DutyStep) -> Iterator[Phase]:
         """The brake is commanded, and closes after its delay; the strategy is in command until then."""
         if self.machine.closing_delay > 0.0:
-            yield self.phase("brake closes", self.go or ZERO, self.now + self.machine.closing_delay)
+            until, fields = self.now + self.machine.closing_delay, self._watched(math.inf)
+            yield self.phase("brake closes", self.go or ZERO, until, fields=fields)
         state = self.recorder.state
         speed = abs(float(state.w[int(self.rows.machine.motor)]))
         if math.isinf(self.machine.brake_torque) and speed > STANDING * self.target:
@@ -354,11 +371,11 @@ class DutyCycle:
         self.closed, self.go = True, None
 
     def _rest(
-        self, step: DutyStep, command: float, time: float | None, **fields: float
+        self, step: DutyStep, command: float, time: float | None, fields: Mapping[str, float] = {}
     ) -> Iterator[Phase]:
         """On until all masses stand, or until the time of the step is over."""
         until = command + (self.patience if time is None else time)
-        phase = self.phase("rest", self.go or ZERO, until, still=STANDING * self.target, **fields)
+        phase = self.phase("rest", self.go or ZERO, until, fields={**fields, **self._watched()})
         yield phase
         if time is None and math.isnan(phase.rest):
             self._give_up(
@@ -387,15 +404,18 @@ def with_load(machine: Machine, step: DutyStep) -> Machine:
 def holding_torque(machine_input: KernelInput, speed: float) -> float:
     """The motor torque, N m, that holds a machine at a speed, rad/s at the motor shaft; with its losses."""
     machine = machine_input.machine
-    masses, shafts = machine_input.masses[0].view(rec.MASS)[:, 0], machine_input.shafts[0].view(rec.SHAFT)[:, 0]
+    masses, shafts = (
+        machine_input.masses[0].view(rec.MASS)[:, 0],
+        machine_input.shafts[0].view(rec.SHAFT)[:, 0],
+    )
     load = masses["active"] - masses["mean"] + masses["ground"] * speed
     load = load + math.copysign(1.0, speed) * (masses["Mc"] + masses["friction"])
     for curve in machine_input.curves[0].view(rec.CURVE)[:, 0]:
         points = int(curve["points"])
         torques = curve["torque"][:points]
         by_angle = float(torques.mean())
-        load[int(curve["mass"])] += by_angle if curve["by_angle"] else np.interp(
-            speed, curve["at"][:points], torques
+        load[int(curve["mass"])] += (
+            by_angle if curve["by_angle"] else np.interp(speed, curve["at"][:points], torques)
         )
     motor, total = int(machine.motor), 0.0
     for outer, way in ((0, 1), (len(load) - 1, -1)):

@@ -208,7 +208,6 @@ def _motor(named: Any, motor: Any, column: Any = np.float64) -> None:
         named[name] = column(values)
     # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
     lag = column(motor.torque_lag)
-    named["opening_delay"] = getattr(motor, "opening_delay", 0.0)
     named["lag"] = np.where(lag > 1e-12 * named["period"], lag, 0.0)
 
 
@@ -229,6 +228,7 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     named["period"] = column(drive.elastic_period)
     _motor(named, drive, column)
     named["target"], named["release_at"] = target, column(drive.release_time)
+    named["opening_delay"] = column(drive.opening_delay)
     named["load"] = 1.0
     for i, (J, ground, w0) in enumerate(((J1, b1, w1), (J2, b2, w2))):
         masses["J"][:, i], masses["ground"][:, i], masses["w0"][:, i] = J, ground, w0
