@@ -13,7 +13,7 @@ from softstart.chain import Chain
 from softstart.clutch.model import Clutch
 from softstart.controller import controller_class, controller_names, declared_parameters
 from softstart.controller.base import Sensor
-from softstart.drive import PARAMETERS
+from softstart.drive import PARAMETERS, Duty
 from softstart.input.documents import DocumentTable
 from softstart.input.parameters import REQUIRED
 from softstart.plugins import STUDIES, registered
@@ -42,7 +42,7 @@ def drive_file() -> str:
                 f"| {prose(p.meaning)} | `{p.example}` | {OUTPUT[p.at_output]} |"
             )
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n" + _tables(Duty.TABLES)
 
 
 def chain_file() -> str:
@@ -65,7 +65,8 @@ def _tables(tables: Iterable[DocumentTable]) -> str:
     for table in tables:
         lines += [_heading(table.name, table.many), ""]
         if table.many:
-            lines += [f"At least {table.least} of these tables.", ""]
+            least = f"At least {table.least} of these tables." if table.least else "Optional tables."
+            lines += [least, ""]
         elif table.name and not table.required:
             lines += ["Optional table.", ""]
         lines += ["| key | unit | default | range | meaning | example |", "|---|---|---|---|---|---|"]

@@ -144,7 +144,7 @@ class Chain(ParameterFile, Machine):
         super()._fill(_completed(given), *rest)
         if self.brake_torque is None:  # an ideal lock, or none
             vars(self)["brake_torque"] = math.inf if self.brake == "motor" else 0.0
-        if self.brake == "motor" and "position" not in vars(self)["_given"] and self._hangs:
+        if self.brake == "motor" and "position" not in vars(self)["_given"] and self.overhauling_torque:
             vars(self)["position"] = "hanging"
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
@@ -197,6 +197,10 @@ class Chain(ParameterFile, Machine):
             return 0 if self.motor is None else names.index(self.motor.mass)
         raise InputError(f"{show(place)}: {no_such_mass(place, names)}")
 
+    @classmethod
+    def _gear_in(cls, given: Mapping[str, object]) -> str:
+        return NO_OUTPUT
+
     def gear_with(self, **given: object) -> str:
         """Why nothing is "at output", as `Drive.gear_with`."""
         return NO_OUTPUT
@@ -232,10 +236,30 @@ class Chain(ParameterFile, Machine):
         return self.opening_delay if self.brake == "motor" else 0.0
 
     @property
-    def _hangs(self) -> bool:
-        """Whether an active load that friction does not hold acts on the chain."""
+    def overhauling_torque(self) -> float:
+        """With what torque the loads turn a motor without torque, N m; 0 where friction holds them.
+
+        Gears on the way to the motor take their share.
+
+        >>> round(Chain.load("crane-4-mass").overhauling_torque, 6)
+        7.16
+        """
         at = arrays_at(self, self.motor_index)  # not `at_motor_shaft`, which keeps the position
-        return bool(abs(at.active.sum()) > at.friction.sum())
+        through = at.efficiency_from_motor
+        pull = float((at.active * through).sum()) + self.curve_torque
+        return math.copysign(max(abs(pull) - float((at.friction * through).sum()), 0.0), pull)
+
+    def with_load(self, values: Mapping[str, Any], mass: str = "") -> Self:
+        """The chain with other load torque, kind, inertia and friction of a mass, by default the load mass.
+
+        >>> Chain.load("crane-4-mass").with_load({"torque": 0.0}).overhauling_torque
+        0.0
+        """
+        if mass and mass not in self.mass_names:
+            raise InputError(f"mass = {show(mass)}: {no_such_mass(mass, list(self.mass_names))}")
+        masses, index = list(self.masses), self.index(mass) if mass else self.load_index
+        masses[index] = masses[index].replace(**values)
+        return self.replace(masses=masses)
 
     @property
     def mass_names(self) -> tuple[str, ...]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Final, Literal, get_args
+from typing import ClassVar, Final, Literal, cast, get_args
 
-from softstart.drive.machine import LoadKind
+from softstart.drive.machine import LoadKind, Machine
+from softstart.errors import InputError, Mistakes
+from softstart.hints import nearest
 from softstart.input.files import Library
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, Rows, component, parameter
@@ -27,6 +30,8 @@ KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "brake": ("time",),
 }
 ENDS: Final = ("stop", "brake")  # steps that end a motion
+
+MOST_SPEED: Final = 2.0  # times rated or target speed; beyond, a motor in field weakening lacks torque
 
 library = Library("softstart.drive", "a duty", "duties", folder="duties")
 
@@ -77,10 +82,10 @@ class DutyStep(ParameterSet):
     # fmt: off
     do: Do = parameter("duty.do", "", "kind of the step", '"start"', choices=get_args(Do), kw_only=False)
     set_speed: MaybeNumber = parameter("duty.set_speed", "rad/s",
-        "speed that the load is to reach, negative backwards", '"-880 rpm"', default=None)
+        "speed that the load is to reach, negative backwards", '"-880 rpm"', default=None, at_output="value")
     time: MaybeNumber = parameter("duty.time", "s", "time of the step", '"2 s"', "above 0", default=None)
     angle: MaybeNumber = parameter("duty.angle", "rad", "travel of the load in the step", '"5 turn"',
-        "above 0", default=None)
+        "above 0", default=None, at_output="value")
     repeat: Number = parameter("duty.repeat", "1", "number of times in a row", "3",
         "a whole number, 1 or more", default=1.0)
     by: StopBy | None = parameter("duty.by", "", "way of the stop", '"coast"', default=None,
@@ -91,13 +96,15 @@ class DutyStep(ParameterSet):
         "speed of the motor at which the brake is closed", '"50 rpm"', "0 or more", default=None)
     brake_time: MaybeNumber = parameter("duty.brake_time", "s",
         "time after which the brake is closed", '"0.5 s"', "0 or more", default=None)
-    torque: MaybeNumber = parameter("duty.torque", "N*m", "torque of the load", '"7.16 N*m"', default=None)
+    torque: MaybeNumber = parameter("duty.torque", "N*m", "torque of the load", '"7.16 N*m"', default=None,
+        at_output="value")
     kind: LoadKind | None = parameter("duty.kind", "", "kind of the load torque", '"active"', default=None,
         choices=get_args(LoadKind))
     inertia: MaybeNumber = parameter("duty.inertia", "kg*m^2", "inertia of the load", '"0.175 kg*m^2"',
-        "above 0", default=None)
+        "above 0", default=None, at_output="value")
     friction: MaybeNumber = parameter("duty.friction", "N*m",
-        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=None)
+        "Coulomb friction of the load besides its torque", '"0.7 N*m"', "0 or more", default=None,
+        at_output="value")
     mass: str | None = parameter("duty.mass", "", "name of the mass of a chain whose load changes",
         '"hook"', default=None)
     # fmt: on
@@ -283,3 +290,168 @@ def _misplaced(step: DutyStep, started: int, direction: float) -> Iterator[str]:
                 f"set_speed = {step.set_speed!r}: the machine runs {running}; a step of the other direction "
                 'is "reverse".'
             )
+
+
+# ---- with a machine and a strategy ------------------------------------------------------------------------
+
+
+def way_of_stop(step: DutyStep, machine: Machine, stop: str | None, can_stop: bool) -> StopBy:
+    """How a step "stop" or "jog" stops: as it says, by the strategy, as configured, or as the motor can.
+
+    >>> from softstart import Drive
+    >>> way_of_stop(DutyStep("stop"), Drive.load("crane-4amtkf"), None, can_stop=False)
+    'coast'
+    """
+    if step.by is not None:
+        return step.by
+    if can_stop:
+        return "strategy"
+    if stop is not None:
+        return cast("StopBy", stop)
+    return "torque" if machine.motor.minimum_torque < 0.0 else "coast"
+
+
+def check_duty(
+    machine: Machine,
+    duty: Duty,
+    stop: str | None,
+    can_stop: bool,
+    can_reverse: bool,
+    holds_speed: bool,
+    name: str,
+) -> None:
+    """Raise InputError with a sentence for each step that this machine or this strategy cannot do.
+
+    `stop` is the stop of strategies that cannot stop, `name` that of the strategy, as it is shown. A strategy
+    that cannot reverse is started anew in the other direction, so `can_reverse` refuses nothing.
+    """
+    if stop is not None and stop not in get_args(StopBy):
+        *first, last = map(show, get_args(StopBy))
+        meant = nearest(stop, get_args(StopBy))
+        remedy = f"; did you mean {show(meant)}?" if meant else "."
+        raise InputError(f"stop = {show(stop)}: the stop is {', '.join(first)} or {last}{remedy}")
+    if machine.motor is None:
+        raise InputError("[motor] is missing: a duty needs one; add it to the chain.")
+    wrong, loaded = Mistakes(), machine
+    wrong.sentences += _weak_brake(machine)
+    # the second cycle begins with the load that the first one leaves
+    for _ in range(1 if duty.ends_moving else 2):
+        speed = math.nan  # the set speed of the present motion, with its sign
+        for number, step in enumerate(duty.steps, start=1):
+            before, sentences = f"[duty] {number}, ", [*_speed_mistakes(step, machine, holds_speed, name)]
+            if step.do in ("start", "jog"):
+                speed = step.set_speed or machine.target_speed or math.nan
+            elif step.do == "reverse":
+                speed = step.set_speed or -math.copysign(machine.target_speed or math.nan, speed)
+            elif step.do == "hold" and step.set_speed is not None:
+                speed = step.set_speed
+            if step.do == "load":
+                with wrong.collect(before):
+                    values = {key: value for key, value in step.given().items() if key in LOAD_KEYS}
+                    loaded = loaded.with_load(values, step.mass or "")
+                    sentences += _weak_brake(loaded, 'do = "load": ')
+            elif step.do in ("stop", "jog", "brake"):
+                by = "brake" if step.do == "brake" else way_of_stop(step, machine, stop, can_stop)
+                subject = f'by = "{by}"' if step.by else f'do = "{step.do}"' + f" by {by}" * (step.do != by)
+                if by == "strategy" and not can_stop:
+                    sentences.append(
+                        f"{subject}: {name} cannot stop a machine; stop by torque, coast or brake, or use a "
+                        "strategy that can stop, as speed-ramp."
+                    )
+                sentences += [f"{subject}: {one}" for one in _endless(step, by, loaded, speed)]
+                sentences += _stop_mistakes(step, by, subject, machine)
+            wrong.sentences += [before + one for one in sentences]
+    wrong.sentences = list(dict.fromkeys(wrong.sentences))
+    wrong.raise_if_any()
+
+
+def _weak_brake(machine: Machine, subject: str = "") -> Iterator[str]:
+    """That the brake cannot hold the load, which `subject` has changed."""
+    pull, torque = abs(machine.overhauling_torque), machine.brake_torque
+    if 0.0 < torque < pull:
+        brake = f"the brake of {torque:g} N*m" if subject else "it"
+        yield (
+            f"{subject or f'[brake] torque = {torque!r}: '}{brake} is weaker than the load, {pull:.6g} N*m "
+            "at the motor shaft besides what friction holds; take a stronger brake or a lighter load."
+        )
+
+
+def _stop_mistakes(step: DutyStep, by: str, subject: str, machine: Machine) -> Iterator[str]:
+    """What the motor or the brake lacks for a step that stops in this way."""
+    brake, torque = machine.brake_torque, -float(machine.motor.minimum_torque)
+    closing = subject if by == "brake" else ""
+    for key in ("brake_speed", "brake_time"):
+        value = getattr(step, key)
+        if not closing and value is not None and (value or key == "brake_time"):
+            closing = f"{key} = {value!r}"
+    if closing and brake == 0.0:
+        yield f"{closing}: the machine has no brake; add [brake] torque, or stop in another way."
+    elif closing and math.isinf(brake):
+        yield (
+            f"{closing}: without [brake] torque the brake is an ideal lock, which closes at standstill only; "
+            "give the torque with which it slips."
+        )
+    open_at = machine.release_time
+    if step.do == "jog" and math.isfinite(open_at) and (step.time or math.inf) <= open_at:
+        yield (
+            f"time = {step.time!r}: the jog ends before the brake is open, at {open_at:g} s; make the jog "
+            "longer, or opening_delay shorter."
+        )
+    if by == "torque" and torque <= 0.0:
+        yield (
+            f"{subject}: the motor has no braking torque; give a [motor] minimum_torque below 0, as "
+            '"-20 N*m", or stop by coast or brake.'
+        )
+    elif by == "torque" and (step.braking_torque or 0.0) > torque:
+        yield (
+            f"braking_torque = {step.braking_torque!r}: the motor has less, [motor] minimum_torque = "
+            f"{-torque!r}; lower the one or the other."
+        )
+
+
+def _endless(step: DutyStep, by: str, machine: Machine, speed: float) -> Iterator[str]:
+    """Why a stop by torque or by coasting never ends, out of a motion with this set speed."""
+    pull = machine.overhauling_torque
+    torque = 0.0 if by == "coast" else step.braking_torque or -float(machine.motor.minimum_torque)
+    load = f"{abs(pull):.6g} N*m at the motor shaft besides what friction holds"
+    in_motion = step.brake_time is not None or (step.brake_speed or 0.0) >= abs(speed)
+    if by not in ("torque", "coast") or (by == "torque" and torque <= 0.0):
+        return
+    if pull and machine.brake_torque == 0.0:
+        yield (
+            f"nothing holds the load, {load}: it runs away and the duty never ends; add [brake] torque, or "
+            'kind = "reactive" for a load that is friction.'
+        )
+    elif pull * speed < 0.0 and not in_motion and torque <= abs(pull):
+        yield (
+            f"the load, {load}, drives the machine on, so that the stop never ends; stop by brake, or give a "
+            "brake_time."
+        )
+    elif by == "coast" and not pull and not in_motion and _coasts_on(machine):
+        yield "nothing brakes the machine, so that the stop never ends; stop by torque or brake."
+
+
+def _coasts_on(machine: Machine) -> bool:
+    """Whether a drive has neither friction nor damping to the ground; of a chain load curves may brake."""
+    friction = machine.lever_rule_model.friction
+    return machine.KIND == "drive" and friction == 0.0 and not any(machine.frictions)
+
+
+def _speed_mistakes(step: DutyStep, machine: Machine, holds_speed: bool, name: str) -> Iterator[str]:
+    """Why the machine or the strategy cannot go to the set speed of a step."""
+    if step.set_speed is None:
+        if step.do in ("start", "jog") and machine.target_speed is None:
+            yield "set_speed is missing: the machine has no target speed; give one of the two."
+        return
+    speeds = (machine.target_speed, machine.motor.rated_speed)
+    known = [speed for speed in speeds if speed is not None]
+    if known and abs(step.set_speed) > MOST_SPEED * max(known):
+        yield (
+            f"set_speed = {step.set_speed!r}: it is above {MOST_SPEED:g} times the rated or target speed, "
+            f"{max(known):.4g} rad/s; in field weakening the motor lacks the torque assumed here."
+        )
+    if step.do == "hold" and not holds_speed:
+        yield (
+            f"set_speed = {step.set_speed!r}: {name} does not hold a speed; leave it out, or use a strategy "
+            "that does, as speed-ramp."
+        )

@@ -264,6 +264,23 @@ class Machine(ABC):
         A chain whose gaps are all closed widens them in the proportions of `origin`.
         """
 
+    # ---- the load ----------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def overhauling_torque(self) -> float:
+        """With what torque the load turns a motor without torque, N m; 0 where friction holds it.
+
+        Positive backwards, as an active load torque.
+        """
+
+    @abstractmethod
+    def with_load(self, values: Mapping[str, Any], mass: str = "") -> Self:
+        """The machine with another load: torque, kind, inertia and friction by their keys, as they are given.
+
+        Of a chain those of a mass, by default the load mass; a drive has one load.
+        """
+
     # ---- parameters --------------------------------------------------------------------------------------
 
     @abstractmethod

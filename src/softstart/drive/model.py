@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, ClassVar, Final, Literal, Self, get_args
@@ -27,7 +28,7 @@ from softstart.input.parameter_set import (
     parameter,
     read_settings,
 )  # fmt: skip
-from softstart.input.parameters import Parameter, ParameterValue, Wording, read_value
+from softstart.input.parameters import Mistake, Parameter, ParameterValue, Wording, read_value
 from softstart.quantities import RefusedError, show
 
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
@@ -37,6 +38,7 @@ Brake = Literal["none", "motor"]
 UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
 SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
 LOAD: Final = ("load_torque", "load_friction")  # the parts of the load torque
+OF_DUTY: Final = re.compile(r"\s*(duty\[|shift\.)")
 BRAKE: Final = ("brake_torque", "closing_delay", "opening_delay")
 
 # documents of another kind from which a drive follows: a test for them, and the drive; see `DataSheet`
@@ -326,7 +328,23 @@ class Drive(ParameterFile, Machine):
         >>> Drive.load("crane-4amtkf").with_settings(["load.inertia=0.07", "gap=2 rad"]).J2
         0.07
         """
-        return self._changed(*read_settings(settings, PARAMETERS))
+        texts = [settings] if isinstance(settings, str) else list(settings)
+        of_duty = [text for text in texts if isinstance(text, str) and OF_DUTY.match(text)]
+        given, wording, mistakes = read_settings([one for one in texts if one not in of_duty], PARAMETERS)
+        try:
+            if of_duty:
+                given["duty"] = self._duty_with(of_duty)
+        except InputError as error:
+            mistakes += [Mistake(sentence) for sentence in error.sentences]
+        return self._changed(given, wording, mistakes)
+
+    def _duty_with(self, settings: list[str]) -> Duty:
+        """The duty with changes of its steps as typed, as "duty[2].time=3 s"."""
+        if self.duty is None:
+            raise InputError(f"{one}: the drive has no duty; add [[duty]] to its file." for one in settings)
+        pairs = (one.partition("=") for one in settings)
+        changes = {key.strip(): value.strip(" \"'") for key, _, value in pairs}
+        return Duty.from_toml(self.duty.to_toml(), also=changes)
 
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
@@ -397,6 +415,28 @@ class Drive(ParameterFile, Machine):
         active: Any = self.active_torque
         falling = np.copysign(np.maximum(np.abs(active) - self.reactive_torque, 0.0), active)
         return falling if falling.ndim else float(falling)
+
+    @property
+    def overhauling_torque(self) -> float:
+        """With what torque the load turns a motor without torque, N m; 0 where friction holds it.
+
+        >>> Drive.load("crane-4amtkf").replace(load_friction=2.16, motor_friction=1.0).overhauling_torque
+        4.0
+        """
+        return math.copysign(max(abs(self.falling_torque) - self.motor_friction, 0.0), self.falling_torque)
+
+    def with_load(self, values: Mapping[str, Any], mass: str = "") -> Self:
+        """The drive with another load: its torque, kind, inertia and friction by their keys.
+
+        >>> Drive.load("crane-4amtkf").with_load({"torque": 5.0, "kind": "reactive"}).reactive_torque
+        5.0
+        """
+        if mass:
+            raise InputError(f"mass = {show(mass)}: a drive has one load; leave it out.")
+        changes = {f"load_{key}": value for key, value in values.items()}
+        if self.position_given and isinstance(self.start_position, str):  # a reactive load does not hang
+            changes["start_position"] = "mid-gap"
+        return self.replace(**changes)
 
     @property
     def rests(self) -> Any:

@@ -59,7 +59,7 @@ class ParameterFile(ParameterSet):
         }
         mistakes += without_unit(given, cls.PARAMETERS, cls.USUAL, wording)
         for name, part in cls.PARTS.items():
-            parts, more = part.read(content, wording)
+            parts, more = part.read(content, wording, cls._gear_in(given))
             mistakes += more
             if not more and len(parts) >= max(part.least, not part.many):
                 given[name] = parts if part.many else parts[0]

@@ -112,27 +112,31 @@ class Component:
                     f"it takes {self.kind.WHAT}, which {self.kind.__name__}(...) makes",
                 )
 
-    def read(self, content: Mapping[str, Any], wording: Wording) -> tuple[list[ParameterSet], list[Mistake]]:
-        """Those in the tables of a document, by name, and what is wrong with them."""
+    def read(
+        self, content: Mapping[str, Any], wording: Wording, gear: Gear | str = NO_GEAR
+    ) -> tuple[list[ParameterSet], list[Mistake]]:
+        """Those in the tables of a document, by name, and what is wrong with them; `gear` of the whole."""
         if self.kind.PARTS:
-            return self._read_parts(content, wording)
+            return self._read_parts(content, wording, gear)
         if not self.many:
             tables = [content[one.name] for one in self.tables if one.name in content]
             rows = [{key: value for table in tables for key, value in table.items()}]
-            return self._read_rows(rows if tables or self.default is REQUIRED else [], [wording])
+            return self._read_rows(rows if tables or self.default is REQUIRED else [], [wording], gear)
         name = self.tables[0].name
         rows = content[name] or []
-        return self._read_rows(rows, [replace(wording, row=f"[{name}] {i + 1}, ") for i in range(len(rows))])
+        return self._read_rows(
+            rows, [replace(wording, row=f"[{name}] {i + 1}, ") for i in range(len(rows))], gear
+        )
 
     def _read_parts(
-        self, content: Mapping[str, Any], wording: Wording
+        self, content: Mapping[str, Any], wording: Wording, gear: Gear | str
     ) -> tuple[list[ParameterSet], list[Mistake]]:
         """One that is itself made of several tables; none where the document has none of them."""
         if not any(content.get(table.name) for table in self.tables):
             return [], []
         given, mistakes = dict[str, object](), list[Mistake]()
         for name, part in self.kind.PARTS.items():
-            parts, wrong = part.read(content, wording)
+            parts, wrong = part.read(content, wording, gear)
             mistakes += wrong
             if parts:
                 given[name] = parts if part.many else parts[0]
@@ -142,12 +146,13 @@ class Component:
             return [], [Mistake(sentence) for sentence in error.sentences]
 
     def _read_rows(
-        self, rows: list[dict[str, object]], wordings: list[Wording]
+        self, rows: list[dict[str, object]], wordings: list[Wording], gear: Gear | str
     ) -> tuple[list[ParameterSet], list[Mistake]]:
         parts, mistakes, kind = list[ParameterSet](), list[Mistake](), self.kind
+        gear = gear if isinstance(gear, str) else gear._replace(load=None)  # a row has a load of its own
         for row, wording in zip(rows, wordings, strict=False):
             given = {p.name: row[p.key] for p in kind.PARAMETERS.values() if p.key in row}
-            values, wrong = read_values(given, kind.PARAMETERS, wording)
+            values, wrong = read_values(given, kind.PARAMETERS, wording, gear=gear)
             wrong += without_unit(given, kind.PARAMETERS, kind.USUAL, wording)
             try:
                 parts += [] if wrong else [kind._made(given, Wording(), [], values)]

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from softstart import Chain, Drive, Duty, DutyStep, InputError, Machine, Shift, machine_table, simulate
+from softstart.chain import Mass, Motor, Shaft
+from softstart.drive.duty import check_duty, way_of_stop
 
 CRANE = Drive.load("crane-4amtkf")
 CHAIN = Chain.load("crane-4-mass")
@@ -184,3 +186,172 @@ def test_a_shift_without_steps_and_things_of_another_kind() -> None:
         CRANE.replace(duty="stop")
     with pytest.raises(InputError, match=r'^steps = "start": it takes a step of a duty'):
         Duty(["start"])
+
+
+# ---- with a machine and a strategy ----------------------------------------------------------------------
+
+LIFT = CRANE.replace(
+    brake_torque="20 N*m", opening_delay="50 ms", minimum_torque="-30 N*m"
+)  # 7.16 N m, active
+CYCLE = [DutyStep("start"), DutyStep("stop")]
+
+
+def refused(machine: Machine, *steps: DutyStep, stop: str | None = None, able: bool = False) -> list[str]:
+    """The sentences on these steps under a strategy that can stop and holds the speed, or that cannot."""
+    try:
+        check_duty(machine, Duty(steps), stop, able, able, able, "ramp")
+    except InputError as error:
+        return list(error.sentences)
+    return []
+
+
+@pytest.mark.parametrize("able", [False, True])
+def test_a_machine_that_can(able: bool) -> None:
+    free = CRANE.replace(load_kind="reactive")
+    for machine in (LIFT, free, CHAIN.replace(brake_torque=20.0), HOIST.replace(brake_torque="400 N*m")):
+        assert refused(machine, *CYCLE, DutyStep("jog", time=1), able=able) == []
+    assert refused(LIFT, DutyStep("start"), DutyStep("reverse"), able=able) == []
+
+
+def test_the_way_of_a_stop() -> None:
+    """As the step says; else the strategy, what is configured, the torque of the motor, coasting."""
+    ways = [(DutyStep("stop", by="brake"), True), (DutyStep("stop"), True), (DutyStep("stop"), False)]
+    assert [way_of_stop(step, LIFT, "coast", can) for step, can in ways] == ["brake", "strategy", "coast"]
+    assert [way_of_stop(DutyStep("stop"), one, None, False) for one in (LIFT, CRANE)] == ["torque", "coast"]
+
+
+@pytest.mark.parametrize("machine", [LIFT, CHAIN.replace(brake_torque=20.0)], ids=["drive", "chain"])
+def test_a_brake_weaker_than_the_load(machine: Machine) -> None:
+    """The load of 7.16 N m at the motor shaft, by statics, in either kind of machine; also a later one."""
+    (sentence,) = refused(machine.replace(brake_torque=7.15), *CYCLE, stop="brake")
+    assert sentence.startswith(
+        "[brake] torque = 7.15: it is weaker than the load, 7.16 N*m at the motor shaft"
+    )
+    assert refused(machine.replace(brake_torque=7.17), *CYCLE, stop="brake") == []
+    heavy = 20.0 if machine.KIND == "drive" else 20.0 * 20.0  # the crane turns 20 times slower
+    lifted = [DutyStep("load", torque=1.01 * heavy), *CYCLE]
+    (sentence,) = refused(machine, *lifted, stop="brake")
+    assert sentence.startswith('[duty] 1, do = "load": the brake of 20 N*m is weaker than the load, 20.2 N*m')
+    assert refused(machine, DutyStep("load", torque=0.99 * heavy), *CYCLE, stop="brake") == []
+    assert (
+        refused(machine, DutyStep("load", torque=1.01 * heavy, friction=0.1 * heavy), *CYCLE, stop="brake")
+        == []
+    )
+
+
+def test_a_brake_that_the_gear_helps() -> None:
+    """A worm gear of efficiency 0.6 lets 0.6 of the load through to the motor."""
+    chain = Chain(
+        [Mass(0.05, name="motor"), Mass(2.0, torque=100.0)],
+        [Shaft(500.0, ratio=20, efficiency=0.6)],
+        Motor(30, rated_speed=100),
+    )
+    assert chain.overhauling_torque == pytest.approx(3.0)
+    assert refused(chain.replace(brake_torque=3.01), *CYCLE, stop="brake") == []
+    assert len(refused(chain.replace(brake_torque=2.99), *CYCLE, stop="brake")) == 1
+
+
+BACK = [DutyStep("start", set_speed=-90)]
+COAST, TORQUE = DutyStep("stop", by="coast"), DutyStep("stop", by="torque", braking_torque=7.0)
+LOCK = CRANE.replace(closing_delay=0.1)
+
+
+@pytest.mark.parametrize(
+    ("machine", "steps", "stop", "sentence"),
+    [
+        (CRANE, CYCLE, "torque", '[duty] 2, do = "stop" by torque: the motor has no braking torque; give a '),
+        (LIFT, [CYCLE[0], DutyStep("stop", by="torque", braking_torque=31)], None,
+         "[duty] 2, braking_torque = 31.0: the motor has less, [motor] minimum_torque = -30.0"),
+        (CRANE, CYCLE, "brake", '[duty] 2, do = "stop" by brake: the machine has no brake; add [brake] torq'),
+        (CRANE, [CYCLE[0], DutyStep("brake")], None, '[duty] 2, do = "brake": the machine has no brake; add'),
+        (LOCK, [CYCLE[0], DutyStep("brake")], None, '[duty] 2, do = "brake": without [brake] torque the bra'),
+        (LOCK, [CYCLE[0], DutyStep("stop", brake_speed=3)], None, "[duty] 2, brake_speed = 3.0: without [br"),
+        (LOCK, [CYCLE[0], DutyStep("stop", brake_time=0)], None, "[duty] 2, brake_time = 0.0: without [brak"),
+        (CRANE, CYCLE, None, '[duty] 2, do = "stop" by coast: nothing holds the load, 7.16 N*m at the motor'),
+        (CRANE, [DutyStep("jog", time=1)], None, '[duty] 1, do = "jog" by coast: nothing holds the load, 7.'),
+        (LIFT, [*BACK, COAST], None, '[duty] 2, by = "coast": the load, 7.16 N*m at the motor shaft besides'),
+        (LIFT, [*BACK, TORQUE], None, '[duty] 2, by = "torque": the load, 7.16 N*m at the motor shaft besid'),
+        (CRANE.replace(load_torque=0), CYCLE, "coast", '[duty] 2, do = "stop" by coast: nothing brakes the '),
+        (LIFT, CYCLE, "strategy", '[duty] 2, do = "stop" by strategy: ramp cannot stop a machine; stop by'),
+        (LIFT, [DutyStep("start", set_speed=185)], None, "[duty] 1, set_speed = 185.0: it is above 2 times "),
+        (LIFT, [CYCLE[0], DutyStep("hold", time=1, set_speed=9)], None, "[duty] 2, set_speed = 9.0: ramp do"),
+        (LIFT, [DutyStep("load", torque=5, mass="hook")], None, '[duty] 1, mass = "hook": a drive has one l'),
+        (CHAIN, [DutyStep("load", torque=5, mass="cran")], None, '[duty] 1, mass = "cran": the chain has no '
+         'mass of this name; did you mean "crane"?'),
+        (LIFT, [DutyStep("load", torque=-5, kind="reactive")], None, "[duty] 1, load_torque = -5 N*m: a rea"),
+        (LIFT, [DutyStep("load", torque=70)], None, "[duty] 1, starting_torque = 62 N*m: the starting torqu"),
+        (LIFT, [DutyStep("jog", time=0.05)], None, "[duty] 1, time = 0.05: the jog ends before the brake is"),
+        (LIFT, CYCLE, "cost", 'stop = "cost": the stop is "strategy", "torque", "coast" or "brake"; did you'),
+    ],
+)  # fmt: skip
+def test_one_sentence_for_what_a_machine_cannot_do(
+    machine: Machine, steps: list[DutyStep], stop: str | None, sentence: str
+) -> None:
+    found = refused(machine, *steps, stop=stop)
+    assert len(found) == 1
+    assert found[0].startswith(sentence), found
+
+
+def test_stops_of_a_load_that_drives_on() -> None:
+    """Lowering ends by the brake in motion, or by more torque than that of the load; lifting by itself."""
+    stronger = TORQUE.replace(braking_torque=7.2)
+    for stop in (stronger, DutyStep("stop", by="brake"), COAST.replace(brake_time=0.2)):
+        assert refused(LIFT, *BACK, stop) == []
+    assert refused(LIFT, *BACK, COAST.replace(brake_speed=95)) == []  # closes at once
+    assert len(refused(LIFT, *BACK, COAST.replace(brake_speed=85))) == 1
+    assert len(refused(LIFT, DutyStep("start"), DutyStep("reverse"), COAST)) == 1
+    assert refused(LIFT, *BACK, DutyStep("reverse"), COAST) == []
+    assert refused(LIFT, DutyStep("start"), COAST) == []
+
+
+def test_the_load_that_the_first_cycle_leaves() -> None:
+    """It is picked up at the end and never set down: the second cycle begins with it."""
+    free = LIFT.replace(brake_torque=None, opening_delay=0, load_kind="reactive")
+    steps = [DutyStep("start"), DutyStep("stop", by="torque"), DutyStep("load", kind="active")]
+    (sentence,) = refused(free, *steps)
+    assert sentence.startswith('[duty] 2, by = "torque": nothing holds the load, 7.16 N*m')
+    assert refused(free, *steps, DutyStep("load", kind="reactive")) == []
+
+
+def test_all_that_a_machine_cannot_do_at_once() -> None:
+    wrong = [DutyStep("start", set_speed=300), DutyStep("brake"), DutyStep("load", torque=1, mass="hook")]
+    assert [one.split(",")[0] for one in refused(CRANE, *wrong)] == ["[duty] 1", "[duty] 2", "[duty] 3"]
+
+
+# ---- as typed --------------------------------------------------------------------------------------------
+
+
+def test_settings_of_steps() -> None:
+    drive = CRANE.replace(duty=SHIFT)
+    settings = {"duty[2].time": "5 s", "shift.cycles_per_hour": "10"}
+    changed = drive.with_settings([*(f"{key}={value}" for key, value in settings.items()), "gap=1 rad"])
+    assert changed.gap == 1.0
+    assert changed.duty is not None
+    assert changed.duty.shift is not None
+    assert (changed.duty.steps[1].time, changed.duty.shift.cycles_per_hour) == (5.0, 10.0)
+    chain = Chain.from_toml(CHAIN.replace(duty=SHIFT).to_toml(), also=settings)
+    assert chain.duty == changed.duty
+    with pytest.raises(InputError) as error:
+        drive.with_settings(["duty[9].time=1", "gapp=1"])
+    assert [one.split(";")[0] for one in error.value.sentences] == [
+        'gapp=1: there is no parameter "gapp"',
+        "duty[9].time: write duty[N].time with N from 1 to 5.",
+    ]
+    with pytest.raises(InputError, match=r"^duty\[1\].time=3: the drive has no duty; add \[\[duty\]\]"):
+        CRANE.with_settings(["duty[1].time=3"])
+
+
+def test_values_at_the_output() -> None:
+    """A torque that drives the motor loses on its way: M eta/i; one that brakes it is M/(i eta)."""
+    steps = [f'[[duty]]\ndo = "load"\ntorque = "{torque} N*m at output"\n' for torque in (320, -320)]
+    steps.append('[[duty]]\ndo = "start"\nset_speed = "-2 rad/s at output"\n')
+    steps.append('[[duty]]\ndo = "hold"\nangle = "1 turn at output"\n')
+    text = CRANE.replace(gear_ratio=40, gear_efficiency=0.8).to_toml() + "".join(steps)
+    up, down, start, hold = Drive.from_toml(text).duty.steps  # type: ignore[union-attr]
+    assert (up.torque, down.torque, start.set_speed) == pytest.approx((10.0, -6.4, -80.0), rel=1e-15)
+    assert hold.angle == pytest.approx(80.0 * math.pi, rel=1e-15)
+    for machine in (CRANE, CHAIN):
+        with pytest.raises(
+            InputError, match=r'^\[duty\] 1, torque = "320 N\*m at output": .*at the motor shaft'
+        ):
+            type(machine).from_toml(machine.to_toml() + steps[0])
