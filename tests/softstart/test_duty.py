@@ -206,3 +206,35 @@ def test_one_trace_over_the_whole() -> None:
 def test_refused_numbers_of_cycles(cycles: object) -> None:
     with pytest.raises(Exception, match="whole number"):
         run_duty(CONVEYOR, "direct", Duty(GO_AND_STOP), cycles=cycles)  # type: ignore[arg-type]
+
+
+def test_a_duty_of_a_speed_controller_is_simulate_with_commands() -> None:
+    """Start, stop and reversal are changes of what is commanded: the same bits, state of the loop included."""
+    drive = CONVEYOR.replace(minimum_torque=-150.0)
+    duty = Duty([DutyStep("start", time=2.0), DutyStep("reverse", time=3.0), DutyStep("stop", time=2.0)])
+    run = run_duty(drive, "speed-ramp", duty, cycles=1)
+    n = drive.target_speed
+    whole = simulate(drive, "speed-ramp", 7.0, commands=[(2.0, 1, -n), (5.0, 0, -n)])
+    for phase in run.phases:
+        last = phase.trajectory.states[-1]
+        state = whole.at(last[1])
+        assert phase.trajectory.of_masses("speed")[-1] == pytest.approx(
+            [float(state["w1"]), float(state["w2"])], rel=1e-9, abs=1e-9
+        )
+    assert run.k_dyn == pytest.approx(whole.k_dyn, rel=1e-12)
+
+
+def test_a_motor_that_cannot_brake_starts_backwards_as_forwards() -> None:
+    duty = Duty([DutyStep("start"), DutyStep("stop", by="coast")])
+    back = Duty([DutyStep("start", set_speed=-CONVEYOR.target_speed), DutyStep("stop", by="coast")])
+    drive = CONVEYOR.replace(start_position="mid-gap", torque_noise=0.0, encoder_lines=0)
+    for name in ("direct", "speed-ramp"):
+        one, two = run_duty(drive, name, duty), run_duty(drive, name, back)
+        assert [-step.angle for step in one.executed] == [step.angle for step in two.executed]
+
+
+def test_a_brake_is_closed_before_the_first_step() -> None:
+    hoist = Drive.load("hoist-15kw")
+    run = run_duty(hoist, "direct", Duty([DutyStep("hold", time=0.5), DutyStep("start")]))
+    assert run.executed[0].largest[0] == pytest.approx(hoist.active_torque, rel=0.01)
+    assert run.executed[0].angle == pytest.approx(0.0, abs=1e-3)

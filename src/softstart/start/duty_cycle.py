@@ -74,7 +74,8 @@ class DutyCycle:
         self.rows = kernel_input(machine)
         self.recorder = StartRecorder(self.rows, int(controller.sensors), room)
         self.go: Go | None = None  # of the controller, while it is in command
-        self.begun = self.closed = False  # whether anything has been simulated; whether the brake is closed
+        self.begun = False  # whether anything has been simulated
+        self.closed = machine.brake_torque > 0.0  # whether the brake is
         self.sense = 1.0  # frame of the controller
         self.speed = 0.0  # commanded speed, rad/s; 0 at standstill
         self.time = self.angle = 0.0  # of the duty at the zero of the recorder
@@ -228,8 +229,9 @@ class DutyCycle:
         before, began = self.speed, self.now
         self.speed = float(step.set_speed or (-before if step.do == "reverse" else self.target))
         begins = self.go is None or not self.controller.can_reverse
+        begins = begins or (step.do == "start" and self.forward != self.sense)
         if begins:
-            self.sense = 1.0 if self.controller.can_reverse else self.forward
+            self.sense = self.forward
             self.starts, began = self.starts + 1, 0.0
             self.go = segment_of(self.controller, self.design, self.recorder)
         assert self.go is not None
