@@ -209,8 +209,8 @@ def test_refused_numbers_of_cycles(cycles: object) -> None:
 
 
 def test_a_duty_of_a_speed_controller_is_simulate_with_commands() -> None:
-    """Start, stop and reversal are changes of what is commanded: the same bits, state of the loop included."""
-    drive = CONVEYOR.replace(minimum_torque=-150.0)
+    """Start, stop and reversal are changes of what is commanded, the state of the loop goes on."""
+    drive = CONVEYOR.replace(minimum_torque=-150.0, encoder_lines=0)
     duty = Duty([DutyStep("start", time=2.0), DutyStep("reverse", time=3.0), DutyStep("stop", time=2.0)])
     run = run_duty(drive, "speed-ramp", duty, cycles=1)
     n = drive.target_speed
