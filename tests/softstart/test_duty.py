@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from softstart import Chain, Drive, Duty, DutyRun, DutyStep, SimulationError, run_duty, simulate
+from softstart import Chain, Drive, Duty, DutyRun, DutyStep, InputError, SimulationError, run_duty, simulate
 from softstart.plugins import controller_names
 from softstart.start.metrics import energy_balance
 
@@ -160,7 +160,7 @@ def test_an_opening_delay_follows_torque_proving() -> None:
 def test_a_duty_on_a_chain() -> None:
     chain = Chain.load("crane-4-mass").with_damping_ratio(0.03)
     duty = Duty([DutyStep("start"), DutyStep("hold", angle=20.0), DutyStep("stop", time=3.0, by="coast")])
-    with pytest.raises(SimulationError, match="does not come to rest"):
+    with pytest.raises(InputError, match="runs away"):
         run_duty(chain, "ramp", Duty([DutyStep("start"), DutyStep("stop", by="coast")]))
     run = run_duty(chain.replace(brake_torque=200.0), "ramp", duty)
     assert run.executed[1].angle == pytest.approx(20.0, rel=1e-9)
@@ -238,3 +238,11 @@ def test_a_brake_is_closed_before_the_first_step() -> None:
     run = run_duty(hoist, "direct", Duty([DutyStep("hold", time=0.5), DutyStep("start")]))
     assert run.executed[0].largest[0] == pytest.approx(hoist.active_torque, rel=0.01)
     assert run.executed[0].angle == pytest.approx(0.0, abs=1e-3)
+
+
+def test_an_undamped_machine_never_rests() -> None:
+    crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", start_position="mid-gap")
+    with pytest.raises(SimulationError, match=r"\[duty\] 2.*does not come to rest.*damping"):
+        run_duty(crane, "direct", Duty([DutyStep("start"), DutyStep("stop", by="coast")]))
+    run = run_duty(crane, "direct", Duty([DutyStep("start"), DutyStep("stop", by="coast", time=8.0)]))
+    assert run.executed[1].time == pytest.approx(8.0, rel=1e-12)

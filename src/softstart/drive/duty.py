@@ -415,7 +415,8 @@ def _endless(step: DutyStep, by: str, machine: Machine, speed: float) -> Iterato
     torque = 0.0 if by == "coast" else step.braking_torque or -float(machine.motor.minimum_torque)
     load = f"{abs(pull):.6g} N*m at the motor shaft besides what friction holds"
     in_motion = step.brake_time is not None or (step.brake_speed or 0.0) >= abs(speed)
-    if by not in ("torque", "coast") or (by == "torque" and torque <= 0.0):
+    ends = step.do == "stop" and step.time is not None
+    if ends or by not in ("torque", "coast") or (by == "torque" and torque <= 0.0):
         return
     if pull and machine.brake_torque == 0.0:
         yield (

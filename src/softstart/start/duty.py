@@ -17,7 +17,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
 from softstart.drive import Machine
-from softstart.drive.duty import Duty, DutyStep
+from softstart.drive.duty import Duty, DutyStep, check_duty, way_of_stop
 from softstart.errors import InputError
 from softstart.results import OneLine, Result
 from softstart.start.demand import ControllerLike, as_controller
@@ -302,7 +302,9 @@ def run_duty(
     if isinstance(cycles, bool) or not isinstance(cycles, Integral) or cycles < 1:
         raise InputError(f"cycles = {cycles}: the number of cycles is a whole number of 1 or more.")
     ready, design = strategy.set_up((as_machine(fitted_to) if fitted_to else machine).design_drive)
-    stop_by = stop or default_stop(machine, ready)
+    holds = ready.regulation(design) is not None
+    check_duty(machine, cycle, stop, ready.can_stop, ready.can_reverse, holds, label_of(ready))
+    stop_by = way_of_stop(DutyStep("stop"), machine, stop, ready.can_stop)
     steps = cycle.expanded()
     moving = cycle.ends_moving
     count = 1 if moving else int(cycles)
@@ -380,10 +382,3 @@ def _worst_of(shown: StepRun, each: Sequence[StepRun]) -> StepRun:
         impulses=np.max([one.impulses for one in each], axis=0),
         start_time=max(one.start_time for one in each),
     )
-
-
-def default_stop(machine: Machine, controller: Controller) -> str:
-    """How a duty stops where nothing is said."""
-    if controller.can_stop:
-        return "strategy"
-    return "torque" if machine.motor is not None and machine.motor.minimum_torque < 0.0 else "coast"

@@ -9,10 +9,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from softstart.chain.model import Chain
 from softstart.controller.base import Controller, Regulation, Sensor, label_of
 from softstart.drive import Drive, Machine
-from softstart.drive.duty import DutyStep
+from softstart.drive.duty import LOAD_KEYS, DutyStep
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.start.engine import segment_of
@@ -323,7 +322,8 @@ class DutyCycle:
                 f'[duty] {self.step + 1}, do = "load": the machine still moves when its load changes '
                 f"({self.where}); let the stop before it end by itself, without a time."
             )
-        self.machine = with_load(self.machine, step)
+        changes = {key: value for key, value in step.given().items() if key in LOAD_KEYS}
+        self.machine = self.machine.with_load(changes, step.mass or "")
         self.rows = kernel_input(next(iter(self.machine.positions.values())))
         yield from self._rest(step, self.now, step.time)
 
@@ -388,19 +388,6 @@ class DutyCycle:
         self.speed = 0.0
         if time is not None and self.now < until:
             yield self.phase("pause", self.go or ZERO, until)
-
-
-def with_load(machine: Machine, step: DutyStep) -> Machine:
-    """The machine with the load of a step."""
-    given = {"torque": step.torque, "kind": step.kind, "inertia": step.inertia, "friction": step.friction}
-    given = {name: value for name, value in given.items() if value is not None}
-    if isinstance(machine, Chain):
-        i = machine.load_index if step.mass is None else machine.index(step.mass)
-        masses = list(machine.masses)
-        masses[i] = masses[i].replace(**given)
-        return machine.replace(masses=masses)
-    assert isinstance(machine, Drive)
-    return machine.replace(**{f"load_{name}": value for name, value in given.items()})
 
 
 def holding_torque(machine_input: KernelInput, speed: float) -> float:
