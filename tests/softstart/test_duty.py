@@ -246,3 +246,10 @@ def test_an_undamped_machine_never_rests() -> None:
         run_duty(crane, "direct", Duty([DutyStep("start"), DutyStep("stop", by="coast")]))
     run = run_duty(crane, "direct", Duty([DutyStep("start"), DutyStep("stop", by="coast", time=8.0)]))
     assert run.executed[1].time == pytest.approx(8.0, rel=1e-12)
+
+
+def test_a_reversal_by_a_speed_controller_needs_a_braking_torque() -> None:
+    duty = Duty([DutyStep("start"), DutyStep("reverse")])
+    with pytest.raises(InputError, match=r"\[duty\] 2.*speed-ramp.*minimum_torque"):
+        run_duty(CONVEYOR, "speed-ramp", duty)
+    assert run_duty(CONVEYOR, "direct", duty).executed[1].how == "strategy, anew in the other direction"

@@ -70,7 +70,7 @@ class DutyStep(ParameterSet):
     0.2
     >>> DutyStep("start", torque=5.0)
     Traceback (most recent call last):
-    softstart.errors.InputError: torque = 5.0: a step "start" has no torque; it has set_speed and repeat.
+    softstart.errors.InputError: torque = 5.0: a step "start" has no torque; it has set_speed, time, ...
 
     References
     ----------
@@ -323,7 +323,7 @@ def check_duty(
     """Raise InputError with a sentence for each step that this machine or this strategy cannot do.
 
     `stop` is the stop of strategies that cannot stop, `name` that of the strategy, as it is shown. A strategy
-    that cannot reverse is started anew in the other direction, so `can_reverse` refuses nothing.
+    that cannot reverse is started anew in the other direction, which takes no braking torque.
     """
     if stop is not None and stop not in get_args(StopBy):
         *first, last = map(show, get_args(StopBy))
@@ -342,6 +342,11 @@ def check_duty(
             if step.do in ("start", "jog"):
                 speed = step.set_speed or machine.target_speed or math.nan
             elif step.do == "reverse":
+                if can_reverse and machine.motor.minimum_torque >= 0.0:
+                    sentences.append(
+                        f'do = "reverse": {name} slows the machine down by a torque against its motion, which '
+                        "the motor has not; give a [motor] minimum_torque below 0, or stop before."
+                    )
                 speed = step.set_speed or -math.copysign(machine.target_speed or math.nan, speed)
             elif step.do == "hold" and step.set_speed is not None:
                 speed = step.set_speed
