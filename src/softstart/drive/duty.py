@@ -344,8 +344,8 @@ def check_duty(
             elif step.do == "reverse":
                 if can_reverse and machine.motor.minimum_torque >= 0.0:
                     sentences.append(
-                        f'do = "reverse": {name} slows the machine down by a torque against its motion, which '
-                        "the motor has not; give a [motor] minimum_torque below 0, or stop before."
+                        f'do = "reverse": {name} slows the machine down by a torque against its motion, '
+                        "which the motor has not; give a [motor] minimum_torque below 0, or stop before."
                     )
                 speed = step.set_speed or -math.copysign(machine.target_speed or math.nan, speed)
             elif step.do == "hold" and step.set_speed is not None:
