@@ -31,6 +31,7 @@ KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 ENDS: Final = ("stop", "brake")  # steps that end a motion
 
+MOST_STEPS: Final = 10_000  # of one cycle
 MOST_SPEED: Final = 2.0  # times rated or target speed; beyond, a motor in field weakening lacks torque
 
 library = Library("softstart.drive", "a duty", "duties", folder="duties")
@@ -48,12 +49,15 @@ class DutyStep(ParameterSet):
       up to and including the stop that ends it are repeated so many times.
     - "stop": until all masses stand, `by` the strategy, the motor's `braking_torque`, coasting or the brake.
       The brake, if there is one, closes at standstill, or at `brake_speed` or `brake_time`.
-    - "hold": go on for `time`, or until the load has travelled `angle`; at standstill a pause. A new
-      `set_speed` needs a strategy that holds the speed.
+    - "hold": go on for `time`, or until the load has travelled `angle`, whichever is first; at standstill a
+      pause. A new `set_speed` needs a strategy that holds the speed.
     - "reverse": start in the other direction, out of the motion.
     - "jog": start for `time`, then a stop; `repeat` times in a row.
     - "load": change the load at rest: `torque`, `kind`, `inertia`, `friction`, of a chain those of `mass`.
     - "brake": close the brake at once, motor off, until all masses stand.
+
+    A start and a reversal end at the set speed, or at a `time` or an `angle`; a stop, "brake" and "load" have
+    ended when all masses stand, or at a `time`.
 
     Parameters
     ----------
@@ -128,14 +132,8 @@ class DutyStep(ParameterSet):
                 f'braking_torque = {self.braking_torque!r}: only a stop by = "torque" has one{by}; write '
                 'by = "torque", or leave it out.'
             )
-        if self.do == "hold":
-            if self.time is None and self.angle is None:
-                yield 'time is missing: a hold takes a time or an angle; write for example time = "2 s".'
-            elif self.time is not None and self.angle is not None:
-                yield (
-                    f"time = {self.time!r} and angle = {self.angle!r}: both end the step; leave one out, or "
-                    "make two steps."
-                )
+        if self.do == "hold" and self.time is None and self.angle is None:
+            yield 'time is missing: a hold takes a time or an angle; write for example time = "2 s".'
         if self.do == "jog" and self.time is None:
             yield 'time is missing: a jog is a start of given time; write for example time = "200 ms".'
         if self.do == "load" and not given.keys() & set(LOAD_KEYS):
@@ -217,6 +215,8 @@ class Duty(ParameterFile):
         """Sentences on steps that cannot follow those before them."""
         if not self.steps:
             yield '[[duty]] is missing: a duty has steps; write for example [[duty]] and do = "start" below.'
+        if (count := self._count()) > MOST_STEPS:
+            yield f"repeat: one cycle has {count:.6g} steps, and a duty at most {MOST_STEPS}; lower repeat."
         started, direction = 0, 1.0  # number of the step that set the machine in motion, 0 at standstill
         for number, step in enumerate(self.steps, start=1):
             yield from (f"[duty] {number}, {sentence}" for sentence in _misplaced(step, started, direction))
@@ -238,15 +238,25 @@ class Duty(ParameterFile):
         end = next((i for i in later if self.steps[i].do in (*ENDS, "start")), None)
         return None if end is None or self.steps[end].do == "start" else end
 
-    def expanded(self) -> tuple[tuple[int, DutyStep], ...]:
-        """All steps of one cycle in their order, repetitions too, each with its index in `steps`."""
-        steps, cycle, index = self.steps, list[tuple[int, DutyStep]](), 0
-        while index < len(steps):
-            step = steps[index]
+    def _count(self) -> float:
+        """How many steps one cycle has."""
+        return sum(step.repeat * (last - index + 1) for index, step, last in self._blocks())
+
+    def _blocks(self) -> Iterator[tuple[int, DutyStep, int]]:
+        """The indices of steps that are carried out together, so many times as the first of them says."""
+        index = 0
+        while index < len(self.steps):
+            step = self.steps[index]
             end = self._end_of(index) if step.do == "start" and step.repeat > 1.0 else None
             last = index if end is None else end
-            cycle += [(i, steps[i]) for i in range(index, last + 1)] * int(step.repeat)
+            yield index, step, last
             index = last + 1
+
+    def expanded(self) -> tuple[tuple[int, DutyStep], ...]:
+        """All steps of one cycle in their order, repetitions too, each with its index in `steps`."""
+        cycle = list[tuple[int, DutyStep]]()
+        for index, step, last in self._blocks():
+            cycle += [(i, self.steps[i]) for i in range(index, last + 1)] * int(step.repeat)
         return tuple(cycle)
 
     @property

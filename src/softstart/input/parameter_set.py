@@ -244,7 +244,9 @@ class ParameterSet:
         mistakes = list(mistakes)
         for name, part in self.PARTS.items():
             if name in given:
-                values[name] = tuple(given[name]) if part.many else given[name]  # type: ignore[arg-type]
+                value = given[name]
+                several = isinstance(value, Iterable) and not isinstance(value, str)
+                values[name] = (tuple(value) if several else (value,)) if part.many else value  # type: ignore[arg-type]
                 found += [Mistake(wording.sentence(*one)) for one in part.misfits(name, values[name])]
             elif part.default is not REQUIRED:
                 values[name] = part.default

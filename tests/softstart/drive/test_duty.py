@@ -79,6 +79,20 @@ def test_a_table_keeps_the_duty() -> None:
     assert [one.duty for one in table.elements()] == [SHIFT, SHIFT]
 
 
+def test_a_table_of_brakes() -> None:
+    """Each machine of a table has its own release and its own lock."""
+    table = machine_table(CRANE, opening_delay=[0.05, 0.1], brake_torque=[20.0, math.inf])
+    each = list(table.elements())
+    assert [(one.brake, one.release_time, one.brake_torque) for one in each] == [
+        ("motor", 0.05, 20.0),
+        ("motor", 0.1, math.inf),
+    ]
+    single = [
+        simulate(CRANE.replace(brake_torque=20.0, opening_delay=delay), "direct") for delay in (0.05, 0.1)
+    ]
+    assert simulate(table, "direct").peak_torque.values.tolist() == [one.peak_torque for one in single]
+
+
 def test_a_duty_in_a_file_of_its_own(tmp_path: Path) -> None:
     assert Duty.from_toml(SHIFT.to_toml()) == SHIFT
     (tmp_path / "shift.toml").write_text(SHIFT.to_toml(), encoding="utf-8")
@@ -147,7 +161,6 @@ def test_torque_proving_and_a_release_at_a_time_stay_as_they_are() -> None:
         ("jog", "[duty] 1, time is missing: a jog is a start of given time"),
         ("jog time=0", "[duty] 1, time = 0: the time of the step must be above 0."),
         ("start; hold", "[duty] 2, time is missing: a hold takes a time or an angle"),
-        ("start; hold time=1 angle=2", "[duty] 2, time = 1.0 and angle = 2.0: both end the step"),
         ("start torque=5", '[duty] 1, torque = 5.0: a step "start" has no torque; it has set_speed, time'),
         ("start; brake by='coast'", '[duty] 2, by = "coast": a step "brake" has no by; it has time'),
         ("start; stop repeat=2", '[duty] 2, repeat = 2.0: a step "stop" has no repeat; it has by, '),
@@ -184,8 +197,36 @@ def test_a_shift_without_steps_and_things_of_another_kind() -> None:
         Drive.from_toml(CRANE.to_toml() + "[shift]\ncycles_per_hour = 3")
     with pytest.raises(InputError, match=r'^duty = "stop": it takes a duty, which Duty\(...\) makes.$'):
         CRANE.replace(duty="stop")
-    with pytest.raises(InputError, match=r'^steps = "start": it takes a step of a duty'):
-        Duty(["start"])
+    for wrong in ("start", ["start"]):
+        with pytest.raises(InputError, match=r'^steps = "start": it takes a step of a duty'):
+            Duty(wrong)
+    with pytest.raises(InputError, match=r"^repeat: one cycle has 2e\+30 steps, and a duty at most 10000;"):
+        Duty([DutyStep("start", repeat=1e30), DutyStep("stop")])
+
+
+ANYTHING = [
+    "nan", "inf", "1e308", "5e-324", "-1", "0", "true", "[1, 2]", "{a = 1}", '""', '"5 xyzzy"', '"-5 %"',
+    '"0,5 rad"', "1979-05-27", '"\\u0000"', '"start"',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("key", DutyStep.PARAMETERS)
+def test_whatever_stands_in_a_file_is_read_or_refused(key: str) -> None:
+    refusals = list[str]()
+    for value in ANYTHING:
+        rest = "" if key == "do" else 'do = "start"\n'
+        try:
+            Drive.from_toml(f"{CRANE.to_toml()}[[duty]]\n{rest}{key} = {value}\n")
+        except InputError as error:
+            refusals += error.sentences
+    assert len(refusals) > 8
+    assert all(key in sentence for sentence in refusals)
+
+
+@pytest.mark.parametrize("text", ["[duty]\ndo = 3", "[[shift]]\nhours = 3", "[shift]\nhours = 'x'"])
+def test_tables_of_another_kind(text: str) -> None:
+    with pytest.raises(InputError):
+        Drive.from_toml(CRANE.to_toml() + text)
 
 
 # ---- with a machine and a strategy ----------------------------------------------------------------------
@@ -302,6 +343,7 @@ def test_stops_of_a_load_that_drives_on() -> None:
     assert len(refused(LIFT, DutyStep("start"), DutyStep("reverse"), COAST)) == 1
     assert refused(LIFT, *BACK, DutyStep("reverse"), COAST) == []
     assert refused(LIFT, DutyStep("start"), COAST) == []
+    assert refused(LIFT, *BACK, COAST.replace(time=0.1)) == []  # over by then
 
 
 def test_the_load_that_the_first_cycle_leaves() -> None:
