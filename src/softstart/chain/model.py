@@ -258,6 +258,8 @@ class Chain(ParameterFile, Machine):
         if mass and mass not in self.mass_names:
             raise InputError(f"mass = {show(mass)}: {no_such_mass(mass, list(self.mass_names))}")
         masses, index = list(self.masses), self.index(mass) if mass else self.load_index
+        if math.isinf(masses[index].inertia):
+            raise InputError(f"mass = {show(mass)}: it stays at rest, so that it has no load to change.")
         masses[index] = masses[index].replace(**values)
         return self.replace(masses=masses)
 

@@ -85,10 +85,12 @@ def _also(machine: Any) -> Iterator[str]:
         yield f"starts {POSITIONS[where]}{', of all gaps alike' if len(machine.gaps) > 1 else ''}"
     elif where == "" and machine.theta0:
         yield f"starts at twist {short(float(machine.theta0))} rad"
-    if machine.brake == "motor":
+    if machine.brake == "motor" and machine.release_time > 0.0:
         proving = math.isinf(machine.release_time)
         until = "its torque has reached the shaft torque" if proving else f"{short(machine.release_time)} s"
         yield f"the brake holds the motor until {until}"
+    if 0.0 < machine.brake_torque < math.inf:
+        yield f"the brake slips at {short(machine.brake_torque)} N m"
     if friction:
         yield f"friction of the motor {short(friction)} N m"
     if b1 or b2:

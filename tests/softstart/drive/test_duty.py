@@ -44,6 +44,13 @@ def test_the_shift_of_a_travel_crane() -> None:
     assert counts == [400.0, 400.0, 150.0]
 
 
+@pytest.mark.parametrize("name", Duty.LIBRARY.names())
+def test_each_shipped_duty_can_be_repeated(name: str) -> None:
+    duty = Duty.load(name)
+    assert duty.shift is not None
+    assert not duty.ends_moving
+
+
 def test_repeats_are_expanded_up_to_the_stop() -> None:
     duty = Duty(
         [
@@ -358,6 +365,12 @@ def test_the_load_that_the_first_cycle_leaves() -> None:
 def test_all_that_a_machine_cannot_do_at_once() -> None:
     wrong = [DutyStep("start", set_speed=300), DutyStep("brake"), DutyStep("load", torque=1, mass="hook")]
     assert [one.split(",")[0] for one in refused(CRANE, *wrong)] == ["[duty] 1", "[duty] 2", "[duty] 3"]
+
+
+def test_a_mass_that_stays_at_rest_has_no_load() -> None:
+    wall = Chain([*CHAIN.masses, Mass(math.inf, name="wall")], [*CHAIN.shafts, Shaft(500.0)], CHAIN.motor)
+    (sentence,) = refused(wall, DutyStep("load", torque=5, mass="wall"))
+    assert sentence.startswith('[duty] 1, mass = "wall": it stays at rest')
 
 
 # ---- as typed --------------------------------------------------------------------------------------------
