@@ -253,3 +253,24 @@ def test_a_reversal_by_a_speed_controller_needs_a_braking_torque() -> None:
     with pytest.raises(InputError, match=r"\[duty\] 2.*speed-ramp.*minimum_torque"):
         run_duty(CONVEYOR, "speed-ramp", duty)
     assert run_duty(CONVEYOR, "direct", duty).executed[1].how == "strategy, anew in the other direction"
+
+
+def test_a_motor_that_friction_stops_has_slowed_down() -> None:
+    """Friction holds the motor at the root of its speed: the brake is commanded there, as an oracle has it."""
+    drive = Drive(
+        motor_inertia=0.0612, starting_torque=26, minimum_torque=-20, motor_friction=2.0, stiffness=1344,
+        damping=4.6, gap=0.032, load_inertia=0.167, load_torque=8.4, load_kind="reactive", target_speed=5.9,
+        brake_torque=24.0, closing_delay=0.014, encoder_lines=0, start_position=0.0,
+    )  # fmt: skip
+    run = run_duty(drive, "direct", Duty([DutyStep("start"), DutyStep("stop", by="coast")]), cycles=1)
+    stop = run.executed[1]
+    assert stop.phases[0].end == pytest.approx(0.209340581, rel=1e-8)
+    assert stop.phases[1].end == pytest.approx(stop.phases[0].end + 0.014, rel=1e-12)
+
+
+def test_a_load_that_changes_takes_time() -> None:
+    drive = CONVEYOR.replace(brake_torque=200.0, closing_delay=0.1)
+    steps = [DutyStep("start"), DutyStep("stop", by="coast"), DutyStep("load", torque=40.0)]
+    run = run_duty(drive, "direct", Duty(steps))
+    for step in run.executed:
+        assert 0.0 <= step.time <= step.end - step.begin

@@ -303,6 +303,9 @@ def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -
         bounced = rebounds and s.rigid[k] != 0.0 and s.path <= k < s.path_end
     elif event == STOP:
         set_friction_state(s, k, 0.0)
+        if s.slow == 0.0 and s.body[s.at_motor] == k:  # SLOWED at the same instant
+            s.t_end = s.time
+            s.slow = math.nan
     elif event in (BREAK_FORWARD, BREAK_BACK):
         set_friction_state(s, k, 1.0 if event == BREAK_FORWARD else -1.0)
     elif event == LET_GO:

@@ -359,7 +359,7 @@ def _carry_out(
     energies = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
     run = StepRun(
         index + 1, step, cycle + 1, how, begin, end,
-        (rests[0] if rests and step.time is None else end) - begin,
+        (rests[-1] if rests and step.time is None else end) - begin,
         first.time + float(reached) - begin if starts else math.nan,
         float(sum(phase.travel for phase in phases)),
         np.array([turn[:, 1].max() for turn in turns]),

@@ -174,7 +174,8 @@ class DutyCycle:
         status = status_of(reason, True, True)
         if not status.finished:
             raise SimulationError(f"{status.value} {self.where}, {what}.")
-        rest = self._rested(self.now < until) if state.still > 0.0 else math.nan
+        slowed = "slow" in fields and math.isnan(state.slow)
+        rest = self._rested(self.now < until and not slowed) if state.still > 0.0 else math.nan
         return Phase(what, self.step, self.cycle, self.time, self.angle, recorder.finished(), rest)
 
     def _rested(self, ended: bool) -> float:
@@ -324,6 +325,7 @@ class DutyCycle:
             )
         changes = {key: value for key, value in step.given().items() if key in LOAD_KEYS}
         self.machine = self.machine.with_load(changes, step.mass or "")
+        self.since[:] = math.nan
         self.rows = kernel_input(next(iter(self.machine.positions.values())))
         yield from self._rest(step, self.now, step.time)
 
