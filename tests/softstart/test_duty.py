@@ -256,7 +256,7 @@ def test_a_reversal_by_a_speed_controller_needs_a_braking_torque() -> None:
 
 
 def test_a_motor_that_friction_stops_has_slowed_down() -> None:
-    """Friction holds the motor at the root of its speed: the brake is commanded there, as an oracle has it."""
+    """Friction holds the motor at the root of its speed; there the brake is commanded."""
     drive = Drive(
         motor_inertia=0.0612, starting_torque=26, minimum_torque=-20, motor_friction=2.0, stiffness=1344,
         damping=4.6, gap=0.032, load_inertia=0.167, load_torque=8.4, load_kind="reactive", target_speed=5.9,
