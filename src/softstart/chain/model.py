@@ -247,7 +247,9 @@ class Chain(ParameterFile, Machine):
         at = arrays_at(self, self.motor_index)  # not `at_motor_shaft`, which keeps the position
         through = at.efficiency_from_motor
         pull = float((at.active * through).sum()) + self.curve_torque
-        return math.copysign(max(abs(pull) - float((at.friction * through).sum()), 0.0), pull)
+        left = abs(pull) - float((at.friction * through).sum())
+        balanced = left <= SAME * float(np.abs(at.active).sum())  # as by a counterweight
+        return 0.0 if balanced else math.copysign(left, pull)
 
     def with_load(self, values: Mapping[str, Any], mass: str = "") -> Self:
         """The chain with other load torque, kind, inertia and friction of a mass, by default the load mass.

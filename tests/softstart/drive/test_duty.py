@@ -299,6 +299,13 @@ def test_a_brake_that_the_gear_helps() -> None:
     assert len(refused(chain.replace(brake_torque=2.99), *CYCLE, stop="brake")) == 1
 
 
+def test_a_counterweight() -> None:
+    """0.1 + 0.2 N m against 0.3 N m are balanced, whatever binary makes of their sum."""
+    masses = [Mass(0.1, torque=torque) for torque in (0.1, 0.2, -0.3)]
+    assert 0.1 + 0.2 - 0.3 != 0.0
+    assert Chain(masses, [Shaft(5.0)] * 2, Motor(9.0)).overhauling_torque == 0.0
+
+
 BACK = [DutyStep("start", set_speed=-90)]
 COAST, TORQUE = DutyStep("stop", by="coast"), DutyStep("stop", by="torque", braking_torque=7.0)
 LOCK = CRANE.replace(closing_delay=0.1)
