@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
@@ -16,7 +16,7 @@ from softstart import formulas
 from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller.base import Controller, label_of
-from softstart.drive import Machine
+from softstart.drive import Drive, Machine
 from softstart.drive.duty import Duty, DutyStep, check_duty, way_of_stop
 from softstart.errors import InputError
 from softstart.results import OneLine, Result
@@ -24,6 +24,7 @@ from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.duty_cycle import DutyCycle, Phase
 from softstart.start.fatigue import STILL, impact_energies
 from softstart.start.metrics import REFERENCE
+from softstart.start.trajectory import FIRST_ROWS
 
 KEPT_CYCLES = 2  # whose trace is kept
 
@@ -140,7 +141,7 @@ class DutyRun(Result, view="duties.duty_sheet"):
     >>> duty = Duty(steps=[DutyStep(do="start"), DutyStep(do="hold", time=1), DutyStep(do="stop")])
     >>> run = run_duty("conveyor-11kw", "ramp", duty)
     >>> [(row.step.do, round(run.k_dyn_of(row), 3)) for row in run.rows]
-    [('start', 1.154), ('hold', 1.0), ('stop', 0.215)]
+    [('start', 1.078), ('hold', 1.0), ('stop', 0.215)]
     """
 
     drive: Any  # a Machine
@@ -285,7 +286,7 @@ def run_duty(
     --------
     >>> from softstart import Duty, DutyStep, run_duty
     >>> jog = Duty(steps=[DutyStep(do="jog", time="200 ms", by="coast")])
-    >>> run_duty("conveyor-11kw", "direct", jog, cycles=3).worst.cycle
+    >>> run_duty("conveyor-11kw", "direct", jog, cycles=3).cycles
     3
 
     References
@@ -305,46 +306,67 @@ def run_duty(
     holds = ready.regulation(design) is not None
     check_duty(machine, cycle, stop, ready.can_stop, ready.can_reverse, holds, label_of(ready))
     stop_by = way_of_stop(DutyStep("stop"), machine, stop, ready.can_stop)
-    steps = cycle.expanded()
-    moving = cycle.ends_moving
-    count = 1 if moving else int(cycles)
+    count = 1 if cycle.ends_moving else int(cycles)
     reference = None if base is None else as_machine(base, "base")
     still = STILL * float((reference or machine).mean_torque)
     executed, points = list[StepRun](), list[list[Matrix]]()
-    runner: DutyCycle | None = None
-    for k in range(count):
-        for j, (index, step) in enumerate(steps):
-            last = moving and j == len(steps) - 1
-            if runner is None:  # an unknown position is tried from each side
-                tried = [DutyCycle(one, ready, design, stop_by) for one in machine.positions.values()]
-                done = [_carry_out(one, step, index, 0, last, still) for one in tried]
-                hardest = max(range(len(done)), key=lambda i: done[i][0].peak_torque)
-                runner, (ran, turns) = tried[hardest], done[hardest]
-                ran = _worst_of(ran, [one for one, _ in done])
-            else:
-                ran, turns = _carry_out(runner, step, index, k, last, still)
-            executed.append(ran if k < KEPT_CYCLES else replace(ran, phases=()))
-            if k > 0 or count == 1:
-                points.append(turns)
+    for ran, turns in carried_out(machine, ready, design, cycle, stop_by, count, still):
+        executed.append(ran if ran.cycle <= KEPT_CYCLES else replace(ran, phases=()))
+        if ran.cycle > 1 or count == 1:
+            points.append(turns)
     shafts = range(len(machine.shaft_names))
     whole = tuple(np.concatenate([turns[s] for turns in points]) for s in shafts)
-    return DutyRun(machine, ready, cycle, stop_by, reference, count, not moving, tuple(executed), whole)
+    repeated = not cycle.ends_moving
+    return DutyRun(machine, ready, cycle, stop_by, reference, count, repeated, tuple(executed), whole)
+
+
+def carried_out(
+    machine: Machine, controller: Controller, design: Drive, duty: Duty, stop: str, cycles: int,
+    still: float | None = None,
+) -> Iterator[tuple[StepRun, list[Matrix]]]:  # fmt: skip
+    """Each step of so many cycles as it was carried out, with the turning points of each shaft.
+
+    These are reversals by more than `still`, N m. Without it nothing is recorded: there are no turning points
+    and no energies of impacts, and of the torques of each shaft only the one with the largest |T|.
+    """
+    steps, moving, room = duty.expanded(), duty.ends_moving, 0 if still is None else FIRST_ROWS
+    runner: DutyCycle | None = None
+    for k in range(cycles):
+        for j, (index, step) in enumerate(steps):
+            last = moving and j == len(steps) - 1
+            if runner is not None:
+                yield _carry_out(runner, step, index, k, last, still)
+                continue
+            # an unknown position is tried from each side
+            tried = [DutyCycle(one, controller, design, stop, room) for one in machine.positions.values()]
+            done = [_carry_out(one, step, index, 0, last, still) for one in tried]
+            hardest = max(range(len(done)), key=lambda i: done[i][0].peak_torque)
+            runner, (ran, turns) = tried[hardest], done[hardest]
+            yield _worst_of(ran, [one for one, _ in done]), turns
 
 
 def _carry_out(
-    runner: DutyCycle, step: DutyStep, index: int, cycle: int, last: bool, still: float
+    runner: DutyCycle, step: DutyStep, index: int, cycle: int, last: bool, still: float | None
 ) -> tuple[StepRun, list[Matrix]]:
     """A step, and the turning points of each shaft in it."""
     runner.step, runner.cycle = index, cycle
     anew = step.do == "reverse" and not runner.controller.can_reverse
     phases = runner.carry_out(step, last)
-    shafts = range(runner.rows.count - 1)
-    turns = []
-    for s in shafts:
-        of_phases = [
-            phase.trajectory.turning_points(s, still) + np.array([phase.time, 0.0]) for phase in phases
-        ]
-        turns.append(np.concatenate(of_phases))
+    turns, energies = list[Matrix](), np.full(runner.rows.count - 1, math.nan)
+    largest, smallest = (peaks := _peaks(phases)), peaks
+    if still is not None:
+        shafts = range(runner.rows.count - 1)
+        for s in shafts:
+            of_phases = [
+                phase.trajectory.turning_points(s, still) + np.array([phase.time, 0.0]) for phase in phases
+            ]
+            turns.append(np.concatenate(of_phases))
+        of_impacts = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
+        energies = np.sum(of_impacts, axis=0)
+        # the kernel has located the largest |T|, to the bit as without a record
+        ends = np.array([[turn[:, 1].max(), turn[:, 1].min()] for turn in turns]).T
+        ends = ends.clip(-np.abs(peaks), np.abs(peaks))
+        largest, smallest = np.where(peaks > 0.0, peaks, ends[0]), np.where(peaks < 0.0, peaks, ends[1])
     how = "strategy, anew in the other direction" if anew else "strategy"
     if step.do in ("stop", "jog"):
         how = step.by or runner.stop_by
@@ -356,20 +378,25 @@ def _carry_out(
     notes = first.trajectory.notes
     starts = step.do in ("start", "reverse")
     reached = notes.start_time if runner.regulation is None else notes.settled
-    energies = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
     run = StepRun(
         index + 1, step, cycle + 1, how, begin, end,
         (rests[-1] if rests and step.time is None else end) - begin,
         first.time + float(reached) - begin if starts else math.nan,
         float(sum(phase.travel for phase in phases)),
-        np.array([turn[:, 1].max() for turn in turns]),
-        np.array([turn[:, 1].min() for turn in turns]),
+        largest,
+        smallest,
         int(sum(phase.trajectory.notes.contacts for phase in phases)),
-        np.sum(energies, axis=0),
+        energies,
         np.max([phase.trajectory.shafts["impulse"] for phase in phases], axis=0),
         tuple(phases),
     )  # fmt: skip
     return run, turns
+
+
+def _peaks(phases: Sequence[Phase]) -> Vector:
+    """The torque of each shaft whose |T| is the largest of all phases, N m, signed."""
+    peaks = np.array([phase.trajectory.shafts["peak"] for phase in phases])
+    return peaks[np.abs(peaks).argmax(axis=0), np.arange(peaks.shape[1])]
 
 
 def _worst_of(shown: StepRun, each: Sequence[StepRun]) -> StepRun:

@@ -16,7 +16,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.start.engine import segment_of
 from softstart.start.kernel_input import MAX_EVENTS, PATIENT, SLOW_SHARE, KernelInput, kernel_input
-from softstart.start.status import status_of
+from softstart.start.status import Status, status_of
 from softstart.start.trajectory import FIRST_ROWS, StartRecorder, Trajectory
 
 STANDING = 0.01  # share of the target speed within which a mass stands
@@ -26,11 +26,20 @@ Line = tuple[float, float, float]  # torque, N m, length, s, slope, N m/s
 ZERO: list[Line] = [(0.0, math.inf, 0.0)]
 
 
+class StepError(SimulationError):
+    """A step that cannot be finished, or does not end, and how it ended."""
+
+    def __init__(self, sentence: str, status: Status = Status.NOT_CARRIED_OUT) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
 @dataclass(frozen=True, eq=False)
 class Phase:
     """A part of a step under one torque: what is recorded of it, and where its time and angle begin.
 
-    `time` and `angle` are those of the duty at the zero of the trajectory, s and rad of the load.
+    `time` and `angle` are those of the duty at the zero of the trajectory, s and rad of the load; `begin` is
+    when it begins, s of the duty, `travel` the angle by which the load turns in it, rad at the motor shaft.
     """
 
     what: str
@@ -40,22 +49,13 @@ class Phase:
     angle: float
     trajectory: Trajectory
     rest: float  # since when all masses stand, s of the duty; NaN where this does not end the phase
-
-    @property
-    def begin(self) -> float:
-        """When it begins, s of the duty."""
-        return self.time + float(self.trajectory.states[0, rec.S_START])
+    begin: float
+    travel: float
 
     @property
     def end(self) -> float:
         """When it ends, s of the duty."""
         return self.time + float(self.trajectory.notes.time)
-
-    @property
-    def travel(self) -> float:
-        """The angle by which the load turns in it, rad at the motor shaft."""
-        angles = self.trajectory.states[:, rec.S_PHI]
-        return float(angles[-1] - angles[0])
 
 
 class DutyCycle:
@@ -154,7 +154,7 @@ class DutyCycle:
                 self.time, self.angle = self.time + self.now, self.angle + float(recorder.state.phi)
             recorder.go_on(begins)
         state = recorder.state
-        self.began = float(state.time)
+        self.began, angle = float(state.time), float(state.phi)
         state.sense, state.t_end = self.sense, until
         if self.speed != 0.0:
             state.toward = self.forward
@@ -173,10 +173,13 @@ class DutyCycle:
         state.status = reason
         status = status_of(reason, True, True)
         if not status.finished:
-            raise SimulationError(f"{status.value} {self.where}, {what}.")
+            raise StepError(f"{status.value} {self.where}, {what}.", status)
         slowed = "slow" in fields and math.isnan(state.slow)
         rest = self._rested(self.now < until and not slowed) if state.still > 0.0 else math.nan
-        return Phase(what, self.step, self.cycle, self.time, self.angle, recorder.finished(), rest)
+        return Phase(
+            what, self.step, self.cycle, self.time, self.angle, recorder.finished(), rest,
+            self.time + self.began, float(state.phi) - angle,
+        )  # fmt: skip
 
     def _rested(self, ended: bool) -> float:
         """Since when all masses stand, s of the duty; NaN where one does not, or has not for long enough."""
@@ -209,7 +212,7 @@ class DutyCycle:
         return f"{self.machine.name}, {label_of(self.controller)}, cycle {self.cycle + 1} of the duty"
 
     def _give_up(self, step: DutyStep, why: str) -> NoReturn:
-        raise SimulationError(f'[duty] {self.step + 1}, do = "{step.do}": {why} ({self.where}).')
+        raise StepError(f'[duty] {self.step + 1}, do = "{step.do}": {why} ({self.where}).')
 
     # ---- motion ------------------------------------------------------------------------------------------
 

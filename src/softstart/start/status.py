@@ -17,7 +17,7 @@ class Status(Enum):
     >>> Status.REACHED.success, Status.REACHED.message
     (True, 'The load reached its target speed.')
     >>> [status.name for status in Status if status.finished]
-    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'FAULT', 'NOT_RELEASED']
+    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'FAULT', 'NOT_RELEASED', 'CARRIED_OUT']
     """
 
     REACHED = "The load reached its target speed."
@@ -48,6 +48,8 @@ class Status(Enum):
         "(1 GB) permit, as its fastest motion is too fast for so long a start. Check the units of damping, "
         "stiffness and inertias, or end the run earlier (until)."
     )
+    CARRIED_OUT = "The duty was carried out."
+    NOT_CARRIED_OUT = "The duty was given up: a step cannot be finished, or does not end."
 
     @property
     def finished(self) -> bool:
@@ -56,8 +58,8 @@ class Status(Enum):
 
     @property
     def success(self) -> bool:
-        """Whether the load reached its target speed."""
-        return self is Status.REACHED
+        """Whether the load reached its target speed, or a duty was carried out."""
+        return self in (Status.REACHED, Status.CARRIED_OUT)
 
     @property
     def message(self) -> str:
@@ -65,9 +67,8 @@ class Status(Enum):
         return self.value
 
 
-_FINISHED = frozenset(
-    {Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED, Status.FAULT}
-)
+_RUN = {Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED, Status.FAULT}
+_FINISHED = frozenset(_RUN | {Status.CARRIED_OUT})
 _BROKEN = {
     rec.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
     rec.NOT_LOCATED: Status.NOT_LOCATED,
