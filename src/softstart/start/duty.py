@@ -295,29 +295,52 @@ def run_duty(
     """
     machine = as_machine(drive)
     strategy = as_controller(controller, parameters)
+    cycle = duty_of(machine, duty)
+    if isinstance(cycles, bool) or not isinstance(cycles, Integral) or cycles < 1:
+        raise InputError(f"cycles = {cycles}: the number of cycles is a whole number of 1 or more.")
+    ready, design = strategy.set_up((as_machine(fitted_to) if fitted_to else machine).design_drive)
+    stop_by = checked_stop(machine, ready, design, cycle, stop)
+    count = 1 if cycle.ends_moving else int(cycles)
+    reference = None if base is None else as_machine(base, "base")
+    return duty_run(machine, ready, design, cycle, stop_by, count, reference)
+
+
+def duty_of(machine: Machine, duty: Duty | str | None) -> Duty:
+    """The duty that is given, by itself or by its file, or that of the machine."""
     cycle = machine.duty if duty is None else duty if isinstance(duty, Duty) else Duty.load(duty)
     if cycle is None:
         raise InputError(
             f"duty is missing: {machine.name} has no [[duty]]; add one to its file, or give one of its own."
         )
-    if isinstance(cycles, bool) or not isinstance(cycles, Integral) or cycles < 1:
-        raise InputError(f"cycles = {cycles}: the number of cycles is a whole number of 1 or more.")
-    ready, design = strategy.set_up((as_machine(fitted_to) if fitted_to else machine).design_drive)
-    holds = ready.regulation(design) is not None
-    check_duty(machine, cycle, stop, ready.can_stop, ready.can_reverse, holds, label_of(ready))
-    stop_by = way_of_stop(DutyStep("stop"), machine, stop, ready.can_stop)
-    count = 1 if cycle.ends_moving else int(cycles)
-    reference = None if base is None else as_machine(base, "base")
-    still = STILL * float((reference or machine).mean_torque)
+    return cycle
+
+
+def checked_stop(
+    machine: Machine, controller: Controller, design: Drive, duty: Duty, stop: str | None
+) -> str:
+    """How steps stop that do not say it; InputError for a duty that the machine or strategy cannot do."""
+    holds = controller.regulation(design) is not None
+    check_duty(
+        machine, duty, stop, controller.can_stop, controller.can_reverse, holds, label_of(controller)
+    )
+    return way_of_stop(DutyStep("stop"), machine, stop, controller.can_stop)
+
+
+def duty_run(
+    machine: Machine, controller: Controller, design: Drive, duty: Duty, stop: str, count: int,
+    base: Machine | None = None,
+) -> DutyRun:  # fmt: skip
+    """So many cycles of a duty that has been checked, under a controller that is set up, recorded."""
+    still = STILL * float((base or machine).mean_torque)
     executed, points = list[StepRun](), list[list[Matrix]]()
-    for ran, turns in carried_out(machine, ready, design, cycle, stop_by, count, still):
+    for ran, turns in carried_out(machine, controller, design, duty, stop, count, still):
         executed.append(ran if ran.cycle <= KEPT_CYCLES else replace(ran, phases=()))
         if ran.cycle > 1 or count == 1:
             points.append(turns)
     shafts = range(len(machine.shaft_names))
     whole = tuple(np.concatenate([turns[s] for turns in points]) for s in shafts)
-    repeated = not cycle.ends_moving
-    return DutyRun(machine, ready, cycle, stop_by, reference, count, repeated, tuple(executed), whole)
+    repeated = not duty.ends_moving
+    return DutyRun(machine, controller, duty, stop, base, count, repeated, tuple(executed), whole)
 
 
 def carried_out(
