@@ -320,9 +320,7 @@ def checked_stop(
 ) -> str:
     """How steps stop that do not say it; InputError for a duty that the machine or strategy cannot do."""
     holds = controller.regulation(design) is not None
-    check_duty(
-        machine, duty, stop, controller.can_stop, controller.can_reverse, holds, label_of(controller)
-    )
+    check_duty(machine, duty, stop, controller.can_stop, controller.can_reverse, holds, label_of(controller))
     return way_of_stop(DutyStep("stop"), machine, stop, controller.can_stop)
 
 
