@@ -65,8 +65,8 @@ class PhaseOracle(ChainOracle):
         self.y, self.form, self.size = duty.y.copy(), [*duty.form], duty.size
         self.side, self.sign = duty.side.copy(), duty.sign.copy()
         self.direction = np.where(self.rubs, np.sign(speeds), 1.0)
-        if lock:
-            self.direction[given.motor] = 0.0
+        if lock:  # on a motor that stands, but for the band of a stop
+            self.direction[given.motor] = self.y[self.n - 1 + given.motor] = 0.0
         self.highest, self.lowest = np.full(self.n - 1, -math.inf), np.full(self.n - 1, math.inf)
         self.since = duty.since - duty.time
         if self.place.any() or not duty.watched:

@@ -1,0 +1,300 @@
+"""Random duties of drives and chains as plain numbers, and what each of their steps is to the oracle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigvalsh
+from tests.duty_oracle import DutyOracle, PhaseEnd, Until
+from tests.oracle import Given
+
+
+@dataclass
+class Case:
+    """A machine, the torque of its starts forwards, and the steps of one cycle."""
+
+    given: Given
+    torque: float  # starting torque
+    braking: float  # size of the smallest torque
+    lag: float
+    rate: float
+    target: float
+    pieces: list[Any]  # of a start: (instant, torque, slope)
+    steps: list[dict[str, Any]]
+    brake: float = 0.0  # friction; infinite for a lock, 0 without a brake
+    closing: float = 0.0
+    opening: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """Of the first natural frequency with all gaps closed."""
+        g = self.given
+        n, K = g.J.size, np.zeros((g.J.size, g.J.size))
+        for k, c in enumerate(g.c):
+            K[k : k + 2, k : k + 2] += c * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return float(2 * math.pi / math.sqrt(eigvalsh(K, np.diag(g.J))[1])) if n > 1 else 0.0
+
+
+@dataclass
+class Step:
+    """What became of a step: its phases, the last of which is at its end."""
+
+    do: str
+    phases: list[PhaseEnd]
+
+    @property
+    def end(self) -> PhaseEnd:
+        return self.phases[-1]
+
+    @property
+    def highest(self) -> np.ndarray:
+        return np.max([one.highest for one in self.phases], axis=0)
+
+    @property
+    def lowest(self) -> np.ndarray:
+        return np.min([one.lowest for one in self.phases], axis=0)
+
+
+class Player:
+    """A cycle of a case on the oracle, step by step."""
+
+    def __init__(self, case: Case, **fields: Any):
+        self.case, self.period = case, case.period
+        self.oracle = DutyOracle(
+            case.given, case.lag, case.rate, band=0.01 * case.target, speed=case.target,
+            longest=400.0 * self.period, **fields,
+        )  # fmt: skip
+        self.speed = 0.0  # commanded; 0 at standstill
+
+    def cycle(self) -> list[Step]:
+        return [self.step(**step) for step in self.case.steps]
+
+    def step(self, do: str, **given: Any) -> Step:
+        first = len(self.oracle.ends)
+        getattr(self, do)(**given)
+        return Step(do, self.oracle.ends[first:])
+
+    def start(self, set_speed: float = math.nan, time: float = math.inf) -> None:
+        """The torque of the start, until the load has its speed; of a jog then on to its time.
+
+        A brake holds the motor fast until it is open.
+        """
+        o, case, speed = self.oracle, self.case, self.case.target if math.isnan(set_speed) else set_speed
+        stood, self.speed = self.speed == 0.0, speed
+        torque: Any = [(t, *(self.way * one for one in rest)) for t, *rest in case.pieces]
+        begin = o.time
+        if stood and case.brake > 0.0 and case.opening > 0.0:
+            o.brake = math.inf
+            o.phase(Until("time", case.opening), torque=torque)
+            torque = None
+        o.brake = 0.0
+        reaches = Until("load", speed, self.way)
+        end = o.phase(reaches, *within(begin + time - o.time), torque=torque)
+        if end.reason == "load" and time < math.inf:
+            self.keep(Until("time", begin + time - o.time))
+
+    def reverse(self, set_speed: float = math.nan) -> None:
+        self.start(-self.speed if math.isnan(set_speed) else set_speed)
+
+    @property
+    def way(self) -> float:
+        """The direction of the command."""
+        return math.copysign(1.0, self.speed)
+
+    def keep(self, *until: Until) -> None:
+        """In a line, over one elastic period, to the torque under which all masses keep the set speed."""
+        g, o, period = self.oracle.given, self.oracle, self.period
+        holds = float(g.pull.sum() + self.way * np.sum(g.hold) + self.speed * g.ground.sum())
+        o.phase(*until, torque=[(0.0, o.limited, (holds - o.limited) / period), (period, holds)])
+
+    def hold(self, time: float = math.inf, angle: float = 0.0) -> None:
+        """Go on at the torque that holds the load; at standstill a pause without torque."""
+        if self.speed == 0.0:
+            self.oracle.phase(Until("time", time), torque=REST)
+        else:
+            self.keep(*([Until("angle", self.way * angle, self.way)] if angle else within(time)))
+
+    def jog(self, time: float, set_speed: float = math.nan, repeat: int = 1, **stop: Any) -> None:
+        for _ in range(repeat):
+            self.start(set_speed, time)
+            self.stop(**stop)
+
+    def brake(self) -> None:
+        self.stop(by="brake")
+
+    def stop(
+        self,
+        by: str,
+        braking_torque: float = math.nan,
+        brake_speed: float = 0.0,
+        brake_time: float = math.nan,
+    ) -> None:
+        """Braking torque until the motor stands, or none; then the brake closes, and all come to rest."""
+        o, braked = self.oracle, self.case.brake > 0.0
+        size = self.case.braking if math.isnan(braking_torque) else braking_torque
+        torque = [(0.0, -self.way * size)] if by == "torque" else REST
+        slows = by == "torque" or (by == "coast" and braked) or brake_speed > 0.0
+        if not math.isnan(brake_time):
+            if brake_time > 0.0:
+                o.phase(Until("time", brake_time), torque=torque)
+        elif slows and self.way * o.y[o.n - 1 + o.given.motor] > brake_speed:
+            o.phase(Until("motor", self.way * brake_speed, -self.way), torque=torque)
+        if braked:
+            if self.case.closing > 0.0:
+                o.phase(Until("time", self.case.closing), torque=REST)
+            o.brake = self.case.brake
+        self.rest()
+
+    def rest(self) -> None:
+        """Without torque until all masses have stood for one elastic period."""
+        self.oracle.watch()
+        self.oracle.phase(Until("stand", self.period), torque=REST)
+        self.oracle.watch(False)
+        self.speed = 0.0
+
+    def load(self, mass: int = -1, **changes: float) -> None:
+        self.oracle.load(mass, **changes)
+        self.rest()
+
+
+REST = [(0.0, 0.0)]  # no torque
+
+
+def within(time: float) -> list[Until]:
+    return [Until("time", time)] if time < math.inf else []
+
+
+# ---- random cases ---------------------------------------------------------------------------------------
+
+
+def decades(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+
+def random_drive(seed: int) -> Case:
+    """A damped drive on duty: a few contacts in each step, so that errors of the oracle do not grow."""
+    rng = np.random.default_rng([50, seed])
+    J1 = decades(rng, 1e-2, 1.0)
+    J2, period, twist = J1 * decades(rng, 0.5, 10.0), decades(rng, 0.02, 0.2), decades(rng, 0.01, 0.3)
+    reduced = J1 * J2 / (J1 + J2)
+    c = reduced * (2 * math.pi / period) ** 2
+    Ms = c * twist
+    given = masses(rng, np.array([J1, J2]), np.array([c]), Ms, period)
+    given.d[0] = 2 * float(rng.uniform(0.05, 0.4)) * math.sqrt(c * reduced)
+    return on_duty(rng, given, Ms, period)
+
+
+def random_chain(seed: int) -> Case:
+    """A damped chain of three or four masses on duty."""
+    rng = np.random.default_rng([51, seed])
+    count = int(rng.integers(3, 5))
+    J, c = 10 ** rng.uniform(-1.0, 0.3, count), 10 ** rng.uniform(2.5, 3.5, count - 1)
+    Ms = float(rng.uniform(0.05, 0.2) * c.min())
+    given = masses(rng, J, c, Ms, 0.0)
+    given.d[:] = 2 * rng.uniform(0.1, 0.4, count - 1) * np.sqrt(c * J[:-1] * J[1:] / (J[:-1] + J[1:]))
+    case = Case(given, 1.0, 1.0, 0.0, math.inf, 1.0, [], [])
+    return on_duty(rng, given, Ms, case.period)
+
+
+def masses(rng: np.random.Generator, J: np.ndarray, c: np.ndarray, Ms: float, period: float) -> Given:
+    """Masses at rest; the torque of the load is active or not, all have some friction."""
+    count, active = J.size, rng.random() < 0.4
+    gap = Ms / c * 10 ** rng.uniform(-1.0, 0.7, count - 1)
+    if count > 2:
+        gap *= rng.random(count - 1) < 0.6
+    Mc, friction = np.zeros(count), np.zeros(count)
+    Mc[-1] = Ms * float(rng.uniform(0.1, 0.5))
+    friction[0] = Ms * float(rng.uniform(0.02, 0.1))
+    friction[-1] = Ms * float(rng.uniform(0.0, 0.15)) if rng.random() < 0.5 else 0.0
+    rate = Ms / J.sum() if period == 0.0 else 1.0 / period
+    ground = J * rate * 10 ** rng.uniform(-4, -2, count) * (rng.random(count) < 0.5)
+    law = [str(rng.choice(["no-pull", "dead-zone", "modelica"])) for _ in c]
+    return Given(
+        J=J, Mc=Mc, reactive=np.array([False] * (count - 1) + [not active]), w0=np.zeros(count), c=c,
+        d=np.zeros(count - 1), gap=gap, law=law, theta0=0.5 * gap + (Mc[-1] / c if active else 0.0),
+        ground=ground, tones=[], restitution=np.full(count - 1, math.nan), motor=0, friction=friction,
+    )  # fmt: skip
+
+
+def on_duty(rng: np.random.Generator, given: Given, Ms: float, period: float) -> Case:
+    """The machine with a motor, a brake where its load is active or by chance, and a cycle of steps."""
+    active, Mc = not given.reactive[-1], float(given.Mc[-1])
+    held = float(given.hold.sum() + given.pull.sum())
+    target = (Ms - held) / float(given.J.sum()) * period * float(rng.uniform(1.5, 4.0))
+    brake = 0.0
+    if active or rng.random() < 0.3:
+        brake = math.inf if rng.random() < 0.3 else 1.3 * Mc + Ms * float(rng.uniform(0.1, 0.8))
+    delays = rng.uniform(0.0, 0.6, 2) * period * (rng.random(2) < 0.7)
+    steps = [step for part in cycle(rng, active, brake, target, period) for step in part]
+    for step in steps:
+        if step["do"] == "load":
+            step["Mc"] = Mc * float(rng.uniform(0.3, 1.2))
+            step["J"] = float(given.J[-1]) * decades(rng, 0.5, 2.0)
+            if not active and rng.random() < 0.4:
+                step["friction"] = Mc * float(rng.uniform(0.0, 0.3))
+    pieces: list[Any] = [(0.0, Ms)]
+    if rng.random() < 0.6:
+        first, t = float(rng.uniform(0.5, 0.9)) * Ms, float(rng.uniform(0.5, 2.0)) * period
+        pieces = [(0.0, first, (Ms - first) / t), (t, Ms)] if rng.random() < 0.5 else [(0.0, first), (t, Ms)]
+    return Case(
+        given, Ms, max(float(rng.uniform(0.4, 1.0)) * Ms, 1.3 * Mc if active else 0.0),
+        0.0 if rng.random() < 0.5 else period * decades(rng, 0.02, 0.2),
+        math.inf if rng.random() < 0.5 else Ms / (period * decades(rng, 0.05, 0.5)),
+        target, pieces, steps, brake, 0.0 if math.isinf(brake) else float(delays[0]), float(delays[1]),
+    )  # fmt: skip
+
+
+def cycle(rng: np.random.Generator, active: bool, brake: float, target: float, period: float) -> list[Any]:
+    """Parts of a cycle that return to rest: lists of steps, in some order."""
+
+    def stop(forwards: bool) -> dict[str, Any]:
+        """A stop that the machine can make: an active load that is let down does not coast."""
+        choices = ["torque"] + ["coast"] * (forwards or not active) + ["brake"] * (0 < brake < math.inf)
+        by = str(rng.choice(choices))
+        stop: dict[str, Any] = {"by": by}
+        if by == "brake":
+            stop |= (
+                {"brake_time": float(rng.uniform(0.0, 1.0)) * period}
+                if rng.random() < 0.5 or (active and not forwards)
+                else {"brake_speed": float(rng.uniform(0.2, 0.9)) * target}
+            )
+        return stop
+
+    def speed(way: float) -> dict[str, float]:
+        return (
+            {}
+            if way > 0 and rng.random() < 0.5
+            else {"set_speed": way * target * float(rng.uniform(0.5, 1.0))}
+        )
+
+    def hold() -> dict[str, Any]:
+        if rng.random() < 0.5:
+            return {"do": "hold", "time": float(rng.uniform(0.3, 2.0)) * period}
+        return {"do": "hold", "angle": float(rng.uniform(0.3, 2.0)) * period * target}
+
+    def run(way: float) -> list[dict[str, Any]]:
+        return [{"do": "start", **speed(way)}, hold(), {"do": "stop", **stop(way > 0)}]
+
+    def turn() -> list[dict[str, Any]]:
+        return [
+            {"do": "start"}, hold(), {"do": "reverse", "set_speed": -0.8 * target}, hold(),
+            {"do": "stop", **stop(False)},
+        ]  # fmt: skip
+
+    def jog(way: float) -> list[dict[str, Any]]:
+        time = float(rng.uniform(0.7, 1.5)) * period
+        jogs = {"do": "jog", "time": time, "set_speed": way * target, "repeat": int(rng.integers(1, 3))}
+        return [{**jogs, **stop(way > 0)}]
+
+    load = [{"do": "load"}]
+    pause = [{"do": "hold", "time": float(rng.uniform(0.5, 2.0)) * period}]
+    several = [
+        [run(1.0), load, run(-1.0)],
+        [turn(), pause, jog(1.0)],
+        [run(1.0), jog(-1.0), load, jog(1.0)],
+        [jog(1.0), run(-1.0), pause, run(1.0)],
+    ]
+    return several[int(rng.integers(len(several)))]
