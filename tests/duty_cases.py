@@ -12,6 +12,14 @@ from tests.duty_oracle import DutyOracle, PhaseEnd, Until
 from tests.oracle import Given
 
 
+def elastic_period(g: Given) -> float:
+    """Of the first natural frequency with all gaps closed."""
+    K = np.zeros((g.J.size, g.J.size))
+    for k, c in enumerate(g.c):
+        K[k : k + 2, k : k + 2] += c * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return float(2 * math.pi / math.sqrt(eigvalsh(K, np.diag(g.J))[1]))
+
+
 @dataclass
 class Case:
     """A machine, the torque of its starts forwards, and the steps of one cycle."""
@@ -29,13 +37,12 @@ class Case:
     opening: float = 0.0
 
     @property
-    def period(self) -> float:
-        """Of the first natural frequency with all gaps closed."""
-        g = self.given
-        n, K = g.J.size, np.zeros((g.J.size, g.J.size))
-        for k, c in enumerate(g.c):
-            K[k : k + 2, k : k + 2] += c * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        return float(2 * math.pi / math.sqrt(eigvalsh(K, np.diag(g.J))[1])) if n > 1 else 0.0
+    def repeated(self) -> list[tuple[dict[str, Any], int]]:
+        """The steps without `repeat`, and how often each is carried out in a row."""
+        return [
+            ({key: value for key, value in step.items() if key != "repeat"}, step.get("repeat", 1))
+            for step in self.steps
+        ]
 
 
 @dataclass
@@ -62,15 +69,16 @@ class Player:
     """A cycle of a case on the oracle, step by step."""
 
     def __init__(self, case: Case, **fields: Any):
-        self.case, self.period = case, case.period
+        self.case = case
         self.oracle = DutyOracle(
             case.given, case.lag, case.rate, band=0.01 * case.target, speed=case.target,
-            longest=400.0 * self.period, **fields,
+            longest=400.0 * elastic_period(case.given), **fields,
         )  # fmt: skip
         self.speed = 0.0  # commanded; 0 at standstill
 
     def cycle(self) -> list[Step]:
-        return [self.step(**step) for step in self.case.steps]
+        """All steps, a jog that is repeated as so many."""
+        return [self.step(**step) for step, times in self.case.repeated for _ in range(times)]
 
     def step(self, do: str, **given: Any) -> Step:
         first = len(self.oracle.ends)
@@ -100,6 +108,11 @@ class Player:
         self.start(-self.speed if math.isnan(set_speed) else set_speed)
 
     @property
+    def period(self) -> float:
+        """With the load as it is now."""
+        return elastic_period(self.oracle.given)
+
+    @property
     def way(self) -> float:
         """The direction of the command."""
         return math.copysign(1.0, self.speed)
@@ -117,10 +130,9 @@ class Player:
         else:
             self.keep(*([Until("angle", self.way * angle, self.way)] if angle else within(time)))
 
-    def jog(self, time: float, set_speed: float = math.nan, repeat: int = 1, **stop: Any) -> None:
-        for _ in range(repeat):
-            self.start(set_speed, time)
-            self.stop(**stop)
+    def jog(self, time: float, set_speed: float = math.nan, **stop: Any) -> None:
+        self.start(set_speed, time)
+        self.stop(**stop)
 
     def brake(self) -> None:
         self.stop(by="brake")
@@ -133,15 +145,16 @@ class Player:
         brake_time: float = math.nan,
     ) -> None:
         """Braking torque until the motor stands, or none; then the brake closes, and all come to rest."""
-        o, braked = self.oracle, self.case.brake > 0.0
+        o, braked, stands = self.oracle, self.case.brake > 0.0, Until("stand", self.period)
+        o.watch()
         size = self.case.braking if math.isnan(braking_torque) else braking_torque
         torque = [(0.0, -self.way * size)] if by == "torque" else REST
         slows = by == "torque" or (by == "coast" and braked) or brake_speed > 0.0
         if not math.isnan(brake_time):
             if brake_time > 0.0:
-                o.phase(Until("time", brake_time), torque=torque)
+                o.phase(Until("time", brake_time), stands, torque=torque)
         elif slows and self.way * o.y[o.n - 1 + o.given.motor] > brake_speed:
-            o.phase(Until("motor", self.way * brake_speed, -self.way), torque=torque)
+            o.phase(Until("motor", self.way * brake_speed, -self.way), stands, torque=torque)
         if braked:
             if self.case.closing > 0.0:
                 o.phase(Until("time", self.case.closing), torque=REST)
@@ -150,13 +163,13 @@ class Player:
 
     def rest(self) -> None:
         """Without torque until all masses have stood for one elastic period."""
-        self.oracle.watch()
         self.oracle.phase(Until("stand", self.period), torque=REST)
         self.oracle.watch(False)
         self.speed = 0.0
 
     def load(self, mass: int = -1, **changes: float) -> None:
         self.oracle.load(mass, **changes)
+        self.oracle.watch()
         self.rest()
 
 
@@ -195,12 +208,11 @@ def random_chain(seed: int) -> Case:
     Ms = float(rng.uniform(0.05, 0.2) * c.min())
     given = masses(rng, J, c, Ms, 0.0)
     given.d[:] = 2 * rng.uniform(0.1, 0.4, count - 1) * np.sqrt(c * J[:-1] * J[1:] / (J[:-1] + J[1:]))
-    case = Case(given, 1.0, 1.0, 0.0, math.inf, 1.0, [], [])
-    return on_duty(rng, given, Ms, case.period)
+    return on_duty(rng, given, Ms, elastic_period(given))
 
 
 def masses(rng: np.random.Generator, J: np.ndarray, c: np.ndarray, Ms: float, period: float) -> Given:
-    """Masses at rest; the torque of the load is active or not, all have some friction."""
+    """Masses at rest; an active load hangs, another one is anywhere in its gap; all have some friction."""
     count, active = J.size, rng.random() < 0.4
     gap = Ms / c * 10 ** rng.uniform(-1.0, 0.7, count - 1)
     if count > 2:
@@ -212,10 +224,12 @@ def masses(rng: np.random.Generator, J: np.ndarray, c: np.ndarray, Ms: float, pe
     rate = Ms / J.sum() if period == 0.0 else 1.0 / period
     ground = J * rate * 10 ** rng.uniform(-4, -2, count) * (rng.random(count) < 0.5)
     law = [str(rng.choice(["no-pull", "dead-zone", "modelica"])) for _ in c]
+    reactive = np.array([False] * (count - 1) + [not active])
+    theta0 = 0.5 * gap + Mc[-1] / c if active else gap * rng.uniform(-0.45, 0.45, count - 1)
     return Given(
-        J=J, Mc=Mc, reactive=np.array([False] * (count - 1) + [not active]), w0=np.zeros(count), c=c,
-        d=np.zeros(count - 1), gap=gap, law=law, theta0=0.5 * gap + (Mc[-1] / c if active else 0.0),
-        ground=ground, tones=[], restitution=np.full(count - 1, math.nan), motor=0, friction=friction,
+        J=J, Mc=Mc, reactive=reactive, w0=np.zeros(count), c=c, d=np.zeros(count - 1), gap=gap, law=law,
+        theta0=theta0, ground=ground, tones=[], restitution=np.full(count - 1, math.nan), motor=0,
+        friction=friction,
     )  # fmt: skip
 
 
@@ -227,7 +241,9 @@ def on_duty(rng: np.random.Generator, given: Given, Ms: float, period: float) ->
     brake = 0.0
     if active or rng.random() < 0.3:
         brake = math.inf if rng.random() < 0.3 else 1.3 * Mc + Ms * float(rng.uniform(0.1, 0.8))
-    delays = rng.uniform(0.0, 0.6, 2) * period * (rng.random(2) < 0.7)
+    closing, opening = rng.uniform(0.05, 0.6, 2) * period * (rng.random(2) < 0.7)
+    if math.isinf(brake):  # it closes at standstill
+        closing, opening = 0.0, 0.3 * period
     steps = [step for part in cycle(rng, active, brake, target, period) for step in part]
     for step in steps:
         if step["do"] == "load":
@@ -243,7 +259,7 @@ def on_duty(rng: np.random.Generator, given: Given, Ms: float, period: float) ->
         given, Ms, max(float(rng.uniform(0.4, 1.0)) * Ms, 1.3 * Mc if active else 0.0),
         0.0 if rng.random() < 0.5 else period * decades(rng, 0.02, 0.2),
         math.inf if rng.random() < 0.5 else Ms / (period * decades(rng, 0.05, 0.5)),
-        target, pieces, steps, brake, 0.0 if math.isinf(brake) else float(delays[0]), float(delays[1]),
+        target, pieces, steps, brake, float(closing), float(opening),
     )  # fmt: skip
 
 

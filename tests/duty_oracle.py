@@ -25,7 +25,7 @@ class Until(NamedTuple):
     load      speed of the load             +1 it rises to it, -1 it falls to it
     motor     speed of the motor            +1 it rises to it, -1 it falls to it
     angle     travel of the load, rad       sign of the travel
-    stand     s for which all masses have been in the band
+    stand     s of the phase for which all masses have been in the band
     proved    0                             sign of the motor torque that carries the shaft torque
     """
 
@@ -79,7 +79,8 @@ class PhaseOracle(ChainOracle):
         """When time ends the phase."""
         limits = [one.value for one in self.until if one.kind == "time"]
         if not math.isnan(self.since):
-            limits += [self.since + one.value for one in self.until if one.kind == "stand"]
+            stands = max(self.since, 0.0)
+            limits += [stands + one.value for one in self.until if one.kind == "stand"]
         self.latest = min([self.path.t_end, *limits])
 
     def rows(self) -> Any:
