@@ -245,6 +245,8 @@ def on_duty(rng: np.random.Generator, given: Given, Ms: float, period: float) ->
     if math.isinf(brake):  # it closes at standstill
         closing, opening = 0.0, 0.3 * period
     steps = [step for part in cycle(rng, active, brake, target, period) for step in part]
+    if math.isinf(brake) and any(step["do"] == "jog" for step in steps):
+        brake = 1.3 * Mc + 0.4 * Ms  # a lock cannot close where the motor has rebounded at the end of a jog
     for step in steps:
         if step["do"] == "load":
             step["Mc"] = Mc * float(rng.uniform(0.3, 1.2))
