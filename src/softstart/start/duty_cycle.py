@@ -20,6 +20,7 @@ from softstart.start.status import Status, status_of
 from softstart.start.trajectory import FIRST_ROWS, StartRecorder, Trajectory
 
 STANDING = 0.01  # share of the target speed within which a mass stands
+HELD = 1e-9  # share of it that is left of the speed of a motor that a brake holds
 NEVER_RELEASED = 1e300  # s
 Go = Callable[[], int]  # goes on to the end that is set, and returns why it came back
 Line = tuple[float, float, float]  # torque, N m, length, s, slope, N m/s
@@ -91,6 +92,11 @@ class DutyCycle:
     def patience(self) -> float:
         """How long a step may take that ends by itself, s."""
         return float(self.rows.machine.time_limit)
+
+    @property
+    def motor_speed(self) -> float:
+        """The speed of the motor, rad/s."""
+        return float(self.recorder.state.w[int(self.rows.machine.motor)])
 
     @property
     def braked(self) -> bool:
@@ -348,8 +354,7 @@ class DutyCycle:
         slow = 0.0 if step.brake_speed is None else step.brake_speed
         timed = step.brake_time is not None
         slows = not timed and (by == "torque" or (by == "coast" and self.braked) or slow > 0.0)
-        motor_speed = self.forward * float(self.recorder.state.w[int(self.rows.machine.motor)])
-        if timed or (slows and motor_speed > slow):
+        if timed or (slows and self.forward * self.motor_speed > slow):
             until = command + (self.patience if step.brake_time is None else step.brake_time)
             yield self.phase("stop", go, until, fields=stopping | ({} if timed else {"slow": slow}))
             if slows and not math.isnan(self.recorder.state.slow) and self.now >= until:
@@ -360,6 +365,7 @@ class DutyCycle:
         yield from self._rest(step, command, time, {} if stopped else stopping)
         if self.braked and not self.closed:
             yield from self._close(step)
+            yield from self._motor_stands(step)
 
     def _watched(self, dwell: float | None = None) -> dict[str, float]:
         """That a phase ends once all masses have stood for an elastic period, or are watched only."""
@@ -371,11 +377,19 @@ class DutyCycle:
         if self.machine.closing_delay > 0.0:
             until, fields = self.now + self.machine.closing_delay, self._watched(math.inf)
             yield self.phase("brake closes", self.go or ZERO, until, fields=fields)
-        state = self.recorder.state
-        speed = abs(float(state.w[int(self.rows.machine.motor)]))
-        if math.isinf(self.machine.brake_torque) and speed > STANDING * self.target:
-            self._give_up(step, "the motor moves when its brake closes; give brake.torque")
+        if math.isinf(self.machine.brake_torque):
+            yield from self._motor_stands(step)
         self.closed, self.go = True, None
+
+    def _motor_stands(self, step: DutyStep) -> Iterator[Phase]:
+        """On to the next standstill of the motor, if it moves: where a brake locks, or friction holds it."""
+        speed, still = self.motor_speed, HELD * self.target
+        if abs(speed) > still:
+            until, toward = self.now + self.patience, math.copysign(1.0, speed)
+            fields = {**self._watched(math.inf), "slow": still, "toward": toward}
+            yield self.phase("motor stands", self.go or ZERO, until, fields=fields)
+            if not math.isnan(self.recorder.state.slow):
+                self._give_up(step, f"the motor does not come to a standstill within {self.patience:.4g} s")
 
     def _rest(
         self, step: DutyStep, command: float, time: float | None, fields: Mapping[str, float] = {}
@@ -391,6 +405,8 @@ class DutyCycle:
                 "the motor a friction or a brake, or the step a time",
             )
         self.speed = 0.0
+        if time is None and self.closed and math.isfinite(self.machine.brake_torque):
+            yield from self._motor_stands(step)
         if time is not None and self.now < until:
             yield self.phase("pause", self.go or ZERO, until)
 
