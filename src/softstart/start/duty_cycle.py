@@ -348,19 +348,25 @@ class DutyCycle:
         elif self.go is None:  # it has handed over
             self._give_up(step, f"{label_of(self.controller)} is not in command")
         self.since = np.full(self.rows.count, math.nan)
-        stopping = self._watched() | ({"run": 0.0, "command_since": command} if by == "strategy" else {})
+        stopping = self._watched(math.inf) | (
+            {"run": 0.0, "command_since": command} if by == "strategy" else {}
+        )
         torque = -float(step.braking_torque or -self.machine.motor.minimum_torque) if by == "torque" else 0.0
         go: Go | list[Line] = self.go or [(torque, math.inf, 0.0)]
-        slow = 0.0 if step.brake_speed is None else step.brake_speed
+        slow, still = 0.0 if step.brake_speed is None else step.brake_speed, STANDING * self.target
         timed = step.brake_time is not None
         slows = not timed and (by == "torque" or (by == "coast" and self.braked) or slow > 0.0)
         if timed or (slows and self.forward * self.motor_speed > slow):
             until = command + (self.patience if step.brake_time is None else step.brake_time)
-            yield self.phase("stop", go, until, fields=stopping | ({} if timed else {"slow": slow}))
-            if slows and not math.isnan(self.recorder.state.slow) and self.now >= until:
+            until = min(until, math.inf if time is None else command + time)
+            if slows:
+                stopping["slow"] = slow if abs(holding_torque(self.rows, 0.0)) > 0.0 else max(slow, still)
+            yield self.phase("stop", go, until, fields=stopping)
+            if slows and not math.isnan(self.recorder.state.slow) and time is None:
                 self._give_up(step, f"the motor does not come to a standstill within {self.patience:.4g} s")
         stopped = timed or slows or by == "brake"
-        if stopped and self.braked:
+        over = time is not None and self.now >= command + time
+        if stopped and self.braked and not over:
             yield from self._close(step)
         yield from self._rest(step, command, time, {} if stopped else stopping)
         if self.braked and not self.closed:
@@ -389,7 +395,11 @@ class DutyCycle:
             fields = {**self._watched(math.inf), "slow": still, "toward": toward}
             yield self.phase("motor stands", self.go or ZERO, until, fields=fields)
             if not math.isnan(self.recorder.state.slow):
-                self._give_up(step, f"the motor does not come to a standstill within {self.patience:.4g} s")
+                self._give_up(
+                    step,
+                    f"the motor does not come to a standstill within {self.patience:.4g} s, at which its brake "
+                    "could lock; give brake.torque",
+                )
 
     def _rest(
         self, step: DutyStep, command: float, time: float | None, fields: Mapping[str, float] = {}
