@@ -397,8 +397,8 @@ class DutyCycle:
             if not math.isnan(self.recorder.state.slow):
                 self._give_up(
                     step,
-                    f"the motor does not come to a standstill within {self.patience:.4g} s, at which its brake "
-                    "could lock; give brake.torque",
+                    f"the motor does not come to a standstill within {self.patience:.4g} s, at which its "
+                    "brake could lock; give brake.torque",
                 )
 
     def _rest(
