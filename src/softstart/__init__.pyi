@@ -57,6 +57,8 @@ from softstart.start.comparison import Comparison as Comparison
 from softstart.start.comparison import compare as compare
 from softstart.start.duty import DutyRun as DutyRun
 from softstart.start.duty import run_duty as run_duty
+from softstart.start.duty_comparison import DutyComparison as DutyComparison
+from softstart.start.duty_comparison import compare_duty as compare_duty
 from softstart.start.fatigue import Fatigue as Fatigue
 from softstart.start.fatigue import fatigue as fatigue
 from softstart.start.run import Run as Run

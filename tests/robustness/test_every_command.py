@@ -31,6 +31,7 @@ COMMANDS = {
     "compare": "compare {}",
     "simulate": "simulate {} --controller direct",
     "fatigue": "fatigue {}",
+    "duty": "duty {} --duty travel-crane --stop torque --controller ramp",
     "linear": "linear {} --controller state-feedback",
     "optimize": "optimize {}",
     "pareto": "pareto {}",

@@ -44,6 +44,7 @@ QUICK = {
     "compare": "compare --controllers direct,ramp",
     "simulate": f"simulate {CRANE} --controller ramp",
     "fatigue": "fatigue --controllers direct,ramp --set damping=1",
+    "duty": "duty conveyor-11kw --duty travel-crane --controller ramp",
     "optimize": "optimize --start-time 1.2x",
     "pareto": "pareto --start-times 1.2x --controllers direct",
     "tune": "tune --controller ramp --gaps 1x --inertias 1x --only robust --restarts 1 --no-optimum",

@@ -21,7 +21,7 @@ PURPOSES = {
     },
     "Strategies": {
         "compare": "starts", "simulate": "starts", "fatigue": "starts", "controllers": "lists",
-        "linear": "starts",
+        "linear": "starts", "duty": "duty",
     },
     "Design": {"optimize": "optimize", "pareto": "optimize", "tune": "tune", "sweep": "sweep"},
     "Results": {"serve": "serve", "report": "report"},

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,20 @@ from softstart.controller.base import Controller, label_of
 from softstart.drive import Drive, Machine
 from softstart.drive.duty import Duty, DutyStep, check_duty, way_of_stop
 from softstart.errors import InputError
+from softstart.kernel import records as rec
 from softstart.results import OneLine, Result
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.duty_cycle import DutyCycle, Phase
+from softstart.start.duty_life import Counted, DutyLife, count_cycles, life_of
 from softstart.start.fatigue import STILL, impact_energies
 from softstart.start.metrics import REFERENCE
+from softstart.start.recommendation import Margin
+from softstart.start.run import named_states, write_columns
 from softstart.start.trajectory import FIRST_ROWS
 
 KEPT_CYCLES = 2  # whose trace is kept
+PLOT_POINTS = 3000
+STILL_IN_TRACE = 1e-4  # of the mean torque: smaller reversals need no instant of the trace
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,12 +177,78 @@ class DutyRun(Result, view="duties.duty_sheet"):
 
     @cached_property
     def rows(self) -> tuple[StepRun, ...]:
-        """Each step of the file as it was carried out with the largest |T|, of all cycles and repetitions."""
-        of_step: dict[int, StepRun] = {}
+        """Each step of the file with its worst figures of all cycles and repetitions.
+
+        Time, angle and phases are of the one with the largest |T|.
+        """
+        of_step: dict[int, list[StepRun]] = {}
         for one in self.executed:
-            if one.number not in of_step or one.peak_torque > of_step[one.number].peak_torque:
-                of_step[one.number] = one
-        return tuple(of_step[number] for number in sorted(of_step))
+            of_step.setdefault(one.number, []).append(one)
+        hardest = {n: max(each, key=lambda one: one.peak_torque) for n, each in of_step.items()}
+        return tuple(
+            replace(_worst_of(hardest[n], each), contacts=max(one.contacts for one in each))
+            for n, each in sorted(of_step.items())
+        )
+
+    @property
+    def regulated(self) -> bool:
+        """Whether the strategy holds the speed, so that the load settles in a band on both sides of it."""
+        return self.controller.regulation(self.drive.design_drive) is not None
+
+    @property
+    def limits_kept(self) -> bool | None:
+        """Whether every step keeps all limits of torque and start time; None without limits."""
+        margins = [margin for row in self.rows for margin in self.margins_of(row)]
+        return all(margin.kept for margin in margins) if margins else None
+
+    @property
+    def counted_cycles(self) -> int:
+        """The number of cycles of the duty to which `turning_points` belong."""
+        return max(self.cycles - 1, 1)
+
+    @property
+    def starts(self) -> int:
+        """Starts, reversals and jogs in one cycle."""
+        first = [one for one in self.executed if one.cycle == 1]
+        return sum(one.step.do in ("start", "reverse", "jog") for one in first)
+
+    @cached_property
+    def _counted(self) -> tuple[Counted, ...]:
+        """The rainflow cycles of each shaft."""
+        begins = np.array([one.begin for one in self.executed])
+        steps = [one.number - 1 for one in self.executed]
+        return tuple(count_cycles(points, begins, steps) for points in self.turning_points)
+
+    def life(self, slope: float | None = None) -> DutyLife:
+        """How long each shaft lasts.
+
+        The rainflow cycles are those of the whole trace, both signs, from the second cycle on. Cycles of the
+        duty are counted as one that repeats itself; Miner's rule adds the damage by the S-N curve of the
+        machine, or with this slope, see `fatigue`.
+
+        Raises
+        ------
+        InputError
+            For a shaft without damping, whose rattling never ends, and for a rigid gap.
+        """
+        return life_of(
+            self.drive, self._counted, self.counted_cycles, self.duty.shift, len(self.duty.steps), slope
+        )
+
+    def margins_of(self, step: StepRun) -> tuple[Margin, ...]:
+        """The margin of a step to each limit of torque and start time that it has."""
+        share = np.nan_to_num(step.peak_torques / self.drive.permissible_torques)
+        figures = {
+            "peak_torque": step.peak_torque,
+            "used_torque": 100.0 * float(share.max()),
+            "start_time": step.start_time,
+        }
+        names = {"start_time": "settled time"} if self.regulated else {}
+        return tuple(
+            Margin(replace(limit, name=names.get(limit.figure, limit.name)), figures[limit.figure], "")
+            for limit in self.drive.limits.each
+            if not math.isnan(figures.get(limit.figure, math.nan))
+        )
 
     @property
     def worst(self) -> StepRun:
@@ -191,6 +264,32 @@ class DutyRun(Result, view="duties.duty_sheet"):
     def phases(self) -> tuple[Phase, ...]:
         """What is recorded, in order of time: of the first two cycles."""
         return tuple(phase for one in self.executed for phase in one.phases)
+
+    @cached_property
+    def t(self) -> Vector:
+        """Instants of the traces of the first two cycles, s: a grid, events and reversals of torque."""
+        last = self.phases[-1].end
+        instants = [np.linspace(0.0, last, PLOT_POINTS)]
+        for phase in self.phases:
+            edges = phase.trajectory.states[:, rec.S_START] + phase.time
+            turns = [
+                phase.trajectory.turning_points(k, STILL_IN_TRACE * self.base_torque)[:, 0]
+                for k in range(len(self.drive.shaft_names))
+            ]
+            instants += [edges, np.nextafter(edges, 0.0), *(turn + phase.time for turn in turns)]
+        return np.unique(np.concatenate(instants).clip(0.0, last))
+
+    @cached_property
+    def traces(self) -> dict[str, Vector]:
+        """The states at `t`, see `at`."""
+        return self.at(self.t)
+
+    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
+        """Write the states under a header with units, at `times` or the plot's instants."""
+        instants = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
+        states = self.traces if times is None else self.at(instants)
+        named = named_states(states, self.phases[0].trajectory.input)
+        write_columns(path, {"t [s]": instants, **self.drive.columns_of(named)})
 
     @property
     def cycle_time(self) -> float:
@@ -211,7 +310,15 @@ class DutyRun(Result, view="duties.duty_sheet"):
             "base_torque": self.base_torque,
             "k_dyn": self.k_dyn,
             "worst_step": self.worst.number,
-            "steps": [{**row.summary(), "k_dyn": self.k_dyn_of(row)} for row in self.rows],
+            "limits_kept": self.limits_kept,
+            "steps": [
+                {
+                    **row.summary(),
+                    "k_dyn": self.k_dyn_of(row),
+                    "limits": [margin.summary() for margin in self.margins_of(row)],
+                }
+                for row in self.rows
+            ],
         }
 
     def at(self, times: ArrayLike) -> dict[str, Vector]:
@@ -389,10 +496,11 @@ def _carry_out(
         ends = ends.clip(-np.abs(peaks), np.abs(peaks))
         largest, smallest = np.where(peaks > 0.0, peaks, ends[0]), np.where(peaks < 0.0, peaks, ends[1])
     how = "strategy, anew in the other direction" if anew else "strategy"
+    held = "strategy" if runner.go else "holding torque" if runner.speed != 0.0 else "at rest"
     if step.do in ("stop", "jog"):
         how = step.by or runner.stop_by
     elif step.do in ("brake", "hold", "load"):
-        how = {"brake": "brake", "hold": "strategy" if runner.go else "holding torque", "load": ""}[step.do]
+        how = {"brake": "brake", "hold": held, "load": ""}[step.do]
     begin, end = phases[0].begin, phases[-1].end
     rests = [phase.rest for phase in phases if not math.isnan(phase.rest)]
     first = phases[0]
@@ -401,7 +509,7 @@ def _carry_out(
     reached = notes.start_time if runner.regulation is None else notes.settled
     run = StepRun(
         index + 1, step, cycle + 1, how, begin, end,
-        (rests[-1] if rests and step.time is None else end) - begin,
+        (max(rests[-1], begin) if rests and step.time is None else end) - begin,
         first.time + float(reached) - begin if starts else math.nan,
         float(sum(phase.travel for phase in phases)),
         largest,

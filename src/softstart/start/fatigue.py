@@ -266,11 +266,11 @@ def fatigue(
     """
     asked = _runs(runs)
     machine, estimate = asked[0].drive, _read_estimate(estimate_damping)
-    curve, given = _curve(machine, slope)
+    curve, given = curve_of(machine, slope)
     gap = _read_gap(worn_gap, machine)
     near = [damped(machine, estimate, factor) for factor in (0.5, 2.0)] if estimate else []
     machine = damped(machine, estimate) if estimate else machine
-    _check_shafts(machine)
+    check_shafts(machine)
     if estimate:
         asked = [_again(run, machine) for run in asked]
     found = next((run for run in asked if run.controller_name == REFERENCE), None)
@@ -316,19 +316,31 @@ def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matr
     >>> rainflow_cycles([0.0, 3.0, 1.0, 2.0], repeated=True).tolist()
     [[3.0, 1.5, 1.0], [1.0, 1.5, 1.0]]
     """
+    return indexed_cycles(torques, repeated=repeated)[:, :3]
+
+
+def indexed_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matrix:
+    """The rows of `rainflow_cycles`, each with the places of its two ends in the history.
+
+    >>> indexed_cycles([0.0, 3.0, 1.0, 2.0], repeated=True).tolist()
+    [[3.0, 1.5, 1.0, 1.0, 0.0], [1.0, 1.5, 1.0, 2.0, 3.0]]
+    """
     import rainflow
 
-    history = list(torques)
+    history, top = list(torques), 0
+    count = len(history)
     if repeated and history:
         sizes = list(map(abs, history))
         top = sizes.index(max(sizes))
         history = history[top:] + history[: top + 1]
-    cycles = sorted([one[:3] for one in rainflow.extract_cycles(history)], reverse=True)
+    cycles = sorted(rainflow.extract_cycles(history), reverse=True)
     if repeated:  # the largest comes as two halves, from the top down and up to it
         halves = [one for one in cycles if one[2] == 0.5]
         whole = [one for one in cycles if one[2] != 0.5]
-        cycles = sorted([*whole, *((r, mean, 1.0) for r, mean, _ in halves[::2])], reverse=True)
-    return np.array(cycles, dtype=np.float64).reshape(-1, 3)
+        cycles = sorted([*whole, *((r, mean, 1.0, i, k) for r, mean, _, i, k in halves[1::2])], reverse=True)
+    rows = np.array(cycles, dtype=np.float64).reshape(-1, 5)
+    rows[:, 3:] = (rows[:, 3:] + top) % max(count, 1)
+    return rows
 
 
 def impacts(run: Run, shaft: int = 0) -> Vector:
@@ -383,6 +395,11 @@ def damped(machine: AnyMachine, estimate: Mapping[str, int], factor: float = 1.0
         )
     ratio = factor * estimated_ratio(estimate.get("gears", 0), estimate.get("couplings", 0))
     return machine.with_damping_ratio(ratio)
+
+
+def with_estimated_damping(machine: AnyMachine, given: Mapping[str, int]) -> AnyMachine:
+    """The machine with the damping ratio that numbers of gears and couplings give, see `fatigue`."""
+    return damped(machine, _read_estimate(given))
 
 
 def undamped(machine: Machine) -> list[str]:
@@ -516,7 +533,8 @@ def _runs(runs: object) -> list[Run]:
     return found
 
 
-def _check_shafts(machine: Machine) -> None:
+def check_shafts(machine: Machine) -> None:
+    """Refuse rigid gaps and undamped shafts, whose damage is undefined."""
     columns = zip(machine.shaft_names, machine.stiffnesses, machine.gaps, strict=True)
     if rigid := [name for name, c, gap in columns if math.isinf(c) and gap > 0.0]:
         raise InputError(
@@ -539,7 +557,7 @@ def _check_shafts(machine: Machine) -> None:
         )
 
 
-def _curve(machine: Machine, slope: float | None) -> tuple[SNCurve, bool]:
+def curve_of(machine: Machine, slope: float | None) -> tuple[SNCurve, bool]:
     """The S-N curve asked for, and whether it was."""
     own = machine.limits.fatigue
     if slope is None:

@@ -107,6 +107,14 @@ class Margin:
         """Whether the limit is kept."""
         return self.share >= 0.0
 
+    @property
+    def brief(self) -> str:
+        """Whether it is kept, and the margin: "kept 28.3 %", "exceeded -4.2 %", "exceeded x109"."""
+        if self.share < -1.0:
+            return f"exceeded x{_times(self.share)}"
+        left = "-" if math.isnan(self.share) else f"{100.0 * self.share:.1f} %"
+        return f"{'kept' if self.kept else 'exceeded'} {left}"
+
     def summary(self) -> dict[str, object]:
         """As plain data."""
         plain = {"limit": self.name, "unit": self.unit, "value": self.value, "permitted": self.limit}
@@ -223,14 +231,9 @@ class Row(OneLine):
 
     @property
     def against_limits(self) -> str:
-        """Whether it keeps the limits, and the margin: "kept 28.3 %", "exceeded -4.2 %", "exceeded x109"."""
+        """Whether it keeps the limits, and the margin, see `Margin.brief`; "" without limits."""
         least = self.least_margin
-        if least is None:
-            return ""
-        if least.share < -1.0:
-            return f"exceeded x{_times(least.share)}"
-        left = "-" if math.isnan(least.share) else f"{100.0 * least.share:.1f} %"
-        return f"{'kept' if least.kept else 'exceeded'} {left}"
+        return "" if least is None else least.brief
 
     def summary(self) -> dict[str, Any]:
         """The figures of the run and of this row under the names used everywhere."""

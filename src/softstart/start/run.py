@@ -23,7 +23,7 @@ from softstart.kernel.guard import FAULTS
 from softstart.results import Result
 from softstart.start import metrics
 from softstart.start.engine import run_one
-from softstart.start.kernel_input import MAX_EVENTS, SETTLING_PERIODS
+from softstart.start.kernel_input import MAX_EVENTS, SETTLING_PERIODS, KernelInput
 from softstart.start.status import Status, status_of
 from softstart.start.trajectory import StartRecorder, Trajectory
 
@@ -91,6 +91,29 @@ class Clipped(NamedTuple):
 
     excess: float
     time: float
+
+
+def named_states(states: Mapping[str, Vector], rows: KernelInput) -> dict[str, Vector]:
+    """The states of a trajectory under the names of `Run.at`."""
+    motor, load = int(rows.machine.motor), int(rows.machine.load)
+    between = states["twist"][:, min(motor, load) : max(motor, load)].sum(axis=1)
+    of_masses = {
+        "phi1": states["phi"][:, motor], "phi2": states["phi"][:, load], "w1": states["w"][:, motor],
+        "w2": states["w"][:, load], "theta": between if motor < load else -between,
+    }  # fmt: skip
+    single = states["T"][:, 0] if rows.count == 2 else states["T"]
+    v = of_masses["w1"] - of_masses["w2"]
+    return {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
+
+
+def write_columns(path: str | Path, columns: Mapping[str, Vector]) -> None:
+    """Write columns of numbers under their headings as CSV, with all digits."""
+    table = np.column_stack(list(columns.values()))
+
+    def write(stream: IO[str]) -> None:
+        np.savetxt(stream, table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+
+    write_whole(Path(path), write)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -501,17 +524,7 @@ class Run(Result, view="starts.run_sheet"):
         flat = np.ascontiguousarray(when.ravel())
         if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
             raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
-        states = self.trajectory.at(flat)
-        machine = self.trajectory.input.machine
-        motor, load = int(machine.motor), int(machine.load)
-        between = states["twist"][:, min(motor, load) : max(motor, load)].sum(axis=1)
-        of_masses = {
-            "phi1": states["phi"][:, motor], "phi2": states["phi"][:, load], "w1": states["w"][:, motor],
-            "w2": states["w"][:, load], "theta": between if motor < load else -between,
-        }  # fmt: skip
-        single = states["T"][:, 0] if self.trajectory.input.count == 2 else states["T"]
-        v = of_masses["w1"] - of_masses["w2"]
-        every = {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
+        every = named_states(self.trajectory.at(flat), self.trajectory.input)
         return {
             name: values.reshape(when.shape if values.ndim == 1 else (*when.shape, values.shape[1]))
             for name, values in every.items()
@@ -555,13 +568,7 @@ class Run(Result, view="starts.run_sheet"):
 
     def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
         """Write the states under a header with units, at `times` or the plot's instants."""
-        columns = self.columns(times)
-        header, table = ",".join(columns), np.column_stack(list(columns.values()))
-
-        def write(stream: IO[str]) -> None:
-            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
-
-        write_whole(Path(path), write)
+        write_columns(path, self.columns(times))
 
     @cached_property
     def energy(self) -> metrics.Energy:

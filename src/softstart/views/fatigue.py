@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softstart.drive import Machine
+from softstart.drive import Machine, SNCurve
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
@@ -113,15 +113,22 @@ def fatigue_conclusion(found: Fatigue) -> str:
     return f"Longest life: {name}, {factor(life(best))} times that of direct{where}{wear}{after}."
 
 
+def slope_sentence(curve: SNCurve, given: bool) -> str:
+    """The S-N curve in a sentence, and where its slope is from.
+
+    >>> slope_sentence(SNCurve(6.6), True)
+    'Slope of the S-N curve: m = 6.6.'
+    """
+    if curve.slope is None:
+        return f"The S-N curve has the {len(curve.points)} points of limits.fatigue."
+    origin = "" if given else ", that of pitting of case-hardened gears (ISO 6336-2), as no slope is given"
+    return f"Slope of the S-N curve: m = {short(curve.slope)}{origin}."
+
+
 def fatigue_notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     drive, limits, curve = found.drive, found.drive.limits, found.curve
     worn, several = not math.isnan(found.worn_gap), len(drive.shaft_names) > 1
-    slope = "" if curve.slope is None else f"Slope of the S-N curve: m = {short(curve.slope)}"
-    if not slope:
-        slope = f"The S-N curve has the {len(curve.points)} points of limits.fatigue"
-    elif not found.slope_given:
-        slope += ", that of pitting of case-hardened gears (ISO 6336-2), as no slope is given"
     ratio = f"{100.0 * drive.damping_ratio:.2g} %"
     damping = f"Damping ratio of the {'first natural vibration' if several else 'shaft'}: {ratio}."
     if found.estimate:
@@ -130,7 +137,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
             f"Damping is estimated (ratio {ratio} from {parts}); lives are also given for half and twice the "
             "estimate."
         )
-    text = [f"{EQUIVALENT} {slope}.", damping]
+    text = [f"{EQUIVALENT} {slope_sentence(curve, found.slope_given)}", damping]
     if worn:
         over = f"{limits.life / 3600.0 / HOURS_PER_YEAR:.3g} years" if limits.life else "the life"
         error = float(f"{100.0 * max(row.wear_error for row in found.rows):.1g}")

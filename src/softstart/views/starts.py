@@ -13,6 +13,7 @@ from softstart.drive.data_sheet_words import BAND
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import Sentence
 from softstart.start.comparison import SOFT_END, Comparison
+from softstart.start.duty import DutyRun
 from softstart.start.kernel_input import SETTLED_BAND, SETTLING_PERIODS
 from softstart.start.recommendation import Recommendation, Row, checked_limits, margins_of
 from softstart.start.run import Run, Stage
@@ -211,7 +212,7 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
     )
 
 
-def parameters_of(run: Run, text: Callable[[float], str] = short) -> str:
+def parameters_of(run: Run | DutyRun, text: Callable[[float], str] = short) -> str:
     """The parameters with which the strategy of a start is set up, each value in its unit.
 
     >>> from softstart import simulate

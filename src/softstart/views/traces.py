@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.start.duty import DutyRun
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import (
@@ -76,7 +77,7 @@ def torques(axes: Axes, run: Run) -> None:
     head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
 
 
-def shafts_of(run: Run) -> list[tuple[str, dict[str, Any]]]:
+def shafts_of(run: Run | DutyRun) -> list[tuple[str, dict[str, Any]]]:
     """Name and line of each shaft."""
     names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque T",)
     return [(name, line_of(k) | {"color": SHAFTS[k % len(SHAFTS)]}) for k, name in enumerate(names)]

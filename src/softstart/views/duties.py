@@ -1,0 +1,556 @@
+"""What is shown of a machine in a duty under one strategy and under several: words, tables, figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.drive import DutyStep, Machine
+from softstart.errors import InputError
+from softstart.start.duty import DutyRun, StepRun
+from softstart.start.duty_comparison import DutyComparison, DutyRow
+from softstart.start.duty_life import SECONDS_PER_HOUR, DutyLife, ShaftLife
+from softstart.start.recommendation import Margin
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    drawing,
+    entitle,
+    head,
+    heat_map,
+    legend_beside,
+    line_of,
+    new_figure,
+)
+from softstart.views.fatigue import SPECTRUM, counted, factor, slope_sentence
+from softstart.views.markdown import file_stem
+from softstart.views.numbers import DataColumn, TextTable, number, plural, short, units_of, with_unit
+from softstart.views.sheet import Sheet, Writer, records_file, rows_file
+from softstart.views.starts import machine_lines, parameters_of
+from softstart.views.traces import shafts_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# of the values of a step: unit in SI
+ASKED = {
+    "set_speed": "rad/s", "time": "s", "angle": "rad", "braking_torque": "N m", "brake_speed": "rad/s",
+    "brake_time": "s", "torque": "N m", "kind": "", "inertia": "kg m2", "friction": "N m", "mass": "",
+}  # fmt: skip
+ANEW = "strategy, anew in the other direction"  # `StepRun.how`
+SAME_RATE = 0.01  # relative difference of two numbers of starts per hour that is no contradiction
+ROOM = (0.055, 0.006)  # share of the figure that the label of a step needs, and its number alone
+BEFORE = 0.08  # share of a step that is shown before it
+EQUIVALENT = (
+    "Damage-equivalent torque: one 0-T-0 cycle in each cycle of the duty causes the same damage (rainflow "
+    "cycles of the whole trace after ASTM E1049, Miner's rule, no endurance limit)."
+)
+
+
+# steps -----------------------------------------------------------------------------------------------------
+
+
+def asked_of(step: DutyStep, machine: Machine) -> str:
+    """What a step is to do, in words, with the values that it is given.
+
+    >>> from softstart import Drive
+    >>> asked_of(DutyStep("jog", time="200 ms", repeat=3), Drive.load("crane-4amtkf"))
+    'jog 0.2 s, 3 times'
+    """
+    units, given = units_of(machine), step.given()
+    parts = []
+    for key, si in ASKED.items():
+        if key not in given:
+            continue
+        value = given[key]
+        text = value if isinstance(value, str) else with_unit(float(units.shown(value, si)), units.of(si))
+        name = "" if key in ("set_speed", "time", "angle") else key.replace("_", " ") + " "
+        parts.append(f"{name}{text}")
+    parts += [f"{step.repeat:g} times"] if step.repeat > 1.0 else []
+    return " ".join([step.do, ", ".join(parts)]).strip()
+
+
+def how_of(row: StepRun, run: DutyRun) -> str:
+    """How a step was carried out; "set" where the stop is the configured one."""
+    if row.how == ANEW:
+        return "plugging"
+    configured = row.step.do in ("stop", "jog") and row.step.by is None and row.how != "strategy"
+    return f"{row.how} (configured)" if configured else row.how
+
+
+def against_limits(margins: Sequence[Margin]) -> str:
+    """The margin that decides, and to which limit."""
+    least = min(margins, key=lambda one: one.share, default=None)
+    return "" if least is None else f"{least.brief}, {least.name}"
+
+
+def name_of(row: StepRun) -> str:
+    """The number of a step and what it does."""
+    return f"{row.number}, {row.step.do}"
+
+
+def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
+    """The columns of the table of steps."""
+    units = units_of(run.drive)
+    shares = None if life is None else 100.0 * life.worst.shares
+    return (
+        DataColumn("step", lambda row: str(row.number)),
+        DataColumn("to do", lambda row: asked_of(row.step, run.drive)),
+        DataColumn("how", lambda row: how_of(row, run)),
+        DataColumn("K_dyn", run.k_dyn_of, 3),
+        DataColumn("largest\ntorque N m", lambda row: float(row.largest.max())),
+        DataColumn("smallest\ntorque N m", lambda row: float(row.smallest.min())),
+        DataColumn("limits", lambda row: against_limits(run.margins_of(row)), optional=True),
+        DataColumn("damage\n%", lambda row: math.nan if shares is None else float(shares[row.number - 1]), 1,
+                   optional=True),
+        DataColumn("impact\nenergy J", lambda row: float(row.impact_energy.sum()), digits=3),
+        DataColumn("contacts", lambda row: row.contacts, 0),
+        DataColumn("time s", lambda row: row.time),
+        DataColumn("settled\ns" if run.regulated else "start\ntime s", lambda row: row.start_time,
+                   optional=True),
+        DataColumn(f"angle\n{units.of('rad')}", lambda row: float(units.shown(row.angle, "rad"))),
+    )  # fmt: skip
+
+
+def shaft_tables(run: DutyRun) -> list[TextTable]:
+    """Of several shafts a row each: its largest |T| in each step, at the motor shaft, and what it permits."""
+    names = run.drive.shaft_names
+    if len(names) == 1:
+        return []
+    peaks = np.array([row.peak_torques for row in run.rows])
+    columns = [DataColumn("shaft", lambda k: names[k])]
+    columns += [DataColumn(name_of(row), lambda k, i=i: float(peaks[i, k])) for i, row in enumerate(run.rows)]  # type: ignore[misc]
+    used = 100.0 * peaks.max(axis=0) / run.drive.permissible_torques
+    columns.append(DataColumn("of the\npermissible %", lambda k: float(used[k]), 1, optional=True))
+    title = "Largest torque of each shaft at the motor shaft, N m"
+    return [TextTable.of_data(title, columns, range(len(names)))]
+
+
+# life ------------------------------------------------------------------------------------------------------
+
+LIFE = (
+    DataColumn("shaft", lambda one: one.shaft),
+    DataColumn("equivalent\ntorque N m", lambda one: one.equivalent_torque),
+    DataColumn("cycles to\nfailure", lambda one: one.cycles, text=counted, optional=True),
+    DataColumn("hours", lambda one: one.hours, text=counted, optional=True),
+    DataColumn("shifts", lambda one: one.shifts, text=counted, optional=True),
+    DataColumn("years", lambda one: one.years, text=counted, optional=True),
+)
+
+
+def life_table(life: DutyLife) -> TextTable:
+    """The lives of the shafts."""
+    return TextTable.of_data("Life", LIFE, life.shafts)
+
+
+def duration(one: ShaftLife) -> str:
+    """A life in cycles, shifts and years; "" where it is not known."""
+    parts = ((one.cycles, "cycles"), (one.hours, "h"), (one.shifts, "shifts"), (one.years, "years"))
+    return ", ".join(f"{counted(value)} {unit}" for value, unit in parts if not math.isnan(value))
+
+
+def life_or_reason(run: DutyRun, slope: float | None) -> tuple[DutyLife | None, str]:
+    """The life of a machine in a duty, or why there is none."""
+    try:
+        return run.life(slope), ""
+    except InputError as error:
+        return None, f"No life: {error}"
+
+
+def life_conclusion(run: DutyRun, life: DutyLife) -> str:
+    """The shaft with the shortest life, and the step that takes most of it."""
+    worst = life.worst
+    number = int(worst.shares.argmax()) + 1
+    step = next(row for row in run.rows if row.number == number)
+    where = f" of {worst.shaft}" if len(life.shafts) > 1 else ""
+    most = f"most damage in step {name_of(step)} ({100.0 * worst.shares[number - 1]:.3g} %)"
+    length = duration(worst)
+    if not length:
+        torque = f"damage-equivalent torque {with_unit(float(f'{worst.equivalent_torque:.4g}'), 'N m')}"
+        return f"Life{where}: {torque}, {most}."
+    required = run.drive.limits.life
+    asked = ""
+    if required is not None and not math.isnan(worst.hours):
+        reached = "reached" if worst.hours >= required / SECONDS_PER_HOUR else "not reached"
+        asked = f" The required life of {short(required / SECONDS_PER_HOUR)} h is {reached}."
+    return f"Life{where}: {length}, {most}.{asked}"
+
+
+def life_notes(life: DutyLife) -> list[str]:
+    """What the life rests on, and what is missing for it."""
+    return [f"{EQUIVALENT} {slope_sentence(life.curve, life.slope_given)}", life.missing]
+
+
+# one strategy ----------------------------------------------------------------------------------------------
+
+
+def duty_lines(run: DutyRun) -> list[str]:
+    """The duty in a line."""
+    steps, per_cycle = len(run.duty.steps), len(run.executed) // run.cycles
+    more = "" if per_cycle == steps else f", {per_cycle} with repetitions"
+    shift = run.duty.shift
+    rate = "" if shift is None else f", {short(shift.cycles_per_hour)} cycles per hour"
+    return [f"  duty   {plural(steps, 'step')} a cycle{more}{rate}; {plural(run.cycles, 'cycle')} computed"]
+
+
+def headline(run: DutyRun) -> str:
+    """The worst step, and whether the limits hold."""
+    worst = run.worst
+    torque = with_unit(float(f"{worst.peak_torque:.4g}"), "N m")
+    text = f"Worst step: {name_of(worst)}, K_dyn {run.k_dyn:.3f} ({torque})."
+    margins = [(row, margin) for row in run.rows for margin in run.margins_of(row)]
+    if not margins:
+        return text
+    broken = [f"step {name_of(row)}: {margin}" for row, margin in margins if not margin.kept]
+    if broken:
+        return f"{text} Limits are exceeded in {'; '.join(broken)}."
+    row, least = min(margins, key=lambda one: one[1].share)
+    return f"{text} All limits are kept; the smallest margin is in step {name_of(row)}: {least}."
+
+
+def duty_notes(run: DutyRun) -> Iterator[str]:
+    """Where the figures of the steps are from, and how steps were carried out."""
+    name, hows = run.controller_name, {row.how for row in run.rows}
+    of = f"all {run.cycles} cycles" if run.cycles > 1 else "the cycle"
+    base = f'"{run.base.name}"' if run.base is not None else "this machine"
+    yield (
+        f"Figures of a step are the largest of {of} and of its repetitions, time and angle those with the "
+        f"largest torque. K_dyn: largest |T| over {run.base_torque:.4g} N m, the mean shaft torque of {base} "
+        "under full starting torque."
+    )
+    if not run.repeated:
+        yield "The duty ends in motion, so that its cycle is computed once."
+    if any("configured" in how_of(row, run) for row in run.rows):
+        yield f"{name} cannot stop: its stops are by {run.stop}, as configured."
+    if ANEW in hows:
+        yield (
+            f"Plugging: {name} cannot reverse; it is started again in the other direction while the machine "
+            "still moves."
+        )
+    if "holding torque" in hows:
+        yield "Holding torque: from the set speed on the motor has the torque that holds the load there."
+    yield from starts_note(run)
+    if len(run.drive.positions) > 1:
+        yield "The start position is unknown: the first step is the worst of both flanks and mid-gap."
+
+
+def starts_note(run: DutyRun) -> Iterator[str]:
+    """Whether the cycles in an hour contradict the starts per hour of the limits."""
+    asked, shift = run.drive.limits.starts_per_hour, run.duty.shift
+    if asked is None or shift is None:
+        return
+    rate = shift.cycles_per_hour * run.starts
+    if abs(rate - asked) > SAME_RATE * asked:
+        yield (
+            f"[limits] starts_per_hour is {short(float(asked))}, the duty has {short(rate)}: "
+            f"{short(shift.cycles_per_hour)} cycles per hour with {plural(run.starts, 'start')}, reversals "
+            "and jogs included. Lives here are those of the duty."
+        )
+
+
+def duty_facts(run: DutyRun) -> list[list[str]]:
+    """The figures of the whole."""
+    worst = run.worst
+    names, gear = run.drive.shaft_names, run.drive.gear
+    where = f" in {names[int(worst.peak_torques.argmax())]}" if len(names) > 1 else ""
+    output = "" if gear is None else with_unit(float(gear.to_output(worst.peak_torque, "N*m")), "N m")
+    return [
+        ["K_dyn", f"{number(run.k_dyn, 6)} in step {name_of(worst)}"],
+        ["peak shaft torque", f"{with_unit(worst.peak_torque, 'N m')}{where}"],
+        ["the same at the output", output],
+        ["time of a cycle", with_unit(run.cycle_time, "s")],
+    ]
+
+
+def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | None = None) -> Sheet:
+    """What is shown of a machine in a duty; `slope` is that of the S-N curve, if another."""
+    life, reason = life_or_reason(run, slope)
+    values, stem = parameters_of(run), file_stem(run.controller_name)
+    columns = step_columns(run, life)
+    records = [_record(run, row) for row in run.executed]
+    files: dict[str, str | Writer] = {
+        f"trace-{stem}.csv": run.to_csv,
+        "steps.csv": records_file(records),
+        "duty.toml": run.duty.to_toml(),
+    }
+    several = len(run.drive.shaft_names) > 1
+    for k, one in enumerate(() if life is None else life.shafts, 1):
+        name = f"spectrum-shaft-{k}.csv" if several else "spectrum.csv"
+        files[name] = rows_file(SPECTRUM, one.spectrum.tolist())
+    return Sheet(
+        f"{run.drive.name}: duty under {run.controller_name}",
+        [
+            *machine_lines(run.drive, fitted_to),
+            f"  under  {run.controller_name}{' (' + values + ')' if values else ''}",
+            *duty_lines(run),
+        ],
+        facts=duty_facts(run),
+        tables=[
+            TextTable.of_data("Steps", columns, run.rows, bold=[run.worst.number - 1], keys=2),
+            *shaft_tables(run),
+            *([] if life is None else [life_table(life)]),
+        ],
+        conclusions=[headline(run), *([] if life is None else [life_conclusion(run, life)])],
+        notes=[*duty_notes(run), *([reason] if life is None else life_notes(life)), *run.drive.warnings],
+        figures={
+            f"duty-{stem}": lambda: duty_figure(run),
+            f"worst-step-{stem}": lambda: duty_figure(run, worst_recorded(run)),
+        },
+        panel=lambda ax: draw_torques(ax, run),
+        records=records,
+        files=files,
+        machine=run.drive,
+        fitted_to=fitted_to,
+    )
+
+
+def duty_data(run: DutyRun, slope: float | None = None) -> dict[str, object]:
+    """All figures as plain data, those of the life too."""
+    life, reason = life_or_reason(run, slope)
+    return {**run.summary(), "life": None if life is None else life.summary(), "no_life": reason}
+
+
+def _record(run: DutyRun, row: StepRun) -> dict[str, object]:
+    """The figures of a step in one line, without those of each shaft."""
+    plain = {key: value for key, value in row.summary().items() if not isinstance(value, list)}
+    return {
+        **plain,
+        "k_dyn": run.k_dyn_of(row),
+        "largest_torque": float(row.largest.max()),
+        "smallest_torque": float(row.smallest.min()),
+        "impact_energy": float(row.impact_energy.sum()),
+        "limits": against_limits(run.margins_of(row)),
+    }
+
+
+# the trace -------------------------------------------------------------------------------------------------
+
+
+def duty_figure(run: DutyRun, step: StepRun | None = None) -> Figure:
+    """Torques and speeds over the first two cycles with the steps, or over one step and the end before it."""
+    with drawing():
+        figure, axes = new_figure(2, 1, (9.0, 5.4), sharex=True)
+        draw_torques(axes[0], run)
+        draw_speeds(axes[1], run)
+        begin, end = (0.0, float(run.t[-1])) if step is None else (step.begin, step.end)
+        begin = max(0.0, begin - (0.0 if step is None else BEFORE * (end - begin)))
+        for panel in axes:
+            mark_steps(panel, run, begin, end, labels=panel is axes[0])
+            legend_beside(panel, fontsize=7.5)
+        axes[-1].set_xlabel("time, s")
+        axes[-1].set_xlim(begin, end)
+        of_step = "" if step is None else f", step {name_of(step)}"
+        entitle(figure, f"{run.drive.name}: duty under {run.controller_name}{of_step}")
+    return figure
+
+
+def worst_recorded(run: DutyRun) -> StepRun:
+    """The worst step as it was carried out in the cycles that are recorded."""
+    recorded = [one for one in run.executed if one.phases and one.number == run.worst.number]
+    return max(recorded, key=lambda one: one.peak_torque)
+
+
+def draw_torques(axes: Axes, run: DutyRun) -> None:
+    """Motor and shaft torques over the duty, and the permissible ones."""
+    traces = run.traces
+    axes.plot(run.t, traces["u"], color=COLOURS[1], lw=0.8, label="motor torque u")
+    for (name, line), torque in zip(shafts_of(run), traces["T"].T, strict=True):
+        axes.plot(run.t, torque, label=name, **(line | {"lw": 0.9}))
+    permissible = float(run.drive.permissible_torques[int(run.worst.peak_torques.argmax())])
+    if not math.isnan(permissible):
+        for sign, label in ((1.0, "permissible"), (-1.0, None)):
+            axes.axhline(sign * permissible, color=COLOURS[3], lw=1.0, ls=DASHES[1], label=label)
+    head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", "torque, N m")
+
+
+def draw_speeds(axes: Axes, run: DutyRun) -> None:
+    """The speeds of all masses over the duty."""
+    units, names = units_of(run.drive), run.drive.mass_names
+    lines = [(name, line_of(i)) for i, name in enumerate(names)]
+    if len(lines) == 2:
+        lines = [("motor w1", {"color": COLOURS[1]}), ("load w2", {"color": COLOURS[0]})]
+    for (name, line), speed in zip(lines, run.traces["w"].T, strict=True):
+        axes.plot(run.t, units.shown(speed, "rad/s"), label=name, **(line | {"lw": 0.9}))
+    head(axes, "", f"speed, {units.of('rad/s')}")
+
+
+def mark_steps(axes: Axes, run: DutyRun, begin: float, end: float, labels: bool) -> None:
+    """A line at the beginning of each step, with its number and what it does where there is room."""
+    last = None
+    for row in (row for row in run.executed if row.phases and begin <= row.begin < end):
+        first, last = row.cycle != last, row.cycle
+        axes.axvline(row.begin, color="#000000" if first else GREY, lw=0.9 if first else 0.6, ls=":")
+        share = (min(row.end, end) - row.begin) / (end - begin)
+        text = (
+            f"{row.number} {row.step.do}" if share > ROOM[0] else f"{row.number}" if share > ROOM[1] else ""
+        )
+        if labels and text:
+            axes.text(
+                row.begin, 0.985, f" {text}", fontsize=7, color=GREY, va="top",
+                transform=axes.get_xaxis_transform(),
+            )  # fmt: skip
+
+
+# several strategies ----------------------------------------------------------------------------------------
+
+
+def step_figures(comparison: DutyComparison) -> list[DataColumn]:
+    """K_dyn of each step, a column each."""
+
+    def of_step(i: int) -> Any:
+        return lambda row: math.nan if row.run is None else row.run.k_dyn_of(row.run.rows[i])
+
+    steps = enumerate(comparison.duty.steps)
+    return [DataColumn(f"K\n{i + 1} {step.do}", of_step(i), 3) for i, step in steps]
+
+
+def _of_run(value: Any, none: Any = math.nan) -> Any:
+    """A figure of the run of a row, `none` where the duty cannot be finished."""
+    return lambda row: none if row.run is None else value(row)
+
+
+def _least_margin(row: DutyRow) -> str:
+    assert row.run is not None
+    margins = [margin for step in row.run.rows for margin in row.run.margins_of(step)]
+    return against_limits(margins)
+
+
+COMPARED = (
+    DataColumn("worst\nstep", _of_run(lambda row: name_of(row.run.worst), "-")),
+    DataColumn("limits", _of_run(_least_margin, ""), optional=True),
+    DataColumn("life over\ndirect", lambda row: row.relative, text=factor, optional=True),
+    DataColumn("cycles to\nfailure", lambda row: math.nan if row.life is None else row.life.worst.cycles,
+               text=counted, optional=True),
+    DataColumn("years", lambda row: math.nan if row.life is None else row.life.worst.years, text=counted,
+               optional=True),
+    DataColumn("cycle\ns", _of_run(lambda row: row.run.cycle_time)),
+)  # fmt: skip
+
+
+def duty_comparison_sheet(
+    comparison: DutyComparison, rows: Sequence[DutyRow] = (), fitted_to: Machine | None = None
+) -> Sheet:
+    """What is shown of strategies in a duty; `rows` are its rows in another order."""
+    machine, rows = comparison.drive, rows or comparison.rows
+    runs = [row.run for row in rows if row.run is not None]
+    columns = [DataColumn("strategy", lambda row: row.name), *step_figures(comparison), *COMPARED]
+    figures = {"duty": lambda: comparison_map(comparison, rows)}
+    files: dict[str, str | Writer] = {"duty.toml": comparison.duty.to_toml()}
+    records, stems = [_compared_record(row) for row in rows], list[str]()
+    files["comparison.csv"] = rows_file(
+        keys := list(dict.fromkeys(key for record in records for key in record)),
+        [[record.get(key) for key in keys] for record in records],
+    )
+    for run in runs:
+        stems.append(stem := file_stem(run.controller_name, stems))
+        figures[f"duty-{stem}"] = partial(duty_figure, run)
+        files[f"trace-{stem}.csv"] = run.to_csv
+    lives = [row.life for row in rows if row.life is not None]
+    return Sheet(
+        f"{machine.name}: strategies in a duty",
+        [*machine_lines(machine, fitted_to), *duty_lines(runs[0])],
+        tables=[TextTable.of_data("Worst of each step", columns, rows, bold=_best(rows), keys=1)],
+        conclusions=comparison_conclusions(comparison),
+        notes=[
+            f"K: largest |T| of a step over {runs[0].base_torque:.4g} N m, the mean shaft torque under full "
+            "starting torque; of all cycles and repetitions.",
+            *(f"{row.name}: {row.reason}" for row in rows if row.run is None),
+            *stop_notes(runs),
+            *starts_note(runs[0]),
+            *(life_notes(lives[0]) if lives else [f"No life: {comparison.no_life}"]),
+            *machine.warnings,
+        ],
+        figures=figures,
+        records=records,
+        files=files,
+        machine=machine,
+        fitted_to=fitted_to,
+    )
+
+
+def _best(rows: Sequence[DutyRow]) -> list[int]:
+    """The place of the row with the lowest K_dyn among those that keep the limits."""
+    kept = [i for i, row in enumerate(rows) if row.run is not None and row.run.limits_kept is not False]
+    return [min(kept, key=lambda i: rows[i].k_dyn)] if kept else []
+
+
+def comparison_conclusions(comparison: DutyComparison) -> list[str]:
+    """The lowest K_dyn, the strategies that keep the limits, and the longest life."""
+    finished = comparison.finished
+    best = min(finished, key=lambda row: row.k_dyn)
+    assert best.run is not None
+    text = [
+        f"Lowest K_dyn of the worst step: {best.name}, {best.k_dyn:.3f} in step {name_of(best.run.worst)}."
+    ]
+    kept = [row.name for row in finished if row.run is not None and row.run.limits_kept]
+    if any(row.run is not None and row.run.limits_kept is not None for row in finished):
+        text.append(f"All limits are kept by {', '.join(kept)}." if kept else "No strategy keeps all limits.")
+    lasting = [row for row in finished if row.life is not None]
+    if lasting:
+        longest = min(lasting, key=lambda row: row.life.worst.damage if row.life else math.inf)
+        assert longest.life is not None
+        over = "" if math.isnan(longest.relative) else f", {factor(longest.relative)} times that of direct"
+        length = duration(longest.life.worst)
+        text.append(f"Longest life: {longest.name}{over}{', ' + length if length else ''}.")
+    return text
+
+
+def stop_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
+    """Which strategies use the configured stop, and which are plugged."""
+    ways: dict[str, list[str]] = {}
+    for run in runs:
+        if any("configured" in how_of(row, run) for row in run.rows):
+            ways.setdefault(run.stop, []).append(run.controller_name)
+    for stop, names in ways.items():
+        yield f"Stops by {stop}, as configured, since they cannot stop: {', '.join(names)}."
+    plugged = [run.controller_name for run in runs if any(row.how == ANEW for row in run.rows)]
+    if plugged:
+        yield f"Reversed by plugging, a start in the other direction out of the motion: {', '.join(plugged)}."
+
+
+def _compared_record(row: DutyRow) -> dict[str, object]:
+    """The figures of a strategy in one line."""
+    if row.run is None:
+        return {"controller": row.name, "reason": row.reason}
+    run = row.run
+    worst = None if row.life is None else row.life.worst
+    return {
+        "controller": row.name,
+        "reason": "",
+        "k_dyn": run.k_dyn,
+        "worst_step": run.worst.number,
+        **{f"k_dyn_step_{step.number}": run.k_dyn_of(step) for step in run.rows},
+        "limits_kept": run.limits_kept,
+        "cycle_time": run.cycle_time,
+        "relative_life": row.relative,
+        "cycles_to_failure": math.nan if worst is None else worst.cycles,
+        "years": math.nan if worst is None else worst.years,
+    }
+
+
+def comparison_map(comparison: DutyComparison, rows: Sequence[DutyRow]) -> Figure:
+    """K_dyn of each step under each strategy as colours and numbers; struck out where a limit is exceeded."""
+    from matplotlib.colors import Normalize
+
+    finished = [row for row in reversed(rows) if row.run is not None]
+    runs = [row.run for row in finished if row.run is not None]
+    values = np.array([[run.k_dyn_of(step) for step in run.rows] for run in runs])
+    broken = np.array(
+        [[not all(one.kept for one in run.margins_of(step)) for step in run.rows] for run in runs]
+    )
+    names = [f"{i} {step.do}" for i, step in enumerate(comparison.duty.steps, 1)]
+    with drawing():
+        figure, axes = new_figure(1, 1, (2.6 + 0.75 * len(names), 1.5 + 0.28 * len(finished)))
+        scale = Normalize(0.0, float(values.max()))
+        heat_map(axes, names, [row.name for row in finished], values, scale, decimals=2, struck=broken)
+        axes.tick_params(axis="x", labelsize=8)
+        struck = "; struck out: a limit is exceeded" if broken.any() else ""
+        head(axes, f"K_dyn of each step{struck}", "")
+        entitle(figure, comparison.drive.name)
+    return figure
