@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,8 @@ class Case:
     brake: float = 0.0  # friction; infinite for a lock, 0 without a brake
     closing: float = 0.0
     opening: float = 0.0
+    proving: bool = False  # the brake is opened by torque proving
+    dead_time: float = 0.0
 
     @property
     def repeated(self) -> list[tuple[dict[str, Any], int]]:
@@ -71,7 +74,7 @@ class Player:
     def __init__(self, case: Case, **fields: Any):
         self.case = case
         self.oracle = DutyOracle(
-            case.given, case.lag, case.rate, band=0.01 * case.target, speed=case.target,
+            case.given, case.lag, case.rate, case.dead_time, band=0.01 * case.target, speed=case.target,
             longest=400.0 * elastic_period(case.given), **fields,
         )  # fmt: skip
         self.speed = 0.0  # commanded; 0 at standstill
@@ -85,27 +88,29 @@ class Player:
         getattr(self, do)(**given)
         return Step(do, self.oracle.ends[first:])
 
-    def start(self, set_speed: float = math.nan, time: float = math.inf) -> None:
-        """The torque of the start, until the load has its speed; of a jog then on to its time.
+    def start(self, set_speed: float = math.nan, time: float = math.inf, angle: float = math.inf) -> None:
+        """The torque of the start, until the load has its speed; then on to the time or angle of the step.
 
         A brake holds the motor fast until it is open.
         """
         o, case, speed = self.oracle, self.case, self.case.target if math.isnan(set_speed) else set_speed
-        stood, self.speed = self.speed == 0.0, speed
+        stood, self.speed, ends = self.speed == 0.0, speed, ends_of(self.oracle, time, angle)
         torque: Any = [(t, *(self.way * one for one in rest)) for t, *rest in case.pieces]
-        begin = o.time
-        if stood and case.brake > 0.0 and case.opening > 0.0:
+        if stood and case.brake > 0.0:
             o.brake = math.inf
-            o.phase(Until("time", case.opening), torque=torque)
-            torque = None
+            if case.proving:
+                o.phase(Until("proved", 0.0, self.way), torque=torque)
+                torque = None
+            if case.opening > 0.0:
+                o.phase(Until("time", case.opening), torque=torque)
+                torque = None
         o.brake = 0.0
-        reaches = Until("load", speed, self.way)
-        end = o.phase(reaches, *within(begin + time - o.time), torque=torque)
-        if end.reason == "load" and time < math.inf:
-            self.keep(Until("time", begin + time - o.time))
+        end = o.phase(Until("load", speed, self.way), *ends(self.way), torque=torque)
+        if end.reason == "load" and min(time, angle) < math.inf:
+            self.keep(*ends(self.way))
 
-    def reverse(self, set_speed: float = math.nan) -> None:
-        self.start(-self.speed if math.isnan(set_speed) else set_speed)
+    def reverse(self, set_speed: float = math.nan, **ends: float) -> None:
+        self.start(-self.speed if math.isnan(set_speed) else set_speed, **ends)
 
     @property
     def period(self) -> float:
@@ -119,35 +124,31 @@ class Player:
 
     def keep(self, *until: Until) -> None:
         """In a line, over one elastic period, to the torque under which all masses keep the set speed."""
-        g, o, period = self.oracle.given, self.oracle, self.period
-        holds = float(g.pull.sum() + self.way * np.sum(g.hold) + self.speed * g.ground.sum())
+        o, period, holds = self.oracle, self.period, holding_torque(self.oracle.given, self.speed)
         o.phase(*until, torque=[(0.0, o.limited, (holds - o.limited) / period), (period, holds)])
 
-    def hold(self, time: float = math.inf, angle: float = 0.0) -> None:
+    def hold(self, time: float = math.inf, angle: float = math.inf) -> None:
         """Go on at the torque that holds the load; at standstill a pause without torque."""
         if self.speed == 0.0:
             self.oracle.phase(Until("time", time), torque=REST)
         else:
-            self.keep(*([Until("angle", self.way * angle, self.way)] if angle else within(time)))
+            self.keep(*ends_of(self.oracle, time, angle)(self.way))
 
     def jog(self, time: float, set_speed: float = math.nan, **stop: Any) -> None:
         self.start(set_speed, time)
         self.stop(**stop)
 
-    def brake(self) -> None:
-        self.stop(by="brake")
+    def brake(self, time: float = math.inf) -> None:
+        self.stop(by="brake", time=time)
 
     def stop(
-        self,
-        by: str,
-        braking_torque: float = math.nan,
-        brake_speed: float = 0.0,
-        brake_time: float = math.nan,
-    ) -> None:
+        self, by: str, braking_torque: float = math.nan, brake_speed: float = 0.0,
+        brake_time: float = math.nan, time: float = math.inf,
+    ) -> None:  # fmt: skip
         """Braking torque until the motor stands, or none; then the brake closes, and all come to rest."""
         o, braked, stands = self.oracle, self.case.brake > 0.0, Until("stand", self.period)
         o.watch()
-        size = self.case.braking if math.isnan(braking_torque) else braking_torque
+        size, ends = self.case.braking if math.isnan(braking_torque) else braking_torque, ends_of(o, time)
         torque = [(0.0, -self.way * size)] if by == "torque" else REST
         slows = by == "torque" or (by == "coast" and braked) or brake_speed > 0.0
         if not math.isnan(brake_time):
@@ -159,25 +160,49 @@ class Player:
             if self.case.closing > 0.0:
                 o.phase(Until("time", self.case.closing), torque=REST)
             o.brake = self.case.brake
-        self.rest()
+        self.rest(ends)
 
-    def rest(self) -> None:
-        """Without torque until all masses have stood for one elastic period."""
-        self.oracle.phase(Until("stand", self.period), torque=REST)
+    def rest(self, ends: Any) -> None:
+        """Without torque until all masses have stood for one elastic period, or to the time of the step."""
+        end = self.oracle.phase(Until("stand", self.period), *ends(), torque=REST)
         self.oracle.watch(False)
+        if end.reason == "stand" and ends():
+            self.oracle.phase(*ends(), torque=REST)
         self.speed = 0.0
 
-    def load(self, mass: int = -1, **changes: float) -> None:
+    def load(self, mass: int = -1, time: float = math.inf, **changes: float) -> None:
+        ends = ends_of(self.oracle, time)
         self.oracle.load(mass, **changes)
         self.oracle.watch()
-        self.rest()
+        self.rest(ends)
 
 
 REST = [(0.0, 0.0)]  # no torque
 
 
-def within(time: float) -> list[Until]:
-    return [Until("time", time)] if time < math.inf else []
+def ends_of(oracle: DutyOracle, time: float, angle: float = math.inf) -> Callable[..., list[Until]]:
+    """What is left from here on of the time and the travel of a step, at any instant of it."""
+    begin, phi = oracle.time, float(oracle.y[-1])
+
+    def left(way: float = 1.0) -> list[Until]:
+        ends = [Until("time", begin + time - oracle.time)] if time < math.inf else []
+        return ends + [Until("angle", phi + way * angle - float(oracle.y[-1]), way)] * (angle < math.inf)
+
+    return left
+
+
+def holding_torque(g: Given, speed: float) -> float:
+    """The motor torque under which all masses keep this speed: from both ends inwards, with gear losses."""
+    need = g.pull + math.copysign(1.0, speed) * g.hold + speed * g.ground
+    for i, (points, torques, _) in g.curves.items():
+        need[i] += np.interp(speed, points, torques)
+    arrives, n = [0.0, 0.0], need.size
+    for side, masses in enumerate((range(g.motor), range(n - 1, g.motor, -1))):
+        for i in masses:
+            through = arrives[side] + float(need[i])
+            eta = float(g.efficiency[i if side == 0 else i - 1])
+            arrives[side] = through / eta if through * speed > 0.0 else through * eta
+    return float(need[g.motor]) + sum(arrives)
 
 
 # ---- random cases ---------------------------------------------------------------------------------------
@@ -316,3 +341,79 @@ def cycle(rng: np.random.Generator, active: bool, brake: float, target: float, p
         [jog(1.0), run(-1.0), pause, run(1.0)],
     ]
     return several[int(rng.integers(len(several)))]
+
+
+# ---- single cases ---------------------------------------------------------------------------------------
+
+
+def given_of(J: list[float], c: list[float], d: list[float], gap: list[float], **changes: Any) -> Given:
+    """Masses at rest in mid-gap, without loads and friction but for these changes."""
+    n = len(J)
+    fields: dict[str, Any] = {
+        "J": J, "c": c, "d": d, "gap": gap, "Mc": np.zeros(n), "reactive": np.zeros(n, bool),
+        "w0": np.zeros(n), "theta0": np.zeros(n - 1), "ground": np.zeros(n), "friction": np.zeros(n),
+        "restitution": np.full(n - 1, math.nan), "efficiency": np.ones(n - 1), "gear": np.arange(n - 1),
+    }  # fmt: skip
+    arrays = {name: np.asarray(value) for name, value in (fields | changes).items() if name != "curves"}
+    motor = int(arrays.pop("motor", 0))
+    return Given(**arrays, law=["no-pull"] * (n - 1), tones=[], motor=motor, curves=changes.get("curves", {}))
+
+
+def single_cases() -> dict[str, Case]:
+    """What the random cases do not have: each with the part of the rules that it is about."""
+    hoist = given_of(
+        [0.19, 0.065], [3200.0], [4.0], [0.1], Mc=[0.0, 120.0], friction=[3.0, 6.0], ground=[0.0, 0.01],
+        theta0=[0.05 + 120.0 / 3200.0],
+    )  # fmt: skip
+    up_and_down: list[dict[str, Any]] = [
+        {"do": "start"}, {"do": "hold", "time": 0.15}, {"do": "stop", "by": "torque", "brake_speed": 4.0},
+        {"do": "load", "Mc": 150.0, "J": 0.09}, {"do": "start", "set_speed": -20.0},
+        {"do": "hold", "angle": 5.0}, {"do": "stop", "by": "torque", "braking_torque": 190.0},
+        {"do": "load", "Mc": 120.0, "J": 0.065},
+    ]  # fmt: skip
+    # a crane's travel: the load turns the machine on, as wind does, and friction holds it
+    wind = given_of(
+        [0.035, 0.2], [368.0], [0.8], [0.3], Mc=[0.0, -3.0], friction=[0.6, 4.5], ground=[2e-3, 1e-3]
+    )
+    travel: list[dict[str, Any]] = [
+        {"do": "start", "angle": 2.5}, {"do": "brake"}, {"do": "start", "set_speed": -18.0, "time": 0.4},
+        {"do": "reverse", "set_speed": 21.0, "angle": 9.0}, {"do": "hold", "time": 0.2},
+        {"do": "stop", "by": "torque", "brake_time": 0.05, "time": 2.5},
+        {"do": "jog", "time": 0.1, "by": "torque", "braking_torque": 12.0},
+        {"do": "load", "Mc": 3.0, "time": 0.35}, {"do": "start"}, {"do": "brake", "time": 1.5},
+    ]  # fmt: skip
+    # four masses, the motor on the second one, gears that lose on either side of their shafts
+    geared = given_of(
+        [0.4, 0.3, 0.5, 0.8], [900.0, 1500.0, 700.0], [4.0, 5.0, 4.0], [0.05, 0.0, 0.1], motor=1,
+        Mc=[1.5, 0.0, 0.0, 6.0], reactive=[True, False, False, True], friction=[0.0, 1.0, 0.4, 0.0],
+        efficiency=[0.9, 0.85, 0.95], gear=[0, 2, 2], ground=[0.01, 0.0, 0.02, 0.0],
+        theta0=[0.01, 0.0, -0.02],
+    )  # fmt: skip
+    shift: list[dict[str, Any]] = [
+        {"do": "start"}, {"do": "hold", "time": 0.6}, {"do": "stop", "by": "coast"},
+        {"do": "load", "mass": 0, "Mc": 3.0, "J": 0.7}, {"do": "load", "J": 0.5},
+        {"do": "start", "set_speed": -6.0}, {"do": "hold", "angle": 3.0}, {"do": "stop", "by": "torque"},
+        {"do": "jog", "time": 0.25, "by": "brake", "repeat": 2},
+    ]  # fmt: skip
+    # a fan: a load curve over the speed brakes it
+    curve = (np.array([0.0, 10.0, 20.0, 30.0]), np.array([0.0, 2.0, 8.0, 18.0]), False)
+    fan = given_of([0.05, 0.3], [600.0], [1.0], [0.0], friction=[0.3, 1.2], curves={1: curve})
+    blow: list[dict[str, Any]] = [
+        {"do": "start", "set_speed": 24.0}, {"do": "hold", "time": 0.5}, {"do": "stop", "by": "coast"},
+        {"do": "hold", "time": 0.1}, {"do": "start", "set_speed": 12.0}, {"do": "stop", "by": "torque"},
+    ]  # fmt: skip
+    return {
+        "proving": Case(
+            hoist, 250.0, 200.0, 0.02, 9000.0, 30.0, [(0.0, 150.0, 800.0), (0.125, 250.0)], up_and_down,
+            260.0, 0.03, 0.04, proving=True,
+        ),
+        "travel": Case(
+            wind, 40.0, 25.0, 0.0, math.inf, 24.0, [(0.0, 40.0)], travel, 15.0, 0.02, 0.03
+        ),
+        "dead-time": Case(
+            wind, 40.0, 25.0, 0.004, 1500.0, 24.0, [(0.0, 20.0), (0.06, 40.0)], travel, 15.0, 0.02, 0.03,
+            dead_time=0.007,
+        ),
+        "gears": Case(geared, 30.0, 24.0, 0.0, math.inf, 8.0, [(0.0, 30.0)], shift, 40.0, 0.0, 0.05),
+        "fan": Case(fan, 26.0, 20.0, 0.003, math.inf, 30.0, [(0.0, 26.0)], blow),
+    }  # fmt: skip

@@ -155,6 +155,7 @@ class DutyOracle:
     given: Given
     lag: float = 0.0
     rate: float = math.inf
+    dead_time: float = 0.0  # after which a new demand takes effect, s
     band: float = 0.0  # rad/s, for "stand"
     speed: float = 1.0  # a speed that is reached, for the tolerances
     longest: float = math.inf  # of a phase without a time, s
@@ -199,7 +200,7 @@ class DutyOracle:
             friction = np.broadcast_to(g.friction, g.J.shape).astype(float)
             friction[g.motor] += self.brake
             g = replace(g, friction=friction)
-        pieces = self.pieces if torque is None else torque
+        pieces = self.pieces if torque is None else self.after_dead_time(torque)
         timed = [one.value for one in until if one.kind == "time"]
         end = min([self.longest, *timed])
         path = TorquePath(pieces, self.lag, self.rate, self.u, end, self.limited)
@@ -218,6 +219,11 @@ class DutyOracle:
         )  # fmt: skip
         self.ends.append(found)
         return found
+
+    def after_dead_time(self, torque: list[Any]) -> list[Any]:
+        """The pieces under way until the new ones take effect."""
+        before = [one for one in self.pieces if one[0] < self.dead_time]
+        return before + [(start + self.dead_time, *rest) for start, *rest in torque]
 
     def energy(self) -> float:
         """Kinetic energy and that of the springs, J; of masses that are held fast none."""

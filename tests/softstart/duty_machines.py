@@ -25,34 +25,40 @@ def drive_of(case: Case) -> Drive:
         gap=float(g.gap[0]), contact_law=g.law[0], load_inertia=float(g.J[1]), load_torque=float(g.Mc[1]),
         load_kind="reactive" if g.reactive[1] else "active", load_friction=float(g.friction[1]),
         load_viscous_friction=float(g.ground[1]), target_speed=case.target,
-        start_position=float(g.theta0[0]), **brake_of(case),
+        start_position=float(g.theta0[0]), computing_delay=case.dead_time, **brake_of(case),
     )  # fmt: skip
 
 
 def chain_of(case: Case) -> Chain:
     motor = Motor(
-        case.torque, mass="mass 1", minimum_torque=-case.braking, torque_lag=case.lag, torque_rate=case.rate,
-        encoder_lines=0,
+        case.torque, mass=f"mass {case.given.motor + 1}", minimum_torque=-case.braking, torque_lag=case.lag,
+        torque_rate=case.rate, encoder_lines=0, computing_delay=case.dead_time,
     )  # fmt: skip
     chain = built(case.given, motor, case.target)
     return chain.replace(**brake_of(case))
 
 
-def brake_of(case: Case) -> dict[str, float]:
+def machine_of(case: Case) -> Drive | Chain:
+    return chain_of(case) if case.given.J.size > 2 or case.given.curves else drive_of(case)
+
+
+def brake_of(case: Case) -> dict[str, Any]:
     """The parameters of its brake; an ideal lock has delays alone."""
     torque = {"brake_torque": case.brake} if 0.0 < case.brake < math.inf else {}
     delays = {"closing_delay": case.closing, "opening_delay": case.opening} if case.brake > 0.0 else {}
-    return {**torque, **delays}
+    return {**torque, **delays, **({"brake": "motor", "release": "torque"} if case.proving else {})}
 
 
 def duty_of(case: Case) -> Duty:
-    return Duty(
-        steps=[DutyStep(**{LOADS.get(key, key): one for key, one in step.items()}) for step in case.steps]
-    )
+    steps = [{LOADS.get(key, key): value for key, value in step.items()} for step in case.steps]
+    for step in steps:
+        if "mass" in step:
+            step["mass"] = f"mass {step['mass'] + 1}"
+    return Duty(steps=[DutyStep(**step) for step in steps])
 
 
-def run_of(case: Case, machine: Drive | Chain, cycles: int = 1) -> DutyRun:
-    return run_duty(machine, Pieces(pieces=tuple(case.pieces)), duty_of(case), cycles=cycles)
+def run_of(case: Case, cycles: int = 1) -> DutyRun:
+    return run_duty(machine_of(case), Pieces(pieces=tuple(case.pieces)), duty_of(case), cycles=cycles)
 
 
 def differences(case: Case, run: DutyRun, steps: list[Step]) -> dict[str, float]:
@@ -72,7 +78,7 @@ def differences(case: Case, run: DutyRun, steps: list[Step]) -> dict[str, float]
     for ran, step in zip(run.executed, steps, strict=False):
         note("time", [ran.begin, ran.end], [step.phases[0].begin, step.end.time], length)
         note("peaks", [ran.largest, ran.smallest], [step.highest, step.lowest], peak)
-        if step.do in ("stop", "load", "brake"):
+        if step.do in ("stop", "load", "brake") and step.end.reason == "stand":
             note("since", ran.begin + ran.time, step.end.since, length)
         for end in step.phases:
             before = run.at(min(end.time, run.executed[-1].end))

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.duty_cases import Case, Player, random_chain, random_drive
-from tests.softstart.duty_machines import chain_of, differences, drive_of, run_of
+from tests.duty_cases import Case, Player, random_chain, random_drive, single_cases
+from tests.softstart.duty_machines import differences, run_of
 
 from softstart import DutyRun
 from softstart.kernel import records as rec
@@ -16,33 +16,36 @@ from softstart.start.metrics import energy_balance
 from softstart.start.trajectory import Trajectory
 
 # start, hold, stop, reversal, jog, load change; by torque, coast and brake; a lock; loads that pull
-QUICK = [("drive", 1), ("drive", 4), ("drive", 7), ("drive", 9), ("chain", 4)]
-ALL = [*(("drive", seed) for seed in range(30)), *(("chain", seed) for seed in range(10))]
-EACH = [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in ALL]
+RANDOM = [*(("drive", seed) for seed in range(30)), *(("chain", seed) for seed in range(10))]
+SINGLE = [("single", name) for name in single_cases()]
+QUICK = [("drive", 1), ("drive", 4), ("drive", 7), ("drive", 9), ("chain", 4), ("single", "proving")]
+EACH = [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in [*RANDOM, *SINGLE]]
+Key = int | str
 
 
-def case_of(kind: str, seed: int) -> Case:
-    return random_drive(seed) if kind == "drive" else random_chain(seed)
+def case_of(kind: str, key: Key) -> Case:
+    if kind == "single":
+        return single_cases()[str(key)]
+    return random_drive(int(key)) if kind == "drive" else random_chain(int(key))
 
 
 @cache
-def duty_run(kind: str, seed: int) -> DutyRun:
+def duty_run(kind: str, key: Key) -> DutyRun:
     """Two cycles: a load that is changed in the first one stays so."""
-    case = case_of(kind, seed)
-    return run_of(case, drive_of(case) if kind == "drive" else chain_of(case), cycles=2)
+    return run_of(case_of(kind, key), cycles=2)
 
 
-@pytest.mark.parametrize(("kind", "seed"), EACH)
-def test_duties_against_the_oracle(kind: str, seed: int) -> None:
+@pytest.mark.parametrize(("kind", "key"), EACH)
+def test_duties_against_the_oracle(kind: str, key: Key) -> None:
     """States at the ends of all phases, peaks of both signs of all steps and their times, within 1e-8.
 
     The oracle itself changes by 1e-11 at a finer tolerance. In the suite the first cycle, of a chain its
     first four steps.
     """
-    case, run = case_of(kind, seed), duty_run(kind, seed)
+    case, run = case_of(kind, key), duty_run(kind, key)
     count = len(run.executed)
-    if (kind, seed) in QUICK:
-        count = count // 2 if kind == "drive" else 4
+    if (kind, key) in QUICK:
+        count = 4 if kind == "chain" else count // 2
     player, several = Player(case), [step for step, times in case.repeated for _ in range(times)] * 2
     found = differences(case, run, [player.step(**step) for step in several[:count]])
     assert max(found.values()) < 1e-8, found
@@ -96,6 +99,8 @@ def check_balances(run: DutyRun) -> None:
         moved = sum(abs(one) for one in (energy.motor, energy.kinetic, energy.elastic, energy.load))
         moved = max(moved, 1e-3 * own["size"].sum() * target)
         assert abs(energy.residual) <= 1e-9 * moved, phase.what
+        if phase.trajectory.input.curves.size or energy.gears:  # which the quadrature does not have
+            continue
         assert np.abs(own["momentum"] - own["impulse"]).max() <= 1e-9 * own["size"].sum(), phase.what
         assert np.abs(own["kinetic"] - own["work"]).max() <= 1e-9 * moved, phase.what
         kernel = [energy.motor, energy.load, energy.ground, -energy.shafts - energy.elastic]
@@ -110,7 +115,7 @@ def test_energy_and_momentum() -> None:
 
 @pytest.mark.slow
 def test_energy_and_momentum_of_all() -> None:
-    for one in ALL:
+    for one in [*RANDOM, *SINGLE]:
         check_balances(duty_run(*one))
 
 
@@ -177,5 +182,5 @@ def test_rainflow_counts() -> None:
 
 @pytest.mark.slow
 def test_rainflow_counts_of_all() -> None:
-    for one in ALL:
+    for one in [*RANDOM, *SINGLE]:
         check_counts(duty_run(*one))
