@@ -6,6 +6,11 @@ Options that several commands have alike; the docstring of a command describes i
     Allow a file of tuned gains to name a Python file, which is then executed.
 --controllers A,B,...
     Strategies, separated by commas. Default: all installed ones that need no parameter.
+--cycles N
+    Number of cycles of the duty. Default: 2.
+--duty [FILE]
+    Carry every machine through a duty instead of a start: a file, or the name of a shipped duty; without FILE
+    the [[duty]] of DRIVE, which is then written first.
 --fitted-to DRIVE
     Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check their
     robustness. --set changes DRIVE only.
@@ -17,6 +22,9 @@ Options that several commands have alike; the docstring of a command describes i
     Compute on the dask cluster of this scheduler.
 --set KEY=VALUE
     Change a parameter of the drive, for example load.inertia=0.07 or shaft.gap='2 rad'. May be repeated.
+--stop strategy|torque|coast|brake
+    How the machine stops where a step does not say it. Default: by the strategy if it can stop, else by
+    torque if motor.minimum_torque is below 0, else coast.
 --torque-speed SPEED:TORQUE,...
     Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 N*m':
     two or more, concave, above the load torque up to the target speed; the last piece goes on.
@@ -39,7 +47,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 import numpy as np
@@ -50,6 +58,7 @@ from softstart.chain.model import Chain
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness, still_assumed
+from softstart.drive.duty import Duty, StopBy
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, parsed
@@ -435,6 +444,10 @@ allow_code_option = click.option(
 )  # fmt: skip
 
 
+def _read_duty(name: str, option: str) -> Duty | bool:
+    return Duty.load(name) if name else True
+
+
 def _read_fitted_to(name: str, option: str) -> Drive:
     return read_drive(name, ())
 
@@ -442,6 +455,9 @@ def _read_fitted_to(name: str, option: str) -> Drive:
 until_option = option("--until", quantity("s", above=0.0))
 fitted_to_option = option("--fitted-to", _read_fitted_to, shell_complete=one_of(drive_names))
 json_option = option("--json as_json", is_flag=True)
+duty_option = option("--duty", _read_duty, is_flag=False, flag_value="")
+stop_option = option("--stop", type=click.Choice(get_args(StopBy)))
+cycles_option = option("--cycles", count(1, 100_000))
 workers_option = option("--workers", count())
 scheduler_option = option("--scheduler")
 param_option = option("--param params", read_params, multiple=True)

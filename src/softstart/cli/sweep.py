@@ -44,6 +44,9 @@ PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 @options.param_option
 @options.fitted_to_option
 @options.until_option
+@options.duty_option
+@options.stop_option
+@options.cycles_option
 @option("--figures", options.read_list)
 @options.workers_option
 @options.scheduler_option
@@ -72,7 +75,8 @@ def sweep_command(
     --param KEY=VALUE
         Set a parameter of the controller for all starts. May be repeated.
     --figures A,B,...
-        Figures to save, for example k_dyn,start_time; the status is always saved.
+        Figures to save, for example k_dyn,start_time, of a duty also k_dyn_step_2 or damage; the status is
+        always saved.
     --chunk N
         Largest number of starts that are computed and written at once.
     --netcdf FILE

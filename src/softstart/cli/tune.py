@@ -94,6 +94,9 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 @options.param_option
 @option("--metric", default="k_dyn")
 @option("--start-time")
+@options.duty_option
+@options.stop_option
+@options.cycles_option
 @option("--tolerance tolerances", read_tolerances, multiple=True)
 @option("--quantile", options.quantity("1"), default="1")
 @option("--only", type=click.Choice(["schedule", "robust"]))
@@ -132,7 +135,8 @@ def tune_command(
     --param KEY=VALUE
         Fix a parameter of the controller, which is then not tuned. May be repeated.
     --metric NAME
-        Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits].
+        Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits]. Of a duty also
+        k_dyn_step_2, that of its second step, or damage.
     --start-time TIME
         Upper bound of the start time (settled time of a strategy that holds the speed): 0.3 (s), or 1.2x
         that of direct in the same cell. Default: that of the controller with its default gains.
@@ -153,6 +157,7 @@ def tune_command(
         Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished
         parts are saved at once, so that an interrupted command resumes.
     """
+    arguments = {name: value for name, value in arguments.items() if value is not None or name != "cycles"}
     arguments |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
     with (
         kept_state(option_value("out"), STATE, "finished parts") as state,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice, product
 from typing import Any
@@ -14,6 +14,7 @@ from softstart.controller.base import CompiledController
 from softstart.controller.recipe import Recipe
 from softstart.drive.machine import Machine
 from softstart.start.batch import prepared
+from softstart.start.duty_batch import DutyBatch, DutyPlan
 from softstart.start.status import Status
 from softstart.sweeping.grid import PREFIX, Grid, axis_lengths, grid_values
 
@@ -24,13 +25,17 @@ MOST_CORNERS = 4096
 
 @dataclass(frozen=True, eq=False)
 class SweepSettings:
-    """What is the same for all starts of a sweep. `until`, `fitted_to` as in `simulate`."""
+    """What is the same for all starts of a sweep. `until`, `fitted_to` as in `simulate`.
+
+    With a `plan` each start is a duty.
+    """
 
     drive: Machine
     recipe: Recipe
     figures: tuple[str, ...]
     until: float | None = None
     fitted_to: Machine | None = None
+    plan: DutyPlan | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +56,9 @@ def compute(task: ChunkTask) -> Block:
     gaps = np.full(task.starts, settings.drive.gap_and_inertia[0])
     machines = varied(settings.drive, {"gap": gaps, **drive})
     fitted_to = None if settings.fitted_to is None else settings.fitted_to.design_drive
-    results = prepared(machines).figures(
+    plan = settings.plan
+    batch = prepared(machines) if plan is None else DutyBatch.of(machines, plan, settings.figures)
+    results = batch.figures(
         settings.recipe.make(parameters, name).set_ups(fitted_to or machines),
         machines.mean_torque,
         until=settings.until,
@@ -75,11 +82,17 @@ def check_corners(settings: SweepSettings, grid: Grid) -> None:
     """Raise the InputError of the first corner of the grid whose drive or controller is impossible."""
     for corner in islice(product(*(_ends(grid, dim) for dim in axis_lengths(grid))), MOST_CORNERS):
         drive, parameters, name = _by_owner({name: one for end in corner for name, one in end.items()})
+        machines: Iterable[Machine]
         if any(isinstance(value, np.ndarray) for value in drive.values()):
-            varied(settings.drive, drive)
+            machines = varied(settings.drive, drive).elements()
         else:
-            settings.drive.with_values(drive)
-        settings.recipe.make(parameters, name)
+            machines = [settings.drive.with_values(drive)]
+        controller = settings.recipe.make(parameters, name)
+        if settings.plan is not None:
+            machines = [*machines]
+            designs = [settings.fitted_to] * len(machines) if settings.fitted_to else machines
+            for machine, set_up in zip(machines, controller.set_ups(designs), strict=True):
+                settings.plan.check(machine, *set_up)
 
 
 def _ends(grid: Grid, dim: str) -> list[dict[str, Any]]:
@@ -96,7 +109,7 @@ def first_start(settings: SweepSettings, grid: Grid) -> bool:
 
     Returns whether all controllers are compiled, so that threads serve as well as processes.
     """
-    compiled = True
+    compiled = settings.plan is None  # Python carries out the steps of a duty
     # one value of each axis; the figures are thrown away
     first = {name: one[:1] for name, one in grid.items()}
     for name in grid[PREFIX].values.tolist() if PREFIX in grid else [""]:

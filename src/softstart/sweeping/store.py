@@ -23,8 +23,10 @@ import numpy as np
 
 from softstart import __version__
 from softstart.controller.recipe import about_name
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.start.batch import figure_columns
+from softstart.start.duty_batch import DutyPlan
 from softstart.start.status import Status
 from softstart.stopping import at_stop
 from softstart.store import PartStore, Target, fresh_folder
@@ -40,14 +42,23 @@ LIST = f"{STATUS}/softstart.sqlite"  # beside the chunks of `status`, where Zarr
 MOST_IN_MEMORY = 10_000_000  # starts
 
 
+def columns_of(machine: Machine, plan: DutyPlan | None) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of all figures by name, of starts of a machine or of its duties."""
+    if plan is not None:
+        return plan.figure_columns(machine.shaft_names)
+    columns = figure_columns(machine.shaft_names).items()
+    return {name: (unit, meaning) for name, (_, unit, meaning) in columns}
+
+
 def empty_results(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> xarray.Dataset:
     """The results before anything is computed; their figures take no memory, however large the grid."""
     import xarray
 
-    sizes, known, machine = axis_lengths(grid), figure_columns(settings.drive.shaft_names), settings.drive
+    sizes, machine = axis_lengths(grid), settings.drive
+    known = columns_of(machine, settings.plan)
     data: dict[str, Any] = {
         name: (list(sizes), np.broadcast_to(np.nan, plan.shape), {"units": unit, "long_name": meaning})
-        for name, (_, unit, meaning) in ((name, known[name]) for name in settings.figures)
+        for name, (unit, meaning) in ((name, known[name]) for name in settings.figures)
     }
     data[STATUS] = list(sizes), np.broadcast_to(np.int8(NOT_COMPUTED), plan.shape), {
         "long_name": "how the start ended",
@@ -64,6 +75,7 @@ def empty_results(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> xarra
         "title": f"{machine.name}, {shown}" if shown else machine.name,
         "source": f"softstart {__version__}",
         "softstart_drive": machine.to_toml(),
+        **({} if settings.plan is None else {"softstart_duty": settings.plan.words()}),
     }
     return xarray.Dataset(data, {**numbers, **grid}, attributes)
 
@@ -79,6 +91,7 @@ def sweep_inputs(plan: ChunkGrid, grid: Grid, settings: SweepSettings) -> dict[s
         "fitted_to": settings.fitted_to and settings.fitted_to.to_toml(),
         "softstart": __version__,
         "chunk": math.prod(plan.chunk),
+        **({} if settings.plan is None else settings.plan.inputs()),
     }
     for name, axis in grid.items():
         inputs[f"axis {name}"] = (
@@ -211,7 +224,9 @@ class FolderStore(MemoryStore):
                 self._make_way(name)
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (fresh / name).replace(folder / name)
-        opened = dict(zarr.open_group(folder, mode="r+").arrays())
+        # a chunk of NaN only is written too: a missing one counts as damaged
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            opened = dict(zarr.open_group(folder, mode="r+").arrays())
         self._arrays = {str(name): opened[str(name)] for name in self._empty.data_vars}
         for record in self._list.parts():
             index = tuple(record["part"])

@@ -32,8 +32,9 @@ class Summary:
 
     @property
     def share_reached(self) -> float:
-        """Share of the starts that brought the load to its target speed."""
-        return self.statuses.get(Status.REACHED.name, 0) / self.starts
+        """Share of the starts that brought the load to its target speed, or of the duties carried out."""
+        good = (status.name for status in Status if status.success)
+        return sum(self.statuses.get(name, 0) for name in good) / self.starts
 
     @property
     def share_kept(self) -> float | None:

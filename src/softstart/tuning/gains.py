@@ -40,14 +40,15 @@ Progress = Callable[[str], object]
 
 
 class StartCounter:
-    """Counts starts, and tells whoever wants to know how far it is.
+    """Counts starts, or duties, and tells whoever wants to know how far it is.
 
     >>> StartCounter(print).tell("schedule", 1, 40)
     schedule, generation 1 of 40, 0 starts
     """
 
-    def __init__(self, progress: Progress | None) -> None:
-        self.progress, self.began, self.starts = progress, time.perf_counter(), 0
+    def __init__(self, progress: Progress | None, what: str = "starts") -> None:
+        self.progress, self.what = progress, what
+        self.began, self.starts = time.perf_counter(), 0
 
     @property
     def seconds(self) -> float:
@@ -59,7 +60,7 @@ class StartCounter:
         if self.progress is not None:
             parts = f", {unit} {done} of {total}" if total else ""
             rate = f", {self.starts / self.seconds:,.0f}/s" if self.starts else ""
-            self.progress(f"{title}{parts}, {self.starts:,} starts{rate}")
+            self.progress(f"{title}{parts}, {self.starts:,} {self.what}{rate}")
 
 
 def best_gains(
@@ -68,9 +69,10 @@ def best_gains(
     """The best gains of every job; those of some cells of a `schedule` begin the first search of one set."""
     problem, costs = trials.problem, partial(shared_costs, trials, pool)
     if not np.any(np.isfinite(trials.default.metric)):
+        what, verb = ("start", "starts") if problem.plan is None else ("duty", "is carried out")
         raise InputError(
-            f"metric = {problem.metric_name}: no start of {problem.recipe.label} with its defaults has "
-            "this result; choose another metric, or give parameters with which it starts."
+            f"metric = {problem.metric_name}: no {what} of {problem.recipe.label} with its defaults has "
+            f"this result; choose another metric, or give parameters with which it {verb}."
         )
     jobs, restarts = len(trials.drives), problem.restarts
     last = _searched(trials, costs, parts, log, schedule)

@@ -226,6 +226,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
             "drive": self.drive.name,
             "metric": self.metric,
             f"{q.time}_bound": q.bound,
+            **({} if q.plan is None else {"duty": q.plan.words()}),
             "gaps": list(q.gaps),
             "load_inertias": list(q.load_inertias),
             "scenarios": len(q.scenarios),

@@ -18,7 +18,7 @@ from softstart.chain.machines import as_machine, listed_of, quantity_of, varied
 from softstart.controller import Controller
 from softstart.controller.recipe import Recipe
 from softstart.controller.tuned import Tuned
-from softstart.drive import Drive
+from softstart.drive import Drive, Duty
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, Mistakes
@@ -28,6 +28,7 @@ from softstart.optimal.problem import StartTime
 from softstart.quantities import check_whole, multiplied, to_si
 from softstart.start.comparison import as_far_as_known
 from softstart.start.demand import ControllerLike, as_recipe
+from softstart.start.duty_batch import DutyPlan
 from softstart.start.results import has_margin
 from softstart.tuning.ranges import Free, Range, ranges_of
 from softstart.tuning.search import latin
@@ -52,6 +53,7 @@ class TuningProblem:
     restarts: int
     population: int
     generations: int
+    plan: DutyPlan | None = None  # each start is a duty
     soft: Drive | None = None  # at the soft end of an unknown stiffness: the second half of the scenarios
 
     @property
@@ -125,6 +127,7 @@ class TuningProblem:
             "tolerances": [repr(sorted(one.items())) for one in self.scenarios],
             "start time": self.bound,
             **{name: getattr(self, name) for name in plain},
+            **({} if self.plan is None else self.plan.inputs()),
         }
 
 
@@ -146,6 +149,9 @@ def tuning_problem(
     tolerances: Mapping[str, Any] | None,
     quantile: float,
     search: Mapping[str, Any],
+    duty: Duty | str | bool | None,
+    stop: str | None,
+    cycles: int,
 ) -> TuningProblem:
     """The arguments of `tune`, read; InputError with all mistakes."""
     known, drawn, soft = as_far_as_known(machine, DRAWN)
@@ -174,12 +180,15 @@ def tuning_problem(
         wrong.sentences.append(f"quantile = {quantile!r}: give a share of the starts above 0, at most 1.")
     if not isinstance(metric, str):
         wrong.sentences.append(f"metric = {metric!r}: name a figure of a start, as k_dyn.")
+    plan: DutyPlan | None = None
+    with wrong.collect():
+        plan = DutyPlan.of(drive, duty, stop, cycles)
     if metric == MARGIN and not has_margin(drive.limits):
         wrong.sentences.append(f"metric = margin: the {drive.KIND} has no limits; give {drive.LIMITS_GIVEN}.")
     wrong.raise_if_any()
     size = {"population": max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))}
     return TuningProblem(
-        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), soft=soft,
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, float(quantile), plan=plan, soft=soft,
         **(size | dict(search)),
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart.chain.machines import MachineLike
-from softstart.drive import Drive
+from softstart.drive import Drive, Duty
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.errors import InputError
 from softstart.parallel import Pool, checked_workers, usable_workers
@@ -41,6 +41,9 @@ def tune(
     free: Free = None,
     metric: str = "k_dyn",
     start_time: float | str | None = None,
+    duty: Duty | str | bool | None = None,
+    stop: str | None = None,
+    cycles: int = 2,
     tolerances: Mapping[str, Any] | None = None,
     quantile: float = 1.0,
     schedule: bool = True,
@@ -94,6 +97,13 @@ def tune(
         strategy that holds the speed it is a bound on the settled time. By default each start is to be no
         slower than with the controller's own defaults; for the margin to a permissible start time there is
         no other bound.
+    duty : Duty, path or bool, optional
+        Every candidate carries the machines through a duty instead of a start: itself, its file or, if True,
+        that of the machine. The metric is then one of the duty: `k_dyn` of all steps, `k_dyn_step_2`, that of
+        its second step, `damage` of a cycle; the bound is on the longest time of its starts and reversals,
+        where these reach their set speeds with the defaults.
+    stop, cycles : optional
+        As in `run_duty`.
     tolerances : mapping, optional
         What drives may be off by, unknown to the controller, see `tuning_scenarios`: a parameter -> "10 %", a
         quantity, or a list of values; of a chain also one mass or shaft ("shaft[2].gap").
@@ -103,7 +113,7 @@ def tune(
         Which of the two questions to answer.
     certified : bool, optional
         Whether to compute each cell's optimum within the same time and its lower bound (only of `k_dyn`).
-        By default that of drives; that of a chain takes longer.
+        By default that of drives; that of a chain takes longer. There is none of a duty.
     seed, restarts, population, generations : int
         Of the search. The same ones give the same bits, whoever computes.
     workers, scheduler, progress : optional
@@ -145,10 +155,13 @@ def tune(
     problem = tuning_problem(
         drive, controller, gaps, inertias, parameters=parameters, free=free, metric=metric,
         start_time=start_time, tolerances=tolerances, quantile=quantile, search=search,
+        duty=duty, stop=stop, cycles=cycles,
     )  # fmt: skip
-    certified = isinstance(problem.drive, Drive) if certified is None else certified
-    log = StartCounter(progress)
-    log.tell("starts with the defaults")
+    if certified and problem.plan is not None:
+        raise InputError("certified = True: an optimum is that of a single start; leave it out for a duty.")
+    certified = isinstance(problem.drive, Drive) and problem.plan is None if certified is None else certified
+    log = StartCounter(progress, "starts" if problem.plan is None else "duties")
+    log.tell(f"{log.what} with the defaults")
     sides = {name: Trials(problem, robust=name == "robust") for name in wanted}
     searches: dict[str, tuple[Trials, GainSearch]] = {}
     target = None if save_to is None else Target("save_to", Path(save_to), "tuning")

@@ -140,7 +140,8 @@ def _figures(trials: Trials, judged: Judged) -> Columns:
     over = "" if len(problem.scenarios) == 1 else f", quantile {share:g} over the tolerances"
     for end, what, one in (("", "tuned", judged), ("_default", "of the defaults", trials.default)):
         metric, time = (_by_cell(trials, part) for part in one)
-        columns[f"{problem.time}{end}"] = (time[:, 0], "s", f"{problem.time_name}, {what}, nominal")
+        shown = np.where(time == 0.0, math.nan, time)  # of a duty without a start
+        columns[f"{problem.time}{end}"] = (shown[:, 0], "s", f"{problem.time_name}, {what}, nominal")
         columns[f"{name}{end}"] = (_over_scenarios(metric, share), "", f"{name}, {what}{over}")
         if over and not end:
             columns[f"{name}_as_is"] = (metric[:, 0], "", f"{name}, tuned, nominal")

@@ -24,6 +24,7 @@ from softstart.errors import InputError
 from softstart.hints import nearest
 from softstart.parallel import Pool
 from softstart.start.batch import Batch, prepared
+from softstart.start.duty_batch import DutyBatch
 from softstart.start.results import limited_time
 from softstart.tuning.problem import MARGIN, TuningProblem
 
@@ -64,10 +65,12 @@ class Trials:
         self.base = np.repeat([one.mean_torque for one in cells], scenarios)
         self.batch = _starts_of_cells(problem)
         set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
-        self.compiled = isinstance(set_up[0], CompiledController)
+        self.compiled = isinstance(set_up[0], CompiledController) and problem.plan is None
         self.defaults = {name: _defaults(problem, name, set_up) for name in problem.names}
         self.time_limit: float | None = None
+        self.timeless = np.zeros(self.starts_of.shape, dtype=bool)
         self.default, self.bound = known or self._measured()
+        self.timeless = self.default.start_time == 0.0
         if np.isfinite(longest := float(self.bound.max())):
             self.time_limit = PATIENCE * longest + self._longest_dwell()
 
@@ -77,11 +80,17 @@ class Trials:
     def _measured(self) -> tuple[Judged, Vector]:
         """What the defaults reach, and the bounds that follow."""
         limit, default = self.problem.start_time, self.judged(np.arange(len(self.drives)), {})
+        if self.problem.plan is not None:
+            # a duty of jogs has no start time to bound, nor has a start that ends before its set speed
+            timeless = np.isnan(default.start_time) & ~np.isnan(default.metric)
+            default = Judged(default.metric, np.where(timeless, 0.0, default.start_time))
         if limit is not None and limit.multiple:
-            return default, limit.value * self._direct()[self.starts_of]
-        if limit is not None or self.problem.limited:
-            return default, np.full(self.starts_of.shape, limit.value if limit else math.inf)
-        return default, np.where(np.isnan(default.start_time), np.inf, default.start_time)
+            bound = limit.value * self._direct()[self.starts_of]
+        elif limit is not None or self.problem.limited:
+            bound = np.full(self.starts_of.shape, limit.value if limit else math.inf)
+        else:
+            bound = np.where(np.isnan(default.start_time), np.inf, default.start_time)
+        return default, np.where(default.start_time == 0.0, np.inf, bound)
 
     def _longest_dwell(self) -> float:
         """For how long a start must be settled at most, s, under a strategy that holds the speed; else 0."""
@@ -102,7 +111,7 @@ class Trials:
         figures = self.batch.figures(
             make_controller("direct").set_ups(drives), 1.0, settled=problem.time == "settled_time"
         )
-        start_times: Vector = figures[problem.time][0]
+        start_times: Vector = figures[problem.time if problem.plan is None else "start_time"][0]
         if np.any(failed := np.isnan(start_times)):
             gap, inertia = problem.cells[int(failed.argmax()) // len(problem.scenarios)]
             raise InputError(
@@ -166,14 +175,16 @@ class Trials:
         if metric not in figures:
             near = nearest(metric, figures)
             hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figures)}."
-            raise InputError(f'metric = "{metric}": this is not a result of a start; {hint}')
+            what = "start" if self.problem.plan is None else "duty"
+            raise InputError(f'metric = "{metric}": this is not a result of a {what}; {hint}')
         time = limited_time(figures).reshape(starts.shape)
         figure = figures[metric][0].reshape(starts.shape)
+        time = np.where(self.timeless[jobs] & ~np.isnan(figure), 0.0, time)
         return Judged(1.0 - figure if metric == MARGIN else figure.astype(np.float64), time)
 
 
-def _starts_of_cells(problem: TuningProblem) -> Batch:
-    """The machines that start: of each cell, one after another, those of all scenarios."""
+def _starts_of_cells(problem: TuningProblem) -> Batch | DutyBatch:
+    """The machines that start, or carry out a duty: of each cell, one by one, those of all scenarios."""
     of_cells: dict[str, Any] = dict(zip(("gap", "load_inertia"), np.array(problem.cells).T, strict=True))
     drives: list[Any] = [problem.drive_of(cell) for cell in range(len(problem.cells))]
     columns_by_name = {}
@@ -186,7 +197,10 @@ def _starts_of_cells(problem: TuningProblem) -> Batch:
         )
         columns = [one[name].of(value) if name in one else value for one in problem.scenarios]
         columns_by_name[name] = np.stack(columns, axis=1).ravel()
-    return prepared(varied(problem.drive, columns_by_name))
+    machines = varied(problem.drive, columns_by_name)
+    if problem.plan is not None:
+        return DutyBatch.of(machines, problem.plan, [problem.metric])
+    return prepared(machines)
 
 
 def _defaults(problem: TuningProblem, name: str, set_up: list[Controller]) -> Vector:

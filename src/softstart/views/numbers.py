@@ -177,10 +177,19 @@ def short(value: float) -> str:
 def plural(count: int, noun: str) -> str:
     """A count and its noun.
 
-    >>> plural(1, "start"), plural(2000, "start"), plural(0, "gap")
-    ('1 start', '2,000 starts', '0 gaps')
+    >>> plural(1, "start"), plural(2000, "start"), plural(0, "gap"), plural(3, "duty")
+    ('1 start', '2,000 starts', '0 gaps', '3 duties')
     """
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+    return f"{count:,} {noun if count == 1 else plural_of(noun)}"
+
+
+def plural_of(noun: str) -> str:
+    """The noun of several things.
+
+    >>> plural_of("start"), plural_of("duty")
+    ('starts', 'duties')
+    """
+    return f"{noun.removesuffix('y')}ies" if noun.endswith("ty") else f"{noun}s"
 
 
 def with_unit(value: float, unit: str) -> str:

@@ -15,7 +15,7 @@ from softstart.start.status import Status
 from softstart.sweeping.summary import SHARES, pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import NOTHING, Column, TextTable, column_of, label, number, plural
+from softstart.views.numbers import NOTHING, Column, TextTable, column_of, label, number, plural, plural_of
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
 
@@ -128,6 +128,11 @@ def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[P
     return figure
 
 
+def _what(results: xarray.Dataset) -> str:
+    """What is at each place of the grid: a start, or a duty."""
+    return "duty" if "softstart_duty" in results.attrs else "start"
+
+
 def _unit(results: xarray.Dataset, name: str) -> str:
     return str(results[name].attrs.get("units", ""))
 
@@ -164,17 +169,17 @@ def _write_cells(results: xarray.Dataset, path: Path) -> None:
 
 
 def start_table(results: xarray.Dataset) -> TextTable:
-    """Each start, with its status where not every one reached its target speed."""
+    """Each start or duty, with its status where not every one was successful."""
     columns = cells(results).to_dict("list")
     ended, axes = columns.pop(STATUS), len(results.coords)
     shown: list[tuple[str, list[str]]] = []
     for name, values in columns.items():
         texts = [_text(value, 6) for value in values] if len(shown) < axes else _figures(values)
         shown.append((label(name, _unit(results, name), "\n"), texts))
-    if set(ended) != {Status.REACHED.name}:
+    if not set(ended) <= {status.name for status in Status if status.success}:
         shown.insert(axes + 1, (STATUS, [name.lower().replace("_", " ") for name in ended]))
     words = [heading for heading, column in shown if any(one[:1].isalpha() for one in column)]
-    return TextTable.of("Each start", dict(shown), words)
+    return TextTable.of(f"Each {_what(results)}", dict(shown), words)
 
 
 def _figures(values: list[float]) -> list[str]:
@@ -211,18 +216,20 @@ def _tables(results: xarray.Dataset, summary: Summary) -> list[TextTable]:
     ends = ("least", "5 %", "median", "95 %", "most")
     return [
         TextTable("The grid", [Column("axis", False), *numbers, Column("unit", False)], axes),
-        TextTable.of_rows("Over all starts", ("figure", "unit"), ends, spreads),
+        TextTable.of_rows(f"Over all {plural_of(_what(results))}", ("figure", "unit"), ends, spreads),
         *([start_table(results)] if summary.starts <= MOST_SHOWN else []),
     ]
 
 
 def sweep_conclusion(results: xarray.Dataset, summary: Summary) -> str:
     """Where the worst case sits, and which shares came to their speed and keep the limits."""
+    what = plural_of(_what(results))
+    done = "were carried out" if _what(results) == "duty" else "reached the target speed"
 
     def of_the_starts(share: float) -> str:
-        return "All starts" if share == 1.0 else f"{100.0 * share:.4g} % of the starts"
+        return f"All {what}" if share == 1.0 else f"{100.0 * share:.4g} % of the {what}"
 
-    found = [f"{of_the_starts(summary.share_reached)} reached the target speed."]
+    found = [f"{of_the_starts(summary.share_reached)} {done}."]
     if summary.worst:
         places = ", ".join(f"{name} {_text(value, 5)}" for name, value in summary.worst.items())
         most = f"{summary.spreads[summary.judged]['max']:.4g}"
@@ -239,8 +246,10 @@ def sweep_conclusion(results: xarray.Dataset, summary: Summary) -> str:
 def pace(last: SweepProgress) -> str:
     """How many starts were made, and how fast."""
     made, before = last.done - last.before, f", of which {last.before:,} were finished before"
-    speed = f"; {made / last.seconds:,.0f} starts/s in {last.seconds:.1f} s" if made and last.seconds else ""
-    return f"{plural(last.starts, 'start')}{before if last.before else ''}{speed}."
+    rate = f"; {made / last.seconds:,.0f} {last.what}/s in {last.seconds:.1f} s"
+    speed = rate if made and last.seconds else ""
+    noun = "duty" if last.what == "duties" else "start"
+    return f"{plural(last.starts, noun)}{before if last.before else ''}{speed}."
 
 
 def sweep_sheet(
@@ -256,14 +265,18 @@ def sweep_sheet(
     if summary.starts <= MOST_WRITTEN:
         files[FILE] = partial(_write_cells, results)
     return Sheet(
-        f"{drive.name}: {plural(summary.starts, 'start')}",
-        [*machine_lines(drive), f"  {controllers_set_up(None, fitted_to)}" if fitted_to else ""],
+        f"{drive.name}: {plural(summary.starts, _what(results))}",
+        [
+            *machine_lines(drive),
+            f"  Duty: {duty}" if (duty := results.attrs.get("softstart_duty")) else "",
+            f"  {controllers_set_up(None, fitted_to)}" if fitted_to else "",
+        ],
         tables=_tables(results, summary),
         conclusions=[sweep_conclusion(results, summary)],
         notes=[
-            f"{plural(count, 'start')}: {Status[name].value}"
+            f"{plural(count, _what(results))}: {Status[name].value}"
             for name, count in summary.statuses.items()
-            if name != Status.REACHED.name
+            if not Status[name].success
         ],
         figures={
             file: partial(_figure, results, name, across)
@@ -275,5 +288,5 @@ def sweep_sheet(
         machine=drive,
         fitted_to=fitted_to,
         varied=True,
-        behind=['Every start is in the folder `sweep.zarr`: `xarray.open_zarr("sweep.zarr")`.'],
+        behind=[f'Every {_what(results)} is in the folder `sweep.zarr`: `xarray.open_zarr("sweep.zarr")`.'],
     )

@@ -99,9 +99,10 @@ def tuning_question(tuning: Tuning) -> str:
     """What was asked, in a sentence."""
     q = tuning.problem
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
+    duty = "" if q.plan is None else f" over the duty {q.plan.words()}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
-        f"{tuning.controller}: {_metric(tuning)} minimised, {q.time_name} {q.bound}, "
+        f"{tuning.controller}: {_metric(tuning)} minimised{duty}, {q.time_name} {q.bound}, "
         f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
         f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
     )
@@ -227,6 +228,7 @@ def conclusions(tuning: Tuning) -> list[str]:
 def tuning_notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how reliable the search is."""
     drive, q, price, notes = tuning.drive, tuning.problem, tuning.price, list[str]()
+    noun = "start" if q.plan is None else "duty"
     if len(drive.mass_names) > 2:
         load = drive.mass_names[drive.load_index]
         notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")
@@ -276,7 +278,7 @@ def tuning_notes(tuning: Tuning) -> list[str]:
         notes.append(
             f"Gaps at the output: {gaps} rad, load inertias there: {inertias} kg m2. {gear_in_words(drive)}"
         )
-    return [*notes, *([f"{plural(tuning.starts, 'start')}."] if tuning.starts else [])]
+    return [*notes, *([f"{plural(tuning.starts, noun)}."] if tuning.starts else [])]
 
 
 def tuning_sheet(tuning: Tuning) -> Sheet:
