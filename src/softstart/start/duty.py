@@ -492,7 +492,10 @@ def _carry_out(
         of_impacts = [[impact_energies(phase.trajectory, s).sum() for s in shafts] for phase in phases]
         energies = np.sum(of_impacts, axis=0)
         # the kernel has located the largest |T|, to the bit as without a record
-        ends = np.array([[turn[:, 1].max(), turn[:, 1].min()] for turn in turns]).T
+        # a step of no length, as a start at its set speed, has no points
+        ends = np.array(
+            [[turn[:, 1].max(initial=-np.inf), turn[:, 1].min(initial=np.inf)] for turn in turns]
+        ).T
         ends = ends.clip(-np.abs(peaks), np.abs(peaks))
         largest, smallest = np.where(peaks > 0.0, peaks, ends[0]), np.where(peaks < 0.0, peaks, ends[1])
     how = "strategy, anew in the other direction" if anew else "strategy"

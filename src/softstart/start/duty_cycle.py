@@ -357,13 +357,13 @@ class DutyCycle:
         timed = step.brake_time is not None
         slows = not timed and (by == "torque" or (by == "coast" and self.braked) or slow > 0.0)
         if timed or (slows and self.forward * self.motor_speed > slow):
-            until = command + (self.patience if step.brake_time is None else step.brake_time)
+            until = command + (self._coasting if step.brake_time is None else step.brake_time)
             until = min(until, math.inf if time is None else command + time)
             if slows:
                 stopping["slow"] = slow if abs(holding_torque(self.rows, 0.0)) > 0.0 else max(slow, still)
             yield self.phase("stop", go, until, fields=stopping)
             if slows and not math.isnan(self.recorder.state.slow) and time is None:
-                self._give_up(step, f"the motor does not come to a standstill within {self.patience:.4g} s")
+                self._give_up(step, f"the motor does not come to a standstill within {until - command:.4g} s")
         stopped = timed or slows or by == "brake"
         over = time is not None and self.now >= command + time
         if stopped and self.braked and not over:
@@ -372,6 +372,14 @@ class DutyCycle:
         if self.braked and not self.closed:
             yield from self._close(step)
             yield from self._motor_stands(step)
+
+    @property
+    def _coasting(self) -> float:
+        """How long a stop may take, s: more where friction far from the motor slows the machine down."""
+        inertia = self.rows.masses[0].view(rec.MASS)[:, 0]["J"]
+        torque = abs(holding_torque(self.rows, 0.0))
+        momentum = float(inertia[np.isfinite(inertia)].sum()) * abs(self.speed)
+        return self.patience + (PATIENT * momentum / torque if torque > 0.0 else 0.0)
 
     def _watched(self, dwell: float | None = None) -> dict[str, float]:
         """That a phase ends once all masses have stood for an elastic period, or are watched only."""
@@ -405,14 +413,14 @@ class DutyCycle:
         self, step: DutyStep, command: float, time: float | None, fields: Mapping[str, float] = {}
     ) -> Iterator[Phase]:
         """On until all masses stand, or until the time of the step is over."""
-        until = command + (self.patience if time is None else time)
+        until = command + (self._coasting if time is None else time)
         phase = self.phase("rest", self.go or ZERO, until, fields={**fields, **self._watched()})
         yield phase
         if time is None and math.isnan(phase.rest):
             self._give_up(
                 step,
-                f"the machine does not come to rest within {self.patience:.4g} s; give its shaft a damping, "
-                "the motor a friction or a brake, or the step a time",
+                f"the machine does not come to rest within {until - command:.4g} s; give its shaft a "
+                "damping, the motor a friction or a brake, or the step a time",
             )
         self.speed = 0.0
         if time is None and self.closed and math.isfinite(self.machine.brake_torque):
