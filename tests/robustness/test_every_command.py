@@ -31,7 +31,7 @@ COMMANDS = {
     "compare": "compare {}",
     "simulate": "simulate {} --controller direct",
     "fatigue": "fatigue {}",
-    "duty": "duty {} --duty travel-crane --stop torque --controller ramp",
+    "duty": "duty {} --duty travel-crane --controller ramp",
     "linear": "linear {} --controller state-feedback",
     "optimize": "optimize {}",
     "pareto": "pareto {}",
@@ -42,6 +42,8 @@ COMMANDS = {
 }
 # command and machine, or its class: a word of the sentence
 REFUSED = {("fatigue", one): "damping" for one in ("undamped", "crane-4-mass")}
+# nothing holds an active load after a stop
+REFUSED |= {("duty", one): "runs away" for one in ("undamped", "crane-4-mass", "nordin-servo-60kw")}
 CHAINS = LIBRARY.names()
 MACHINES = (*library.names(), *SHEETS, *CHAINS)
 QUICK = (("fatigue", "crane-4amtkf"), ("sweep", "hoist"), *(("fatigue", machine) for machine in SHEETS))

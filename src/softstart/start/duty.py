@@ -195,11 +195,11 @@ class DutyRun(Result, view="duties.duty_sheet"):
         """Whether the strategy holds the speed, so that the load settles in a band on both sides of it."""
         return self.controller.regulation(self.drive.design_drive) is not None
 
-    @property
-    def limits_kept(self) -> bool | None:
-        """Whether every step keeps all limits of torque and start time; None without limits."""
-        margins = [margin for row in self.rows for margin in self.margins_of(row)]
-        return all(margin.kept for margin in margins) if margins else None
+    def margins(self, life: DutyLife | None = None) -> tuple[tuple[StepRun | None, Margin], ...]:
+        """The margin of each step to each of its limits, and that of a life to the required one: no step."""
+        used = None if life is None else life.margin(self.drive.limits)
+        steps = [(row, margin) for row in self.rows for margin in self.margins_of(row)]
+        return (*steps, *([] if used is None else [(None, used)]))
 
     @property
     def counted_cycles(self) -> int:
@@ -310,7 +310,6 @@ class DutyRun(Result, view="duties.duty_sheet"):
             "base_torque": self.base_torque,
             "k_dyn": self.k_dyn,
             "worst_step": self.worst.number,
-            "limits_kept": self.limits_kept,
             "steps": [
                 {
                     **row.summary(),

@@ -15,10 +15,11 @@ from softstart.errors import InputError, SimulationError
 from softstart.results import OneLine, Result
 from softstart.start.comparison import make_controllers
 from softstart.start.demand import ControllerLike
-from softstart.start.duty import DutyRun, duty_of, run_duty
+from softstart.start.duty import DutyRun, StepRun, duty_of, run_duty
 from softstart.start.duty_life import DutyLife
 from softstart.start.fatigue import check_shafts, curve_of, life_ratio, with_estimated_damping
 from softstart.start.metrics import REFERENCE
+from softstart.start.recommendation import Margin
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,12 +51,23 @@ class DutyRow(OneLine):
         """Dynamic coefficient of the worst step; infinite if the duty cannot be finished."""
         return math.inf if self.run is None else self.run.k_dyn
 
+    @property
+    def margins(self) -> tuple[tuple[StepRun | None, Margin], ...]:
+        """The margins of all steps and of the life, see `DutyRun.margins`."""
+        return () if self.run is None else self.run.margins(self.life)
+
+    @property
+    def limits_kept(self) -> bool | None:
+        """Whether all limits are kept, a required life too; None without any."""
+        return all(margin.kept for _, margin in self.margins) if self.margins else None
+
     def summary(self) -> dict[str, object]:
         """The figures under the names used everywhere."""
         if self.run is None:
             return {"controller": self.name, "reason": self.reason}
         life = None if self.life is None else self.life.summary()
-        return {**self.run.summary(), "reason": "", "life": life, "relative_life": self.relative}
+        also = {"limits_kept": self.limits_kept, "life": life, "relative_life": self.relative, "reason": ""}
+        return {**self.run.summary(), **also}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.drive import Machine, Shift, SNCurve
+from softstart.drive import Limits, Machine, Shift, SNCurve
 from softstart.results import OneLine
 from softstart.start.fatigue import check_shafts, curve_of, indexed_cycles, miner
+from softstart.start.recommendation import Margin
 
 SECONDS_PER_HOUR = 3600.0
 
@@ -95,18 +96,14 @@ class DutyLife(OneLine):
         """The shaft that takes most damage."""
         return max(self.shafts, key=lambda one: one.damage)
 
-    @property
-    def missing(self) -> str:
-        """What is missing for a life in cycles, shifts and years, a sentence; "" where nothing is."""
-        if not self.curve.points:
-            shift = "" if self.shift is not None else " and [shift] cycles_per_hour"
-            return (
-                "The life is relative only: [limits.fatigue] has no point of an S-N curve; give torque and "
-                f"cycles there{shift}."
-            )
-        if self.shift is None:
-            return "The life is in cycles only: the duty has no [shift]; give its cycles_per_hour."
-        return ""
+    def margin(self, limits: Limits) -> Margin | None:
+        """The margin to a required life, limits.life; None without one, or where the life is not known."""
+        hours = self.worst.hours
+        limit = next((one for one in limits.each if one.figure == "used_life"), None)
+        if limit is None or math.isnan(hours):
+            return None
+        required = float(limits.life or 0.0) / SECONDS_PER_HOUR
+        return Margin(limit, 100.0 * required / hours, "")
 
     def summary(self) -> dict[str, object]:
         """Everything as plain data, for JSON."""

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.arrays import Vector
+from softstart.chain.model import Chain
 from softstart.drive import DutyStep, Machine
 from softstart.errors import InputError
 from softstart.start.duty import DutyRun, StepRun
@@ -30,7 +32,7 @@ from softstart.views.drawing import (
 from softstart.views.fatigue import SPECTRUM, counted, factor, slope_sentence
 from softstart.views.markdown import file_stem
 from softstart.views.numbers import DataColumn, TextTable, number, plural, short, units_of, with_unit
-from softstart.views.sheet import Sheet, Writer, records_file, rows_file
+from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 from softstart.views.starts import machine_lines, parameters_of
 from softstart.views.traces import shafts_of
 
@@ -45,7 +47,8 @@ ASKED = {
 }  # fmt: skip
 ANEW = "strategy, anew in the other direction"  # `StepRun.how`
 SAME_RATE = 0.01  # relative difference of two numbers of starts per hour that is no contradiction
-ROOM = (0.055, 0.006)  # share of the figure that the label of a step needs, and its number alone
+LETTER = 0.0085  # share of the figure that a letter of the label of a step needs
+PLOT_POINTS = 1500  # of one step
 BEFORE = 0.08  # share of a step that is shown before it
 EQUIVALENT = (
     "Damage-equivalent torque: one 0-T-0 cycle in each cycle of the duty causes the same damage (rainflow "
@@ -95,6 +98,11 @@ def name_of(row: StepRun) -> str:
     return f"{row.number}, {row.step.do}"
 
 
+def place_of(row: StepRun | None) -> str:
+    """Where a margin is: in a step, or, without one, in the life."""
+    return "the life" if row is None else f"step {name_of(row)}"
+
+
 def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
     """The columns of the table of steps."""
     units = units_of(run.drive)
@@ -109,6 +117,7 @@ def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
         DataColumn("limits", lambda row: against_limits(run.margins_of(row)), optional=True),
         DataColumn("damage\n%", lambda row: math.nan if shares is None else float(shares[row.number - 1]), 1,
                    optional=True),
+        DataColumn("impulse\nN m s", lambda row: float(row.impulses.max()) or math.nan, optional=True),
         DataColumn("impact\nenergy J", lambda row: float(row.impact_energy.sum()), digits=3),
         DataColumn("contacts", lambda row: row.contacts, 0),
         DataColumn("time s", lambda row: row.time),
@@ -160,7 +169,7 @@ def life_or_reason(run: DutyRun, slope: float | None) -> tuple[DutyLife | None, 
     try:
         return run.life(slope), ""
     except InputError as error:
-        return None, f"No life: {error}"
+        return None, str(error)
 
 
 def life_conclusion(run: DutyRun, life: DutyLife) -> str:
@@ -174,17 +183,33 @@ def life_conclusion(run: DutyRun, life: DutyLife) -> str:
     if not length:
         torque = f"damage-equivalent torque {with_unit(float(f'{worst.equivalent_torque:.4g}'), 'N m')}"
         return f"Life{where}: {torque}, {most}."
-    required = run.drive.limits.life
-    asked = ""
-    if required is not None and not math.isnan(worst.hours):
-        reached = "reached" if worst.hours >= required / SECONDS_PER_HOUR else "not reached"
-        asked = f" The required life of {short(required / SECONDS_PER_HOUR)} h is {reached}."
+    used, required = life.margin(run.drive.limits), float(run.drive.limits.life or 0.0)
+    reached = "" if used is None else "reached" if used.kept else "not reached"
+    asked = f" The required life of {short(required / SECONDS_PER_HOUR)} h is {reached}." if reached else ""
     return f"Life{where}: {length}, {most}.{asked}"
 
 
-def life_notes(life: DutyLife) -> list[str]:
+def life_notes(machine: Machine, life: DutyLife) -> list[str]:
     """What the life rests on, and what is missing for it."""
-    return [f"{EQUIVALENT} {slope_sentence(life.curve, life.slope_given)}", life.missing]
+    return [
+        f"{EQUIVALENT} {slope_sentence(life.curve, life.slope_given)}",
+        missing_for_life(machine, life),
+    ]
+
+
+def missing_for_life(machine: Machine, life: DutyLife) -> str:
+    """What is missing for a life in cycles, shifts and years, a sentence; "" where nothing is."""
+    if isinstance(machine, Chain):
+        return "The life is relative only: a chain has no S-N curve."
+    if not life.curve.points:
+        shift = "" if life.shift is not None else ", and the duty a [shift] with cycles_per_hour"
+        return (
+            "The life is relative only: [limits.fatigue] has no point of an S-N curve; give it torque and "
+            f"cycles{shift}."
+        )
+    if life.shift is None:
+        return "The life is in cycles only: the duty has no [shift]; give its cycles_per_hour."
+    return ""
 
 
 # one strategy ----------------------------------------------------------------------------------------------
@@ -199,19 +224,19 @@ def duty_lines(run: DutyRun) -> list[str]:
     return [f"  duty   {plural(steps, 'step')} a cycle{more}{rate}; {plural(run.cycles, 'cycle')} computed"]
 
 
-def headline(run: DutyRun) -> str:
+def headline(run: DutyRun, life: DutyLife | None = None) -> str:
     """The worst step, and whether the limits hold."""
     worst = run.worst
     torque = with_unit(float(f"{worst.peak_torque:.4g}"), "N m")
     text = f"Worst step: {name_of(worst)}, K_dyn {run.k_dyn:.3f} ({torque})."
-    margins = [(row, margin) for row in run.rows for margin in run.margins_of(row)]
+    margins = run.margins(life)
     if not margins:
         return text
-    broken = [f"step {name_of(row)}: {margin}" for row, margin in margins if not margin.kept]
+    broken = [f"{place_of(row)}: {margin}" for row, margin in margins if not margin.kept]
     if broken:
         return f"{text} Limits are exceeded in {'; '.join(broken)}."
     row, least = min(margins, key=lambda one: one[1].share)
-    return f"{text} All limits are kept; the smallest margin is in step {name_of(row)}: {least}."
+    return f"{text} All limits are kept; the smallest margin is in {place_of(row)}: {least}."
 
 
 def duty_notes(run: DutyRun) -> Iterator[str]:
@@ -276,7 +301,7 @@ def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | No
     records = [_record(run, row) for row in run.executed]
     files: dict[str, str | Writer] = {
         f"trace-{stem}.csv": run.to_csv,
-        "steps.csv": records_file(records),
+        "steps.csv": columns_file({key: [record[key] for record in records] for key in records[0]}),
         "duty.toml": run.duty.to_toml(),
     }
     several = len(run.drive.shaft_names) > 1
@@ -296,8 +321,12 @@ def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | No
             *shaft_tables(run),
             *([] if life is None else [life_table(life)]),
         ],
-        conclusions=[headline(run), *([] if life is None else [life_conclusion(run, life)])],
-        notes=[*duty_notes(run), *([reason] if life is None else life_notes(life)), *run.drive.warnings],
+        conclusions=[headline(run, life), *([] if life is None else [life_conclusion(run, life)])],
+        notes=[
+            *duty_notes(run),
+            *([f"No life: {reason}"] if life is None else life_notes(run.drive, life)),
+            *run.drive.warnings,
+        ],
         figures={
             f"duty-{stem}": lambda: duty_figure(run),
             f"worst-step-{stem}": lambda: duty_figure(run, worst_recorded(run)),
@@ -313,7 +342,14 @@ def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | No
 def duty_data(run: DutyRun, slope: float | None = None) -> dict[str, object]:
     """All figures as plain data, those of the life too."""
     life, reason = life_or_reason(run, slope)
-    return {**run.summary(), "life": None if life is None else life.summary(), "no_life": reason}
+    margins = run.margins(life)
+    kept = all(margin.kept for _, margin in margins) if margins else None
+    return {
+        **run.summary(),
+        "limits_kept": kept,
+        "life": None if life is None else life.summary(),
+        "no_life": reason,
+    }
 
 
 def _record(run: DutyRun, row: StepRun) -> dict[str, object]:
@@ -334,12 +370,13 @@ def _record(run: DutyRun, row: StepRun) -> dict[str, object]:
 
 def duty_figure(run: DutyRun, step: StepRun | None = None) -> Figure:
     """Torques and speeds over the first two cycles with the steps, or over one step and the end before it."""
+    whole = float(run.t[-1])
+    begin, end = (0.0, whole) if step is None else (step.begin, step.end)
+    begin = begin if step is None else max(0.0, begin - BEFORE * (end - begin))
     with drawing():
         figure, axes = new_figure(2, 1, (9.0, 5.4), sharex=True)
-        draw_torques(axes[0], run)
-        draw_speeds(axes[1], run)
-        begin, end = (0.0, float(run.t[-1])) if step is None else (step.begin, step.end)
-        begin = max(0.0, begin - (0.0 if step is None else BEFORE * (end - begin)))
+        draw_torques(axes[0], run, begin, end)
+        draw_speeds(axes[1], run, begin, end)
         for panel in axes:
             mark_steps(panel, run, begin, end, labels=panel is axes[0])
             legend_beside(panel, fontsize=7.5)
@@ -350,18 +387,27 @@ def duty_figure(run: DutyRun, step: StepRun | None = None) -> Figure:
     return figure
 
 
+def traces_of(run: DutyRun, begin: float, end: float) -> tuple[Vector, dict[str, Vector]]:
+    """Instants between two, and the states then."""
+    inside = run.t[(run.t >= begin) & (run.t <= end)]
+    if inside.size == run.t.size:
+        return run.t, run.traces
+    instants = np.unique(np.concatenate([inside, np.linspace(begin, end, PLOT_POINTS)]))
+    return instants, run.at(instants)
+
+
 def worst_recorded(run: DutyRun) -> StepRun:
     """The worst step as it was carried out in the cycles that are recorded."""
     recorded = [one for one in run.executed if one.phases and one.number == run.worst.number]
     return max(recorded, key=lambda one: one.peak_torque)
 
 
-def draw_torques(axes: Axes, run: DutyRun) -> None:
-    """Motor and shaft torques over the duty, and the permissible ones."""
-    traces = run.traces
-    axes.plot(run.t, traces["u"], color=COLOURS[1], lw=0.8, label="motor torque u")
+def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
+    """Motor and shaft torques, and the permissible ones."""
+    t, traces = traces_of(run, begin, end)
+    axes.plot(t, traces["u"], color=COLOURS[1], lw=0.8, label="motor torque u")
     for (name, line), torque in zip(shafts_of(run), traces["T"].T, strict=True):
-        axes.plot(run.t, torque, label=name, **(line | {"lw": 0.9}))
+        axes.plot(t, torque, label=name, **(line | {"lw": 0.9}))
     permissible = float(run.drive.permissible_torques[int(run.worst.peak_torques.argmax())])
     if not math.isnan(permissible):
         for sign, label in ((1.0, "permissible"), (-1.0, None)):
@@ -369,14 +415,15 @@ def draw_torques(axes: Axes, run: DutyRun) -> None:
     head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", "torque, N m")
 
 
-def draw_speeds(axes: Axes, run: DutyRun) -> None:
-    """The speeds of all masses over the duty."""
+def draw_speeds(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
+    """The speeds of all masses."""
     units, names = units_of(run.drive), run.drive.mass_names
+    t, traces = traces_of(run, begin, end)
     lines = [(name, line_of(i)) for i, name in enumerate(names)]
     if len(lines) == 2:
         lines = [("motor w1", {"color": COLOURS[1]}), ("load w2", {"color": COLOURS[0]})]
-    for (name, line), speed in zip(lines, run.traces["w"].T, strict=True):
-        axes.plot(run.t, units.shown(speed, "rad/s"), label=name, **(line | {"lw": 0.9}))
+    for (name, line), speed in zip(lines, traces["w"].T, strict=True):
+        axes.plot(t, units.shown(speed, "rad/s"), label=name, **(line | {"lw": 0.9}))
     head(axes, "", f"speed, {units.of('rad/s')}")
 
 
@@ -387,9 +434,8 @@ def mark_steps(axes: Axes, run: DutyRun, begin: float, end: float, labels: bool)
         first, last = row.cycle != last, row.cycle
         axes.axvline(row.begin, color="#000000" if first else GREY, lw=0.9 if first else 0.6, ls=":")
         share = (min(row.end, end) - row.begin) / (end - begin)
-        text = (
-            f"{row.number} {row.step.do}" if share > ROOM[0] else f"{row.number}" if share > ROOM[1] else ""
-        )
+        texts = (f"{row.number} {row.step.do}", f"{row.number}")
+        text = next((text for text in texts if share > LETTER * (len(text) + 0.6)), "")
         if labels and text:
             axes.text(
                 row.begin, 0.985, f" {text}", fontsize=7, color=GREY, va="top",
@@ -416,14 +462,12 @@ def _of_run(value: Any, none: Any = math.nan) -> Any:
 
 
 def _least_margin(row: DutyRow) -> str:
-    assert row.run is not None
-    margins = [margin for step in row.run.rows for margin in row.run.margins_of(step)]
-    return against_limits(margins)
+    return against_limits([margin for _, margin in row.margins])
 
 
 COMPARED = (
     DataColumn("worst\nstep", _of_run(lambda row: name_of(row.run.worst), "-")),
-    DataColumn("limits", _of_run(_least_margin, ""), optional=True),
+    DataColumn("limits", _least_margin, optional=True),
     DataColumn("life over\ndirect", lambda row: row.relative, text=factor, optional=True),
     DataColumn("cycles to\nfailure", lambda row: math.nan if row.life is None else row.life.worst.cycles,
                text=counted, optional=True),
@@ -443,10 +487,8 @@ def duty_comparison_sheet(
     figures = {"duty": lambda: comparison_map(comparison, rows)}
     files: dict[str, str | Writer] = {"duty.toml": comparison.duty.to_toml()}
     records, stems = [_compared_record(row) for row in rows], list[str]()
-    files["comparison.csv"] = rows_file(
-        keys := list(dict.fromkeys(key for record in records for key in record)),
-        [[record.get(key) for key in keys] for record in records],
-    )
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    files["comparison.csv"] = columns_file({key: [record.get(key) for record in records] for key in keys})
     for run in runs:
         stems.append(stem := file_stem(run.controller_name, stems))
         figures[f"duty-{stem}"] = partial(duty_figure, run)
@@ -463,7 +505,7 @@ def duty_comparison_sheet(
             *(f"{row.name}: {row.reason}" for row in rows if row.run is None),
             *stop_notes(runs),
             *starts_note(runs[0]),
-            *(life_notes(lives[0]) if lives else [f"No life: {comparison.no_life}"]),
+            *(life_notes(machine, lives[0]) if lives else [f"No life: {comparison.no_life}"]),
             *machine.warnings,
         ],
         figures=figures,
@@ -476,7 +518,7 @@ def duty_comparison_sheet(
 
 def _best(rows: Sequence[DutyRow]) -> list[int]:
     """The place of the row with the lowest K_dyn among those that keep the limits."""
-    kept = [i for i, row in enumerate(rows) if row.run is not None and row.run.limits_kept is not False]
+    kept = [i for i, row in enumerate(rows) if row.run is not None and row.limits_kept is not False]
     return [min(kept, key=lambda i: rows[i].k_dyn)] if kept else []
 
 
@@ -488,8 +530,8 @@ def comparison_conclusions(comparison: DutyComparison) -> list[str]:
     text = [
         f"Lowest K_dyn of the worst step: {best.name}, {best.k_dyn:.3f} in step {name_of(best.run.worst)}."
     ]
-    kept = [row.name for row in finished if row.run is not None and row.run.limits_kept]
-    if any(row.run is not None and row.run.limits_kept is not None for row in finished):
+    kept = [row.name for row in finished if row.limits_kept]
+    if any(row.limits_kept is not None for row in finished):
         text.append(f"All limits are kept by {', '.join(kept)}." if kept else "No strategy keeps all limits.")
     lasting = [row for row in finished if row.life is not None]
     if lasting:
@@ -526,7 +568,7 @@ def _compared_record(row: DutyRow) -> dict[str, object]:
         "k_dyn": run.k_dyn,
         "worst_step": run.worst.number,
         **{f"k_dyn_step_{step.number}": run.k_dyn_of(step) for step in run.rows},
-        "limits_kept": run.limits_kept,
+        "limits_kept": row.limits_kept,
         "cycle_time": run.cycle_time,
         "relative_life": row.relative,
         "cycles_to_failure": math.nan if worst is None else worst.cycles,
