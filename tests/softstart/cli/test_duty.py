@@ -6,6 +6,7 @@ import csv
 import json
 
 import pytest
+from tests.softstart.cli.conftest import CONTROLLERS
 
 from softstart import Drive, compare_duty, run_duty
 from softstart.views.duties import duty_data
@@ -156,13 +157,14 @@ def test_a_way_to_stop_that_there_is_not(run):
     assert "'wall' is not one of 'strategy', 'torque', 'coast', 'brake'" in err
 
 
-def test_a_duty_that_never_ends_exits_with_3(run, place):
-    """Nothing slows the machine down: its load is lifted off, and it coasts without friction."""
-    (place / "free.toml").write_text(
-        CRANE.replace("friction = 0.5", "").replace("torque = 7.16", "torque = 1e-6")
-    )
-    code, out, err = run(
-        "duty", "free.toml", "--controller", "ramp", "--duty", "cycle.toml", "--stop", "coast"
-    )
+def test_a_step_that_never_ends_exits_with_3(run, place):
+    """Under a torque below that of the load nothing moves; among several it is one row with the sentence."""
+    weak = CONTROLLERS.replace("31.0 if measured.time < 0.1 else 62.0, measured.time + 0.01", "3.0")
+    (place / "own.py").write_text(weak)
+    code, out, err = run("duty", "crane.toml", "--controller", "own.py:Good")
     assert (code, out) == (3, "")
-    assert '[duty] 3, do = "stop"' in err
+    assert '[duty] 1, do = "start": the load does not reach its set speed' in err
+    code, out, err = run("duty", "crane.toml", "--controllers", "own.py:Good,own.py:Raises,ramp")
+    assert (code, err) == (0, "")
+    assert "own: [duty] 1" in out
+    assert "the controller Raises failed at t = 0 s in" in " ".join(out.split())
