@@ -159,8 +159,20 @@ class Player:
         if braked:
             if self.case.closing > 0.0:
                 o.phase(Until("time", self.case.closing), torque=REST)
+            if math.isinf(self.case.brake):
+                self.stand()
             o.brake = self.case.brake
         self.rest(ends)
+        if 0.0 < o.brake < math.inf and not ends():
+            self.stand()
+
+    def stand(self) -> None:
+        """On to the next standstill of the motor, if it moves: a lock closes there."""
+        o, still = self.oracle, 1e-9 * self.case.target
+        speed = float(o.y[o.n - 1 + o.given.motor])
+        if abs(speed) > still:
+            way = math.copysign(1.0, speed)
+            o.phase(Until("motor", way * still, -way), torque=REST)
 
     def rest(self, ends: Any) -> None:
         """Without torque until all masses have stood for one elastic period, or to the time of the step."""
@@ -270,8 +282,6 @@ def on_duty(rng: np.random.Generator, given: Given, Ms: float, period: float) ->
     if math.isinf(brake):  # it closes at standstill
         closing, opening = 0.0, 0.3 * period
     steps = [step for part in cycle(rng, active, brake, target, period) for step in part]
-    if math.isinf(brake) and any(step["do"] == "jog" for step in steps):
-        brake = 1.3 * Mc + 0.4 * Ms  # a lock cannot close where the motor has rebounded at the end of a jog
     for step in steps:
         if step["do"] == "load":
             step["Mc"] = Mc * float(rng.uniform(0.3, 1.2))
