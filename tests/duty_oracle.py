@@ -79,7 +79,8 @@ class PhaseOracle(ChainOracle):
         """When time ends the phase."""
         limits = [one.value for one in self.until if one.kind == "time"]
         if not math.isnan(self.since):
-            stands = max(self.since, 0.0)
+            begin = self.duty.time if self.duty.rest_from is None else self.duty.rest_from
+            stands = max(self.since, begin - self.duty.time)
             limits += [stands + one.value for one in self.until if one.kind == "stand"]
         self.latest = min([self.path.t_end, *limits])
 
@@ -174,6 +175,7 @@ class DutyOracle:
         self.time = self.u = self.limited = self.brake = 0.0
         self.pieces: list[Any] = [(0.0, 0.0)]
         self.watched, self.since = False, math.nan
+        self.rest_from: float | None = None  # from when on "stand" counts, if not the beginning of the phase
 
     @property
     def demand(self) -> float:

@@ -7,9 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.duty_cases import Case, Player, random_chain, random_drive, single_cases
-from tests.softstart.duty_machines import differences, run_of
+from tests.softstart.duty_machines import differences, duty_of, machine_of, run_of
+from tests.softstart.duty_sampled import SampledPlayer, sampled_case
+from tests.twin import plain
 
-from softstart import DutyRun
+from softstart import DutyRun, run_duty
+from softstart.controller import make_controller
 from softstart.kernel import records as rec
 from softstart.start.fatigue import rainflow_cycles
 from softstart.start.metrics import energy_balance
@@ -48,6 +51,25 @@ def test_duties_against_the_oracle(kind: str, key: Key) -> None:
         count = 4 if kind == "chain" else count // 2
     player, several = Player(case), [step for step, times in case.repeated for _ in range(times)] * 2
     found = differences(case, run, [player.step(**step) for step in several[:count]])
+    assert max(found.values()) < 1e-8, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["speed-ramp", "acceleration-delay", "pulse-coast-hold", "s-curve", "shaped", "take-up"]
+)
+def test_duties_of_sampled_strategies(name: str) -> None:
+    """What they see and demand in the mirrored frame, out of a motion, and at new set speeds and stops.
+
+    Two others switch at samples where 1e-12 of the load torque moves a reversal by 1e-4 s.
+    """
+    case = sampled_case(holds=name == "speed-ramp")
+    machine, controller = machine_of(case), make_controller(name)
+    if "period" in controller.parameters:
+        controller = make_controller(name, {"period": 0.004})
+    run = run_duty(machine, controller, duty_of(case), cycles=1)
+    steps = SampledPlayer(case, plain(controller, machine), name == "speed-ramp").cycle()
+    found = differences(case, run, steps)
     assert max(found.values()) < 1e-8, found
 
 
