@@ -207,13 +207,13 @@ def there_and_back(run: DutyOracle, way: float = 1.0, cut: float = 1.0) -> list[
     phase(Until("motor", way * 3.0, -way), torque=[(0.0, -way * 40.0)])
     run.watch()
     run.brake = 20.0
-    phase(Until("stand", PERIOD), torque=[(0.0, 0.0)])
+    phase(Until("stand", 0.6 * PERIOD), torque=[(0.0, 0.0)])
     run.load(J=1.7, Mc=9.0)
     run.brake = 0.0
     run.watch(False)
-    phase(Until("time", 2.0 * PERIOD), torque=[(0.0, -way * 30.0)])
+    phase(Until("time", PERIOD), torque=[(0.0, -way * 30.0)])
     run.watch()
-    phase(Until("stand", PERIOD), torque=[(0.0, 0.0)])
+    phase(Until("stand", 0.6 * PERIOD), torque=[(0.0, 0.0)])
     return found
 
 

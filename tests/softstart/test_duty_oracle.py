@@ -190,6 +190,9 @@ def check_counts(run: DutyRun) -> None:
         assert np.unique(theirs[:, 2]).tolist() == [1.0]
         for column in (0, 1):
             assert np.sort(theirs[:, column]) == pytest.approx(np.sort(mine[:, column]), abs=1e-12 * largest)
+        # one cycle from 0 to the equivalent torque and back does the damage of all of them
+        equivalent = run.life(6.6).shafts[shaft].equivalent_torque
+        assert equivalent**6.6 == pytest.approx((mine[:, 0] ** 6.6).sum() / run.counted_cycles, rel=1e-9)
         # and they are those of the trace: sampled, which cuts its peaks by less than 1 %
         T = run.at(np.linspace(points[0, 0], points[-1, 0], 20_001)[:-1])["T"][:, shaft]
         sampled = astm_e1049(reversals(T.tolist()))
