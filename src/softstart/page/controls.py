@@ -64,6 +64,11 @@ class Controls:
             "fix": (self._fix, {"fixed": bool}),
             "reference": (session.set_reference, {"on": bool}),
             "at_time": (session.set_at_time, {"text": str}),
+            "duty_step": (self._duty_step, {"index": float}),
+            "duty_add": (self._duty_add, {"index": float, "do": str}),
+            "duty_remove": (self._duty_remove, {"index": float}),
+            "duty_move": (self._duty_move, {"index": float, "to": float}),
+            "duty_time": (self._duty_time, {"index": float, "time": float}),
             "window": (self._window, {"begin": float, "end": float}),
             "hello": (self._hello, {"stored": object, "link": object}),
         }
@@ -146,6 +151,31 @@ class Controls:
     def _window(self, begin: float, end: float) -> None:
         """Visible part of the starts, in s; all of it if it has no length."""
         self._frames.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
+
+    # the duty: `index` is the place of a step, from 0
+
+    def _duty_step(self, index: float) -> None:
+        self._frames.duty_step = min(max(int(index), 0), len(self._session.inputs.plan.steps) - 1)
+
+    def _duty_add(self, index: float, do: str) -> None:
+        inputs = self._session.inputs
+        plan = inputs.plan.added(int(index), do, inputs.machine)
+        self._frames.duty_step = min(max(int(index), 0), len(inputs.plan.steps))
+        self._session.set_duty(plan)
+
+    def _duty_remove(self, index: float) -> None:
+        self._session.set_duty(self._session.inputs.plan.removed(int(index)))
+        if int(index) < self._frames.duty_step:
+            self._frames.duty_step -= 1
+
+    def _duty_move(self, index: float, to: float) -> None:
+        plan = self._session.inputs.plan.moved(int(index), int(to))
+        self._frames.duty_step = min(max(int(to), 0), len(plan.steps) - 1)
+        self._session.set_duty(plan)
+
+    def _duty_time(self, index: float, time: float) -> None:
+        plan = self._session.inputs.plan.timed(int(index), time)
+        self._session.set_duty(plan, gesture=f"duty_time {int(index)}")
 
 
 def _is_a(kind: type, value: object) -> bool:

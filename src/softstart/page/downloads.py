@@ -125,6 +125,8 @@ def drive_words(drive: Machine) -> list[str]:
     >>> drive_words(Chain.load("crane-4-mass"))
     ['crane-4-mass']
     """
+    if drive.duty is not None:
+        return [drive_file(drive)]
     same_kind = {name: machine for name, machine in shipped_drives().items() if type(machine) is type(drive)}
     candidates = [(name, changes(machine, drive)) for name, machine in same_kind.items()]
     name, different = min(candidates, key=lambda candidate: len(candidate[1]))

@@ -75,7 +75,9 @@ class DriveFiles:
         self._troubles.say(error.sentences, f"{cut(name)} was not loaded; the drive is unchanged.")
 
     def _save(self) -> None:
-        save(self._session.inputs.machine.to_toml(), drive_file(self._session.inputs.machine))
+        inputs = self._session.inputs
+        machine = inputs.machine if inputs.duty is None else inputs.machine_with_duty
+        save(machine.to_toml(), drive_file(machine))
 
 
 def machine_of(content: bytes, name: str) -> Loaded:
@@ -156,8 +158,8 @@ class ReportPanel(JobPanel):
         """The report."""
         inputs = self.session.inputs
         name = file_name(inputs.machine.name, "report", suffix=".html")
-        command = command_text(inputs.machine_in_units, inputs.controllers, "report", f"--out={name}")
-        return tasks.report_task, inputs.both_ends, list(inputs.controllers.values()), command, name
+        command = command_text(inputs.machine_with_duty, inputs.controllers, "report", f"--out={name}")
+        return tasks.report_task, inputs.both_ends_with_duty, list(inputs.controllers.values()), command, name
 
 
 def command_line(session: Session, user: Hashable) -> None:

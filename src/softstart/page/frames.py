@@ -18,9 +18,11 @@ from softstart.drive import Machine
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.kernel import records as rec
 from softstart.page import links, machines
+from softstart.page.duty import fields_of, values_of
+from softstart.page.duty_frames import duty_view, json_number
 from softstart.page.machines import STRATEGY, Axes, FormField
 from softstart.page.sentences import Value, differences, sentence_of, written
-from softstart.page.session import EqualTime, Inputs, Reference, Session, Strategy
+from softstart.page.session import LONGEST_DUTY, EqualTime, Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
@@ -32,6 +34,7 @@ QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are co
 QUICK = 0.010  # s, of a start that is computed at every step of a slider, even if no frame follows
 LONG = (math.inf, math.inf)
 TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute catches up after a shorter halt
+LIVE_DUTY = 0.3  # s, of a duty that is computed at each change; a longer one is at rest
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is reloaded comes back, or does not
 MOST_STAGES = 400  # of one gap, shaded and lit up
@@ -54,6 +57,8 @@ class FrameBuilder:
         self.stamp = 0.0  # the browser's clock at the last input that has been taken
         self.late = 0.0  # s, how long the last message has waited to be read
         self.window: tuple[float, float] | None = None  # s, visible part of the starts; None for all
+        self.duty_shown = False  # whether the duty is in sight: it is computed then
+        self.duty_step = 0  # the step that is selected
         self.mistakes: dict[str, str] = {}  # sentences by the field that they stand next to
         self.sent: dict[str, Any] = {}  # by part of a frame
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
@@ -67,6 +72,8 @@ class FrameBuilder:
         inputs = self.session.inputs
         origin, label = inputs.origin, inputs.selected
         controller = inputs.controllers[label]
+        self.duty_step = min(self.duty_step, len(inputs.plan.steps) - 1)
+        self._duty = fields_of(inputs.plan, self.duty_step)
         if self._origin is not origin:
             self.axes, self._machine = machines.axes_about(origin), machines.parameter_fields(origin)
             empty = {machines.LIMITS: not origin.limits, machines.GEAR: not origin.gear, machines.MORE: True}
@@ -83,8 +90,8 @@ class FrameBuilder:
 
     @property
     def entries(self) -> Mapping[str, FormField]:
-        """All fields by their paths: those of the machine, then those of the selected strategy."""
-        return {**self._machine, **self._strategy}
+        """All fields by their paths: of the machine, the selected strategy, and the selected step."""
+        return {**self._machine, **self._strategy, **self._duty}
 
     def _is_new(self, part: str, content: object) -> bool:
         """Whether the browser does not have this yet; it is sent then."""
@@ -121,7 +128,9 @@ class FrameBuilder:
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": machine_fields(session, self._machine) | self._strategy_fields(result),
+            "fields": machine_fields(session, self._machine)
+            | self._strategy_fields(result)
+            | self._duty_fields(),
             "steps": session.steps,
             "drive": inputs.machine.name,
             "order": list(inputs.controllers),
@@ -141,7 +150,8 @@ class FrameBuilder:
             "angle": (units.of("rad"), units.size("rad")),
             "map_is_old": not self._map_is_right(),
         }
-        for part, entries in (("groups", self._machine), ("strategy", self._strategy)):
+        parts = (("groups", self._machine), ("strategy", self._strategy), ("duty_fields", self._duty))
+        for part, entries in parts:
             if self._is_new(part, (entries, units, self._folded)):
                 frame[part] = self._grouped(entries)
                 frame["filled"] = self._filled()
@@ -192,6 +202,25 @@ class FrameBuilder:
             fields[path]["changed"] = setting is not None and not isinstance(setting, str)
         return fields
 
+    def _duty_fields(self) -> dict[str, Frame]:
+        """What the fields of the selected step and of the whole duty show."""
+        values, units = values_of(self.session.inputs.plan, self._duty), self.session.inputs.units
+        return {
+            path: {"text": written_value(value, self._duty[path], units)} for path, value in values.items()
+        }
+
+    def _duty_frame(self, seconds: float) -> Frame | None:
+        """The duty under the selected strategy, if it is in sight and new, and takes no more than that."""
+        session, inputs = self.session, self.session.inputs
+        if not self.duty_shown:
+            return None
+        result = session.duty_result(seconds)
+        content = inputs.machine, inputs.controllers[inputs.selected], inputs.plan, inputs.units
+        if not self._is_new("duty", (*content, self.duty_step, result.given_up)):
+            return None
+        waits = result.given_up and seconds < LONGEST_DUTY
+        return {"duty": duty_view(inputs, None if waits else result, self.duty_step)}
+
     def _reference(self) -> Frame | None:
         """What the strategies are compared with, in words and figures; its trace if that is new."""
         inputs, result = self.session.inputs, self.session.reference()
@@ -208,6 +237,8 @@ class FrameBuilder:
         While a slider is dragged, each call goes on where the last one was left, so that all have their turn.
         """
         session, inputs = self.session, self.session.inputs
+        if (duty := self._duty_frame(LIVE_DUTY)) is not None:
+            yield duty
         labels = [label for label in inputs.controllers if label != inputs.selected]
         visible = inputs.drawn
         begun = perf_counter()
@@ -233,6 +264,8 @@ class FrameBuilder:
         if self._is_new("inputs", inputs):
             name, link = links.store(session)
             yield {"keep": {"server": SERVER, "name": name, "link": link}}
+        if (duty := self._duty_frame(LONGEST_DUTY)) is not None:
+            yield duty
         for label in inputs.controllers:
             if session.ready(label) is None:
                 result = session.result(label)
@@ -311,11 +344,6 @@ class FrameBuilder:
             "symbols": symbols,
             "labels": labels,
         }
-
-
-def json_number(value: float) -> float | None:
-    """A number that JSON can carry."""
-    return float(value) if math.isfinite(value) else None
 
 
 def numbers(values: Vector) -> list[float | None]:

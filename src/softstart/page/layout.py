@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
@@ -24,6 +25,7 @@ from softstart.page.session import Session
 
 WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
+DUTY = "Duty"  # this tab is live too: a strip of steps in the place of the plots
 LARGE = "Sheet"  # this tab is built when it is opened: others would feel it
 # further tabs: title, module and class
 PANELS = (
@@ -73,8 +75,13 @@ def build(drive: Loaded) -> Session:
     session.select(first_strategy(drive))
     session.restore(session.inputs)  # the page begins here: that is no step to undo
     frames = FrameBuilder(session)
+
+    def turned_to(title: str) -> None:
+        frames.duty_shown = title == DUTY
+        live.poke()
+
     with Instrument() as element:
-        _panels(session, client)
+        _panels(session, client, turned_to)
 
     def send(number: int, frame: Frame) -> None:
         if not client.is_deleted:
@@ -116,14 +123,14 @@ def _end(task: asyncio.Task[Any], session: Session) -> None:
     session.close()
 
 
-def _panels(session: Session, client: Client) -> None:
-    """The tabs for what is computed in the background, and for files."""
+def _panels(session: Session, client: Client, turned_to: Callable[[str], None]) -> None:
+    """The tabs for what is computed in the background, and for files; `turned_to(title)` at each change."""
     try:
         user = client.request.scope.get("session", {}).get(USER, client.id)  # of all tabs of a browser
     except RuntimeError:  # a page that no request has asked for
         user = client.id
     with ui.tabs().props("dense no-caps align=justify").classes("panel-tabs") as tabs:
-        for title in (EXPLORE, *(title for title, _, _ in PANELS)):
+        for title in (EXPLORE, DUTY, *(title for title, _, _ in PANELS)):
             ui.tab(title).classes(f"tab-{title.lower()}")
     with ui.tab_panels(tabs, value=EXPLORE, animated=False).classes("panel-body"):
         places = {}
@@ -132,7 +139,7 @@ def _panels(session: Session, client: Client) -> None:
                 places[title] = ui.element("div").classes("panel")
 
     def fill(title: str) -> None:
-        if (place := places.pop(title, None)) is None:  # it is there already
+        if (place := places.pop(title, None)) is None:  # it is there already, or live
             return
         module, name = next((module, name) for tab, module, name in PANELS if tab == title)
         with place:
@@ -143,5 +150,6 @@ def _panels(session: Session, client: Client) -> None:
                 ui.label(sentence_of(error))
 
     tabs.on_value_change(lambda event: fill(str(event.value)))
+    tabs.on_value_change(lambda event: turned_to(str(event.value)))
     for title in [title for title in places if title != LARGE]:
         fill(title)

@@ -19,6 +19,7 @@ from typing import Any
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.errors import InputError, Mistakes
+from softstart.page.duty import packed_plan, plan_of, unpacked_plan
 from softstart.page.machines import machine_from, startable
 from softstart.page.session import LONGEST_TIME, SOFT, Inputs, Reference, Session
 from softstart.plugins import controller_names
@@ -68,6 +69,7 @@ def link_of(inputs: Inputs) -> str:
         "drawn": sorted(inputs.visible),
         "soft": dict(inputs.soft_end),
         "at_time": inputs.at_time,
+        "duty": packed_plan(inputs.duty),
         "reference": None if reference is None or reference.label not in installed else {
             "drive": reference.machine.to_toml(), "label": reference.label,
             "parameters": _settings(reference.controller),
@@ -92,8 +94,9 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
     """
     try:
         content = _content(link)
-        machine = machine_from(content["drive"])
-        origin = machine_from(content["origin"]) if content["origin"] else machine
+        machine, _ = plan_of(machine_from(content["drive"]))
+        origin = plan_of(machine_from(content["origin"]))[0] if content["origin"] else machine
+        duty = unpacked_plan(content.get("duty"))
         soft_end = {name: float(content["soft"][name]) for name in SOFT} if content.get("soft") else {}
         origin.with_values(soft_end)  # refused here, not in the midst of a page
         same = origin == now.origin
@@ -126,6 +129,7 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         reference,
         soft_end,
         str(content.get("at_time", ""))[:LONGEST_TIME],
+        duty,
     )
 
 

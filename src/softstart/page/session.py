@@ -21,6 +21,7 @@ from softstart.drive.data_sheet import UnknownStiffness, still_assumed
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.hints import nearest
+from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, sentence_of
 from softstart.quantities import Units
@@ -35,6 +36,7 @@ from softstart.start.comparison import (
     equal_time,
     row_at_time,
 )
+from softstart.start.duty import DutyRun, StepRun, run_duty
 from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
 from softstart.views.numbers import cut, units_of
@@ -51,6 +53,10 @@ PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are
 MAX_AT_TIME = 10.0  # times the settled time of direct: a longer time sets nothing else
 MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that takes 64 of them
 LONGEST_TIME = 40  # characters
+LONGEST_DUTY = 3.0  # s of computation
+TOO_LONG_DUTY = (
+    "The duty takes too long to be carried out while you wait; use softstart duty, or less repetitions."
+)
 MAX_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
 
 
@@ -90,6 +96,15 @@ class Strategy:
         return self.trouble if self.run is None else outcome(self.run)
 
 
+@dataclass(frozen=True, eq=False)
+class DutyResult:
+    """The duty under one strategy, or the sentence that says why there is none."""
+
+    run: DutyRun | None
+    trouble: str = ""
+    given_up: bool = False  # it takes too long
+
+
 class EqualTime(NamedTuple):
     """A strategy set for a given time: its row, or a word and the sentence that say why there is none."""
 
@@ -119,6 +134,7 @@ class Inputs:
     reference: Reference | None = None  # what all strategies are compared with
     soft_end: Mapping[str, float] = field(default_factory=dict)  # of a drive loaded without stiffness: SOFT
     at_time: str = ""  # within which the strategies of the table are set to settle, "1.3x"; "" as they are
+    duty: DutyPlan | None = None  # of the machine, without its own: start, hold, stop
 
     @cached_property
     def units(self) -> Units:
@@ -175,6 +191,27 @@ class Inputs:
             return stiff
         return UnknownStiffness(stiff, soft.replace(units=stiff.units))
 
+    @cached_property
+    def plan(self) -> DutyPlan:
+        """The duty that is shown."""
+        return self.duty or DutyPlan()
+
+    @property
+    def machine_with_duty(self) -> Machine:
+        """`machine_in_units` with the duty, if one was made; InputError where its steps are wrong."""
+        machine = self.machine_in_units
+        return machine if self.duty is None else with_duty(machine, self.duty.duty)
+
+    @property
+    def both_ends_with_duty(self) -> Loaded:
+        """`machine_with_duty`, at both ends where its stiffness is unknown."""
+        ends = self.both_ends
+        if not isinstance(ends, UnknownStiffness):
+            return self.machine_with_duty
+        return UnknownStiffness(
+            *(one if self.duty is None else one.replace(duty=self.duty.duty) for one in ends)
+        )
+
     @property
     def drawn(self) -> tuple[str, ...]:
         """Labels of the strategies that are drawn, in the order of the table; the selected one always is."""
@@ -201,10 +238,13 @@ class Session:
         self, machine: Loaded | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
     ) -> None:
         stiff, soft_end = _both_ends(load_machine(machine) if isinstance(machine, str) else machine)
+        stiff, duty = plan_of(stiff)
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = _first_selected(names)
         self._initial = {name: make_controller(name) for name in names}
-        self.inputs = Inputs(stiff, stiff, self._initial, selected, frozenset((selected,)), soft_end=soft_end)
+        self.inputs = Inputs(
+            stiff, stiff, self._initial, selected, frozenset((selected,)), soft_end=soft_end, duty=duty
+        )
         self._past: list[Inputs] = []
         self._future: list[Inputs] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
@@ -218,6 +258,7 @@ class Session:
         self._at_equal_time: dict[str, tuple[Machine, Controller, str, EqualTime]] = {}
         self._direct: tuple[Machine, Run | None] | None = None
         self._reference: tuple[Reference, Strategy] | None = None
+        self._duty: tuple[tuple[Machine, Controller, DutyPlan], DutyResult] | None = None
 
     # the state -----------------------------------------------------------------------------------------
 
@@ -257,6 +298,8 @@ class Session:
         """
         if path.startswith(STRATEGY):
             self.set_parameter(path.removeprefix(STRATEGY), value, gesture)
+        elif path.startswith(PATH):
+            self.set_duty(self.inputs.plan.changed(path, value), gesture)
         elif value is None:
             self._change(machine=startable(without(self.inputs.machine, path)))
         else:
@@ -290,9 +333,21 @@ class Session:
         controller = changed_controller(controllers[label], {name: value})
         self._change(gesture, controllers={**controllers, label: controller})
 
+    def set_duty(self, plan: DutyPlan, gesture: str = "") -> None:
+        """Another duty; also one whose steps cannot follow one another, which `duty_result` says.
+
+        >>> session = Session("conveyor-11kw")
+        >>> session.set_duty(session.inputs.plan.moved(0, 2))
+        >>> session.duty_result().trouble
+        '[duty] 2, do = "stop": the machine stands; a step "start" comes before it.'
+        """
+        if plan != self.inputs.plan:
+            self._change(gesture, duty=plan)
+
     def load(self, machine: Loaded) -> None:
         """Another drive or chain, without the optima and gains that were computed for this one."""
         stiff, soft_end = _both_ends(machine)
+        stiff, duty = plan_of(stiff)
         inputs = self.inputs
         controllers = {
             label: controller for label, controller in inputs.controllers.items() if label in self._initial
@@ -304,6 +359,7 @@ class Session:
             selected=inputs.selected if inputs.selected in controllers else _first_selected(controllers),
             visible=inputs.visible.intersection(controllers),
             soft_end=soft_end,
+            duty=duty,
         )
 
     def restore(self, inputs: Inputs) -> None:
@@ -448,6 +504,20 @@ class Session:
             self._reference = reference, start
         return self._reference[1]
 
+    def duty_result(self, seconds: float = LONGEST_DUTY) -> DutyResult:
+        """The duty under the selected strategy. What goes wrong in it becomes its sentence.
+
+        One that takes longer is given up, and is not kept as the result.
+        """
+        inputs = self.inputs
+        key = inputs.machine, inputs.controllers[inputs.selected], inputs.plan
+        if self._duty is None or self._duty[0] != key:
+            result = _in_duty(*key, seconds)
+            if result.given_up and seconds < LONGEST_DUTY:
+                return result
+            self._duty = key, result
+        return self._duty[1]
+
     def compute_row(self, label: str) -> Iterator[None]:
         """Compute the row of a strategy in a comparison, step by step; there is none if its start fails."""
         run = self.result(label).run
@@ -537,7 +607,7 @@ class Session:
             self._listeners, self._results, self._rows, self._at_equal_time, self._past, self._future
         ):  # fmt: skip
             kept.clear()
-        self._reference = None
+        self._reference = self._duty = None
 
     # ---------------------------------------------------------------------------------------------------
 
@@ -593,3 +663,18 @@ def _started(label: str, machine: Machine, controller: Controller, max_events: i
     except Exception as error:  # a controller is anyone's code and may fail in any way
         run, trouble, given_up = None, sentence_of(error, FAILED_START), isinstance(error, SimulationError)
     return Strategy(label, run, trouble, time.thread_time() - began, given_up)
+
+
+def _in_duty(machine: Machine, controller: Controller, plan: DutyPlan, seconds: float) -> DutyResult:
+    latest = time.perf_counter() + seconds
+
+    def watch(step: StepRun) -> None:
+        if time.perf_counter() > latest:
+            raise TimeoutError
+
+    try:
+        return DutyResult(run_duty(machine, controller, plan.duty, stop=plan.stop or None, progress=watch))
+    except TimeoutError:
+        return DutyResult(None, TOO_LONG_DUTY, given_up=True)
+    except Exception as error:  # a controller is anyone's code and may fail in any way
+        return DutyResult(None, sentence_of(error, FAILED_START))

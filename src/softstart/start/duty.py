@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
@@ -352,6 +352,7 @@ def run_duty(
     parameters: Mapping[str, object] | None = None,
     fitted_to: MachineLike | None = None,
     base: MachineLike | None = None,
+    progress: Callable[[StepRun], None] | None = None,
 ) -> DutyRun:
     """A machine through cycles of a duty, exactly: each step begins in the state that the last has left.
 
@@ -376,6 +377,8 @@ def run_duty(
     cycles : int
         How often the cycle is carried out, one behind the other; once if it ends in motion.
     parameters, fitted_to, base : as in `simulate`.
+    progress : callable, optional
+        `progress(step)` is called after each step; what it raises ends the duty.
 
     Returns
     -------
@@ -408,7 +411,7 @@ def run_duty(
     stop_by = checked_stop(machine, ready, design, cycle, stop)
     count = 1 if cycle.ends_moving else int(cycles)
     reference = None if base is None else as_machine(base, "base")
-    return duty_run(machine, ready, design, cycle, stop_by, count, reference)
+    return duty_run(machine, ready, design, cycle, stop_by, count, reference, progress)
 
 
 def duty_of(machine: Machine, duty: Duty | str | None) -> Duty:
@@ -432,12 +435,14 @@ def checked_stop(
 
 def duty_run(
     machine: Machine, controller: Controller, design: Drive, duty: Duty, stop: str, count: int,
-    base: Machine | None = None,
+    base: Machine | None = None, progress: Callable[[StepRun], None] | None = None,
 ) -> DutyRun:  # fmt: skip
     """So many cycles of a duty that has been checked, under a controller that is set up, recorded."""
     still = STILL * float((base or machine).mean_torque)
     executed, points = list[StepRun](), list[list[Matrix]]()
     for ran, turns in carried_out(machine, controller, design, duty, stop, count, still):
+        if progress is not None:
+            progress(ran)
         executed.append(ran if ran.cycle <= KEPT_CYCLES else replace(ran, phases=()))
         if ran.cycle > 1 or count == 1:
             points.append(turns)

@@ -4,12 +4,12 @@ import { element, put } from "./numbers.js";
 const STEPS = 600;
 
 export class Controls {
-  constructor(place, own, head, say) {
-    Object.assign(this, { say, own, head, rows: new Map(), open: new Map(), groups: place.appendChild(element("div")) });
+  constructor(place, own, head, duty, say) {
+    Object.assign(this, { say, own, head, duty, rows: new Map(), open: new Map(), groups: place.appendChild(element("div")) });
   }
 
   // the fields of another machine, the first group in the head of the page; or of another strategy
-  build({ groups, strategy, filled = [] }) {
+  build({ groups, strategy, duty_fields: duty, filled = [] }) {
     if (groups) {
       this.head.replaceChildren(...groups[0].rows.flatMap((row) => this.row(row)));
       this.groups.replaceChildren(...groups.slice(1).map((group) => this.box(group, filled)));
@@ -18,6 +18,7 @@ export class Controls {
       this.own.replaceChildren(...strategy.map((group) => this.box(group, filled)));
       this.own.hidden = !strategy.length;
     }
+    if (duty) this.duty.replaceChildren(...duty.map((group) => this.box(group, filled)));
     for (const [path, { line }] of this.rows) if (!line.isConnected) this.rows.delete(path);
   }
 
@@ -37,7 +38,7 @@ export class Controls {
 
   row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {
     const id = `field-${path.replaceAll(/[.[]/g, "-").replaceAll("]", "")}`;
-    const own = path.startsWith("strategy.");
+    const own = /^(strategy|duty)\b/.test(path); // without symbols
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
     const line = element("div", { class: `row${slider ? "" : " plain"}${text ? " words" : ""}${words.length ? " wide" : ""}`, "data-path": path },
       element("label", { for: id, title: meaning }, ...(own ? [] : [element("i", {}, symbol)]), label));

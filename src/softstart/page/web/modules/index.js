@@ -1,5 +1,6 @@
 // Takes frames of the server, keeps what they say, and draws it once a screen refresh.
 import { Controls } from "./controls.js";
+import { Duty } from "./duty.js";
 import { Figure } from "./figure.js";
 import { GapMap } from "./map.js";
 import { element, put, stored } from "./numbers.js";
@@ -23,13 +24,14 @@ export class Instrument {
     this.theme = new Theme(part("theme"), () => this.redraw());
     this.scheme = new Scheme(part("controls"));
     this.remarks = part("controls").appendChild(element("div", { class: "remarks", role: "status" }));
-    this.controls = new Controls(part("controls"), part("strategy"), part("units"), say);
+    this.controls = new Controls(part("controls"), part("strategy"), part("units"), part("duty-fields"), say);
     this.steps = new Steps(part("steps"), say);
     this.figure = new Figure(part("figure"), say);
     this.table = new Table(part("strategies"), this.theme, say);
     const windowed = (window) => say({ what: "window", begin: window?.[0] ?? 0, end: window?.[1] ?? 0 });
     this.plots = new Plots(part("plots"), this.theme, windowed, (t) => this.timed(t));
     this.player = new Player(part("player"), this.plots);
+    this.duty = new Duty(part("duty"), part("duty-figure"), part("duty-files"), this.theme, say);
     this.map = new GapMap(part("map"), this.theme, say);
     this.resized = new ResizeObserver(() => this.redraw());
     for (const canvas of root.querySelectorAll("canvas")) this.resized.observe(canvas.parentElement);
@@ -81,6 +83,7 @@ export class Instrument {
       this.controls.build(frame);
       this.controls.show(fields, mistakes, stamp);
       this.figure.tell(mistakes[""] ?? "");
+      this.duty.answered(stamp, mistakes[""] ?? "");
       put(this.driveName, drive);
       document.title = `softstart: ${(this.driveName.title = drive)}`;
       this.advice.classList.add("old"); // it is of the drive as it was when it was last at rest
@@ -92,6 +95,7 @@ export class Instrument {
       const texts = [...plausibility_warnings, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
       this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < plausibility_warnings.length ? "doubt" : "" }, text)));
     }
+    if (frame.duty) this.duty.show(frame.duty);
     if (frame.keep) this.keep(frame.keep);
     this.map.take(frame);
     if (!number) return; // a quick frame: the figure alone
@@ -110,6 +114,7 @@ export class Instrument {
   redraw() {
     this.plotted = false;
     this.map?.fade();
+    this.duty?.lay();
     this.waiting ||= requestAnimationFrame(() => this.draw());
   }
 
