@@ -234,7 +234,7 @@ def test_a_start_time_is_a_settled_time_where_the_speed_is_held() -> None:
     assert [one.name for one in run.margins_of(start)] == ["shaft torque", "settled time"]
     assert run.executed[0].start_time == simulate(CRANE, "speed-ramp").settled_time
     assert start.start_time == max(one.start_time for one in run.executed if one.number == 1)
-    assert how_of(run.rows[1], run) == "strategy"
+    assert how_of(run.rows[1]) == "strategy"
     assert "settled\ns" in [column.heading for column in run.tables[0].columns]
 
 
@@ -243,7 +243,7 @@ def test_a_start_time_is_a_settled_time_where_the_speed_is_held() -> None:
 
 def test_the_table_says_how_each_step_was_done() -> None:
     run = ramp()
-    assert [how_of(row, run) for row in run.rows] == [
+    assert [how_of(row) for row in run.rows] == [
         "strategy", "holding torque", "plugging", "torque (configured)", "torque (configured)",
     ]  # fmt: skip
     text = text_of(run)
@@ -251,7 +251,7 @@ def test_the_table_says_how_each_step_was_done() -> None:
     assert "Plugging: ramp cannot reverse" in text
     asked = Duty([DutyStep("start"), DutyStep("stop", by="coast")])
     other = run_duty(CRANE, "ramp", asked, stop="torque")
-    assert how_of(other.rows[1], other) == "coast"
+    assert how_of(other.rows[1]) == "coast"
     assert "configured" not in text_of(other)
 
 

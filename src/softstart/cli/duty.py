@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -19,6 +23,7 @@ from softstart.plugins import controller_names
 if TYPE_CHECKING:
     from softstart.drive import Drive
     from softstart.drive.machine import Machine
+    from softstart.start.duty import DutyRun
 
 
 def _read_duty(name: str, option: str) -> Duty:
@@ -31,7 +36,7 @@ def _read_duty(name: str, option: str) -> Duty:
 @option("--compare", is_flag=True)
 @options.param_option
 @options.fitted_to_option
-@option("--duty", _read_duty)
+@option("--duty", _read_duty, shell_complete=one_of(Duty.LIBRARY.names))
 @option("--stop", type=click.Choice(["strategy", "torque", "coast", "brake"]))
 @option("--cycles", options.count(1, 100_000), default="2")
 @option("--slope", options.quantity("1"))
@@ -105,4 +110,37 @@ def duty_command(
     if several:
         rows = compared.ranked if controllers is None else compared.rows
         return compared.summary, duties.duty_comparison_sheet(compared, rows, fitted_to)
-    return lambda: duties.duty_data(run, slope), duties.duty_sheet(run, slope, fitted_to)
+    sheet = duties.duty_sheet(run, slope, fitted_to)
+    return lambda: duties.duty_data(run, slope), replace(sheet, commands=_next_steps(run))
+
+
+WAYS = {
+    "coast": "stops by coasting",
+    "torque": "stops by the torque of the motor",
+    "brake": "stops by the brake",
+}
+
+
+def _next_steps(run: DutyRun) -> list[tuple[str, str]]:
+    """The same command for all strategies, and with another stop where none of the steps says how."""
+    from softstart.start.duty import checked_stop
+
+    typed = list(click.get_current_context().obj or ())
+    found = [([*_without(typed, "controller", "param", "out"), "--compare"], "all strategies side by side")]
+    for way, gives in WAYS.items() if run.uses_configured_stop else ():
+        with suppress(InputError):
+            checked_stop(run.drive, run.controller, run.drive.design_drive, run.duty, way)
+            if way != run.stop:
+                found.append(([*_without(typed, "stop", "out"), "--stop", way], gives))
+    return [(shlex.join(["softstart", *words]), gives) for words, gives in found]
+
+
+def _without(words: Sequence[str], *names: str) -> Iterator[str]:
+    """The words of a command without these options and their values."""
+    value = False
+    for word in words:
+        name, equals, _ = word.removeprefix("--").partition("=")
+        if value or (word.startswith("--") and name in names):
+            value = not value and not equals
+        else:
+            yield word

@@ -108,6 +108,11 @@ class StepRun(OneLine):
         }
 
     @property
+    def configured(self) -> bool:
+        """Whether it stopped as configured, since the step does not say how and the strategy cannot stop."""
+        return self.step.do in ("stop", "jog") and self.step.by is None and self.how != "strategy"
+
+    @property
     def peak_torques(self) -> Vector:
         """Largest |T| of each shaft, N m."""
         return np.maximum(self.largest, -self.smallest)
@@ -200,6 +205,11 @@ class DutyRun(Result, view="duties.duty_sheet"):
         used = None if life is None else life.margin(self.drive.limits)
         steps = [(row, margin) for row in self.rows for margin in self.margins_of(row)]
         return (*steps, *([] if used is None else [(None, used)]))
+
+    @property
+    def uses_configured_stop(self) -> bool:
+        """Whether a step stops as configured, since it does not say how and the strategy cannot stop."""
+        return any(one.configured for one in self.executed)
 
     @property
     def counted_cycles(self) -> int:

@@ -79,12 +79,11 @@ def asked_of(step: DutyStep, machine: Machine) -> str:
     return " ".join([step.do, ", ".join(parts)]).strip()
 
 
-def how_of(row: StepRun, run: DutyRun) -> str:
-    """How a step was carried out; "set" where the stop is the configured one."""
+def how_of(row: StepRun) -> str:
+    """How a step was carried out, and whether that is the configured stop."""
     if row.how == ANEW:
         return "plugging"
-    configured = row.step.do in ("stop", "jog") and row.step.by is None and row.how != "strategy"
-    return f"{row.how} (configured)" if configured else row.how
+    return f"{row.how} (configured)" if row.configured else row.how
 
 
 def against_limits(margins: Sequence[Margin]) -> str:
@@ -110,7 +109,7 @@ def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
     return (
         DataColumn("step", lambda row: str(row.number)),
         DataColumn("to do", lambda row: asked_of(row.step, run.drive)),
-        DataColumn("how", lambda row: how_of(row, run)),
+        DataColumn("how", how_of),
         DataColumn("K_dyn", run.k_dyn_of, 3),
         DataColumn("largest\ntorque N m", lambda row: float(row.largest.max())),
         DataColumn("smallest\ntorque N m", lambda row: float(row.smallest.min())),
@@ -251,7 +250,7 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     )
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
-    if any("configured" in how_of(row, run) for row in run.rows):
+    if run.uses_configured_stop:
         yield f"{name} cannot stop: its stops are by {run.stop}, as configured."
     if ANEW in hows:
         yield (
@@ -260,6 +259,8 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
         )
     if "holding torque" in hows:
         yield "Holding torque: from the set speed on the motor has the torque that holds the load there."
+    if len(run.drive.shaft_names) > 1:
+        yield "Damage: of the shaft with the shortest life."
     yield from starts_note(run)
     if len(run.drive.positions) > 1:
         yield "The start position is unknown: the first step is the worst of both flanks and mid-gap."
@@ -547,7 +548,7 @@ def stop_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
     """Which strategies use the configured stop, and which are plugged."""
     ways: dict[str, list[str]] = {}
     for run in runs:
-        if any("configured" in how_of(row, run) for row in run.rows):
+        if run.uses_configured_stop:
             ways.setdefault(run.stop, []).append(run.controller_name)
     for stop, names in ways.items():
         yield f"Stops by {stop}, as configured, since they cannot stop: {', '.join(names)}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 
 import pytest
 from tests.softstart.cli.conftest import CONTROLLERS
@@ -78,6 +79,18 @@ def test_one_strategy(done, as_json):
     assert f"Worst step: 3, stop, K_dyn {said['k_dyn']:.3f}" in out
     assert "its stops are by torque, as configured" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 100
+
+
+def test_what_next(done):
+    """All strategies, and the other stops that this machine has; both commands run."""
+    shown = done(*RAMP, "--param", "time=0.1 s", "--stop=torque", "--cycles", "1").splitlines()
+    lines = [line.strip().split("   ")[0] for line in shown[shown.index("Next:") + 1 :]]
+    assert lines == [
+        "softstart duty crane.toml --stop=torque --cycles 1 --compare",
+        "softstart duty crane.toml --controller ramp --param 'time=0.1 s' --cycles 1 --stop coast",
+    ]
+    assert "Next:" in done(*shlex.split(lines[1])[1:])
+    assert "--stop" not in done("duty", "crane.toml", "--controller", "speed-ramp")
 
 
 def test_options_reach_the_duty(as_json):
