@@ -58,7 +58,7 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
     shares = None if life is None else 100.0 * life.worst.shares
     return view | {
         "steps": [line | step_figures(run, row, inputs.units, shares) for line, row in rows],
-        "notes": [headline(run), reason if life is None else life_conclusion(run, life)],
+        "notes": [headline(run, life), f"No life: {reason}" if life is None else life_conclusion(run, life)],
         "wrong": None,
         "worst": run.worst.number - 1,
         "k_dyn": json_number(run.k_dyn),
@@ -79,7 +79,7 @@ def step_figures(run: DutyRun, row: StepRun, units: Units, shares: Vector | None
     largest, smallest = (0.0 if abs(T) < none else float(T) for T in (row.largest.max(), row.smallest.min()))
     return {
         "length": row.end - row.begin,
-        "how": how_of(row, run),
+        "how": how_of(row),
         "k_dyn": json_number(run.k_dyn_of(row)),
         "largest": json_number(largest),
         "smallest": json_number(smallest),
