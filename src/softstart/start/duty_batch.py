@@ -133,22 +133,23 @@ class DutyBatch:
         """
         ready = list(set_ups)
         places = np.arange(len(self.machines))[which]
-        bases = np.broadcast_to(np.asarray(base, dtype=np.float64), places.shape).tolist()
         rows = [
-            self._figures_of(self.machines[place], *ready[i * len(ready) // len(places)], bases[i])
+            self._figures_of(self.machines[place], *ready[i * len(ready) // len(places)])
             for i, place in enumerate(places.tolist())
         ]
         machine = self.machines[0]
         columns = self.plan.figure_columns(machine.shaft_names)
         if not any(has_margin(one.limits) for one in self.machines):
             del columns["margin"], columns["keeps_limits"]
-        values = {name: [row.get(name, math.nan) for row in rows] for name in columns}
-        return {name: (np.array(values[name]), *column) for name, column in columns.items()}
+        values = {name: np.array([row.get(name, math.nan) for row in rows]) for name in columns}
+        for name in columns:
+            if name.startswith("k_dyn"):  # of torques
+                k_dyn = formulas.dynamic_coefficient(np.nan_to_num(values[name]), base)
+                values[name] = np.where(np.isnan(values[name]), np.nan, k_dyn)
+        return {name: (values[name], *column) for name, column in columns.items()}
 
-    def _figures_of(
-        self, machine: Machine, controller: Controller, design: Drive, base: float
-    ) -> dict[str, float | str]:
-        """The figures of one machine that is carried through the duty."""
+    def _figures_of(self, machine: Machine, controller: Controller, design: Drive) -> dict[str, float | str]:
+        """The figures of one machine that is carried through the duty; see `_of_steps`."""
         plan, damage = self.plan, math.nan
         stop = plan.check(machine, controller, design)
         try:
@@ -161,24 +162,19 @@ class DutyBatch:
                 executed = [one for one, _ in steps]
         except StepError as error:
             return {"status": error.status.name}
-        figures = dict(_of_steps(machine, executed, base))
+        figures = dict(_of_steps(machine, executed))
         return {**figures, "damage": damage, "status": Status.CARRIED_OUT.name}
 
 
-def _of_steps(machine: Machine, executed: Sequence[StepRun], base: float) -> Iterator[tuple[str, float]]:
-    """Figures of the steps of all cycles, by name."""
-
-    def k_dyn(torque: float) -> float:
-        return float(formulas.dynamic_coefficient(torque, base))
-
+def _of_steps(machine: Machine, executed: Sequence[StepRun]) -> Iterator[tuple[str, float]]:
+    """Figures of the steps of all cycles, by name; in place of each K_dyn its torque, N m."""
     of_shafts = np.max([one.peak_torques for one in executed], axis=0)
     peak, last = float(of_shafts.max()), [one for one in executed if one.cycle == executed[-1].cycle]
-    yield from (("k_dyn", k_dyn(peak)), ("peak_torque", peak))
+    yield from (("k_dyn", peak), ("peak_torque", peak))
     for number in {one.number for one in executed}:
-        largest = max(one.peak_torque for one in executed if one.number == number)
-        yield f"k_dyn_step_{number}", k_dyn(largest)
+        yield f"k_dyn_step_{number}", max(one.peak_torque for one in executed if one.number == number)
     for k, torque in enumerate(of_shafts.tolist(), start=1):
-        yield from ((f"k_dyn_{k}", k_dyn(torque)), (f"peak_torque_{k}", torque))
+        yield from ((f"k_dyn_{k}", torque), (f"peak_torque_{k}", torque))
     times = [one.start_time for one in executed if one.step.do in ("start", "reverse")]
     yield "start_time", float(np.max(times)) if times else math.nan
     yield "cycle_time", last[-1].end - last[0].begin

@@ -30,6 +30,7 @@ class StartRecorder:
     def __init__(self, machine_input: KernelInput, sees: int, room: int = FIRST_ROWS) -> None:
         self.input, self.sees = machine_input, sees
         self.work = np.zeros(rec.N_WORK)
+        self._state = self.work.view(rec.WORK)[0]
         self.measured = np.zeros(N_MEASURED)
         self.spans = np.zeros((room, rec.span_size(machine_input.count)))
         most_events = room + 16 * machine_input.count if room else 0
@@ -38,7 +39,7 @@ class StartRecorder:
     @property
     def state(self) -> Any:
         """The work of the start, by names."""
-        return self.work.view(rec.WORK)[0]
+        return self._state
 
     def begin(self, until: float, on_gap: bool) -> None:
         """The state at t = 0; without an end `until` is infinite."""

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from softstart.sweeping.summary import Summary
 
 MOST_PANELS, MOST_LINES = 6, 8
+MOST_COUNT = 1e9
 MOST_CELLS = 4_000_000  # of a map
 MOST_SHOWN = 40  # starts in the table on the screen, in report.md and in JSON
 MOST_WRITTEN = 100_000  # starts in the file
@@ -183,7 +184,8 @@ def start_table(results: xarray.Dataset) -> TextTable:
 
 
 def _figures(values: list[float]) -> list[str]:
-    whole = all(math.isnan(value) or float(value).is_integer() for value in values)
+    # every large float is whole, also that of a damage
+    whole = all(math.isnan(value) or (value < MOST_COUNT and value == int(value)) for value in values)
     return [number(value, 0) for value in values] if whole else column_of(values, 5)
 
 
