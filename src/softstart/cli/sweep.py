@@ -126,6 +126,7 @@ def sweep_command(
         "drive": drive.name,
         "fitted_to": fitted_to.name if fitted_to else None,
         "controller": controller,
+        "duty": results.attrs.get("softstart_duty"),
         "axes": views.axis_summary(results),
         **summary.summary(),
         "cells": views.cells(results).to_dict("records") if summary.starts <= views.MOST_SHOWN else None,
