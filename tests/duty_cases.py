@@ -78,6 +78,7 @@ class Player:
             longest=400.0 * elastic_period(case.given), **fields,
         )  # fmt: skip
         self.speed = 0.0  # commanded; 0 at standstill
+        self.oracle.brake = case.brake
 
     def cycle(self) -> list[Step]:
         """All steps, a jog that is repeated as so many."""
@@ -146,16 +147,18 @@ class Player:
         brake_time: float = math.nan, time: float = math.inf,
     ) -> None:  # fmt: skip
         """Braking torque until the motor stands, or none; then the brake closes, and all come to rest."""
-        o, braked, stands = self.oracle, self.case.brake > 0.0, Until("stand", self.period)
+        o, braked = self.oracle, self.case.brake > 0.0
         o.watch()
         size, ends = self.case.braking if math.isnan(braking_torque) else braking_torque, ends_of(o, time)
         torque = [(0.0, -self.way * size)] if by == "torque" else REST
         slows = by == "torque" or (by == "coast" and braked) or brake_speed > 0.0
+        # without load and friction a motor without torque stands in its band
+        slow = brake_speed if abs(holding_torque(o.given, 0.0)) > 0.0 else max(brake_speed, o.band)
         if not math.isnan(brake_time):
             if brake_time > 0.0:
-                o.phase(Until("time", brake_time), stands, torque=torque)
+                o.phase(Until("time", brake_time), torque=torque)
         elif slows and self.way * o.y[o.n - 1 + o.given.motor] > brake_speed:
-            o.phase(Until("motor", self.way * brake_speed, -self.way), stands, torque=torque)
+            o.phase(Until("motor", self.way * slow, -self.way), torque=torque)
         if braked:
             if self.case.closing > 0.0:
                 o.phase(Until("time", self.case.closing), torque=REST)

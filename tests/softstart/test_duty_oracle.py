@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from tests.softstart.duty_machines import differences, duty_of, machine_of, run_
 from tests.softstart.duty_sampled import SampledPlayer, sampled_case
 from tests.twin import plain
 
-from softstart import DutyRun, run_duty
+from softstart import DutyRun, InputError, run_duty
 from softstart.controller import make_controller
 from softstart.kernel import records as rec
 from softstart.start.fatigue import rainflow_cycles
@@ -71,6 +73,18 @@ def test_duties_of_sampled_strategies(name: str) -> None:
     steps = SampledPlayer(case, plain(controller, machine), name == "speed-ramp").cycle()
     found = differences(case, run, steps)
     assert max(found.values()) < 1e-8, found
+
+
+def test_a_motor_in_motion_is_not_locked() -> None:
+    """A stop that its time ends in motion: the start behind it would take the motor's speed away."""
+    case = single_cases()["travel"]
+    steps = [{"do": "start"}, {"do": "brake", "time": 0.05}, {"do": "start"}]
+    with pytest.raises(InputError, match="the motor still moves"):
+        run_of(replace(case, steps=steps))
+    run = run_of(replace(case, steps=[steps[0], {"do": "brake"}, steps[2]]))
+    ends = [phase.trajectory.of_masses("speed")[[0, -1]] for phase in run.phases]
+    for before, after in pairwise(ends):
+        assert np.abs(after[0] - before[1]).max() < 1e-8 * case.target
 
 
 # ---- energy and momentum --------------------------------------------------------------------------------

@@ -245,6 +245,11 @@ class DutyCycle:
             self.go = segment_of(self.controller, self.design, self.recorder)
         assert self.go is not None
         release = self.machine.release_time if before == 0.0 and begins else 0.0
+        if release > 0.0 and self.begun and abs(self.motor_speed) > 2.0 * HELD * self.target:
+            raise InputError(
+                f'[duty] {self.step + 1}, do = "{step.do}": the motor still moves, and its brake is to hold '
+                f"it until it is open ({self.where}); let the stop before it end by itself, without a time."
+            )
         self.closed = False
         travel = {} if step.angle is None else self._travel(step.angle, begins)
         until = began + (math.inf if step.time is None else step.time)
