@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, simulate, sweep
+from softstart import Drive, Duty, DutyStep, InputError, Shift, simulate, sweep
 from softstart.controller import make_controller
 from softstart.controller.tuned import (
     Gain,
@@ -48,7 +48,8 @@ def test_a_schedule_is_read_back_to_the_bit(tmp_path):
 
 def test_a_robust_set_is_read_back_to_the_bit(tmp_path):
     gains = {"time": 1.0 / 3.0, "initial": 0.1 + 0.2}
-    saved = RobustFile("ramp", gains, CRANE.replace(damping=0.1, torque_lag="2 ms"))
+    duty = Duty([DutyStep("start"), DutyStep("stop", by="coast")], shift=Shift(cycles_per_hour=4))
+    saved = RobustFile("ramp", gains, CRANE.replace(damping=0.1, torque_lag="2 ms", duty=duty))
     assert read_gains(robust_text(saved, {"worst": 1.0}), tmp_path / "x.toml") == saved
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
@@ -410,5 +411,5 @@ def _table(name: str, values: Mapping[str, object], meanings: Mapping[str, str] 
 def _nested(drive: Drive) -> str:
     """The drive's own file, below the table [drive]."""
     lines = drive.to_toml().splitlines()
-    nested = [f"[drive.{line[1:]}" if line.startswith("[") else line for line in lines]
+    nested = [re.sub(r"^\[+", r"\g<0>drive.", line) for line in lines]
     return "\n".join(["[drive]", *nested])

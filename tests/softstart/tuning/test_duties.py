@@ -55,7 +55,8 @@ def test_a_stop_by_the_strategy_is_tuned_by_the_metric_of_its_step() -> None:
 
 def test_gains_note_the_duty_that_they_are_tuned_for(tmp_path: Any) -> None:
     duty = Duty([DutyStep("start"), DutyStep("stop", by="torque")])
-    tuned = tune(CONVEYOR, "ramp", **CELL, duty=duty, stop="torque", free=["initial"], cycles=1, **SMALL)
+    drive = CONVEYOR.replace(duty=duty)
+    tuned = tune(drive, "ramp", **CELL, duty=True, stop="torque", free=["initial"], cycles=1, **SMALL)
     tuned.to_toml(tmp_path / "robust.toml", "robust")
     about = tomllib.loads((tmp_path / "robust.toml").read_text(encoding="utf-8"))["about"]
     assert about["duty"] == tuned.summary()["duty"] == "start, stop by torque; stops by torque; 1 cycle"
@@ -63,7 +64,7 @@ def test_gains_note_the_duty_that_they_are_tuned_for(tmp_path: Any) -> None:
     assert not any("optimum" in str(name) for name in tuned.price)
     again = make_controller(str(tmp_path / "robust.toml"))
     assert tuned.robust is not None
-    assert run_duty(CONVEYOR, again, duty, cycles=1).k_dyn == tuned.robust.worst
+    assert run_duty(drive, again, cycles=1).k_dyn == tuned.robust.worst
 
 
 def test_an_interrupted_search_goes_on_and_takes_no_other_duty(tmp_path: Any) -> None:
