@@ -151,6 +151,8 @@ def test_a_rigid_gap_has_no_life() -> None:
     with pytest.raises(InputError, match="impacts in a rigid gap have no finite torque"):
         run.life()
     assert any("rigid gap" in note for note in run.notes)
+    assert "impulse\nN m s" in [column.heading for column in run.tables[0].columns]
+    assert "impulse\nN m s" not in [column.heading for column in ramp().tables[0].columns]
 
 
 def test_required_life_and_starts_per_hour() -> None:
@@ -182,6 +184,13 @@ def test_limits_hold_for_every_step_in_both_directions() -> None:
     assert sum(not margin.kept for _, margin in run.margins()) == 2
     assert run.worst.number == 4
     assert hold.start_time != hold.start_time
+    table = run.tables[0]
+    place = [column.heading for column in table.columns].index("margin\n%")
+    torque, time = "shaft torque", "start time"
+    assert [row[place + 1] for row in table.rows] == [time, torque, time, torque, torque]
+    for row, cells in zip(run.rows, table.rows, strict=True):
+        least = min(margin.share for margin in run.margins_of(row))
+        assert float(cells[place]) == pytest.approx(100.0 * least, abs=0.051)
     text = text_of(run)
     assert text.count("Worst step: 4, stop, K_dyn") == 1
     assert "Limits are exceeded in step 3, reverse: start time" in text

@@ -92,6 +92,14 @@ def against_limits(margins: Sequence[Margin]) -> str:
     return "" if least is None else f"{least.brief}, {least.name}"
 
 
+def _least(margins: Sequence[Margin], what: str) -> Any:
+    """The margin that decides in per cent, negative where the limit is exceeded, or the name of its limit."""
+    least = min(margins, key=lambda one: one.share, default=None)
+    if what == "name":
+        return "" if least is None else least.name
+    return math.nan if least is None else 100.0 * least.share
+
+
 def name_of(row: StepRun) -> str:
     """The number of a step and what it does."""
     return f"{row.number}, {row.step.do}"
@@ -113,7 +121,8 @@ def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
         DataColumn("K_dyn", run.k_dyn_of, 3),
         DataColumn("largest\ntorque N m", lambda row: float(row.largest.max())),
         DataColumn("smallest\ntorque N m", lambda row: float(row.smallest.min())),
-        DataColumn("limits", lambda row: against_limits(run.margins_of(row)), optional=True),
+        DataColumn("margin\n%", lambda row: _least(run.margins_of(row), "share"), 1, optional=True),
+        DataColumn("to the limit", lambda row: _least(run.margins_of(row), "name"), optional=True),
         DataColumn("damage\n%", lambda row: math.nan if shares is None else float(shares[row.number - 1]), 1,
                    optional=True),
         DataColumn("impulse\nN m s", lambda row: float(row.impulses.max()) or math.nan, optional=True),
@@ -248,6 +257,8 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
         f"largest torque. K_dyn: largest |T| over {run.base_torque:.4g} N m, the mean shaft torque of {base} "
         "under full starting torque."
     )
+    if run.margins():
+        yield "Margin: what a step leaves of the limit to which it comes nearest; negative: exceeded."
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
     if run.uses_configured_stop:
@@ -462,13 +473,14 @@ def _of_run(value: Any, none: Any = math.nan) -> Any:
     return lambda row: none if row.run is None else value(row)
 
 
-def _least_margin(row: DutyRow) -> str:
-    return against_limits([margin for _, margin in row.margins])
+def _nearest(what: str) -> Any:
+    return lambda row: _least([margin for _, margin in row.margins], what)
 
 
 COMPARED = (
     DataColumn("worst\nstep", _of_run(lambda row: name_of(row.run.worst), "-")),
-    DataColumn("limits", _least_margin, optional=True),
+    DataColumn("margin\n%", _nearest("share"), 1, optional=True),
+    DataColumn("to the limit", _nearest("name"), optional=True),
     DataColumn("life over\ndirect", lambda row: row.relative, text=factor, optional=True),
     DataColumn("cycles to\nfailure", lambda row: math.nan if row.life is None else row.life.worst.cycles,
                text=counted, optional=True),
