@@ -26,7 +26,7 @@ from softstart.start import fatigue
 from softstart.start.comparison import Comparison
 from softstart.start.recommendation import SLOW
 from softstart.vibration import natural_vibration
-from softstart.views import chains, drives, starts, traces
+from softstart.views import chains, drives, duties, starts, traces
 from softstart.views import fatigue as lives
 from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_map, panels, svg_of, verbatim
 from softstart.views.numbers import (
@@ -51,9 +51,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softstart.reporting.result import Report
+    from softstart.start.duty import StepRun
+    from softstart.start.duty_comparison import DutyRow
 
 HERE = Path(__file__).parent
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
+OWN_SECTION = ("duty", "shift")  # tables of a machine that are shown with the duty
+LEFT_OUT = ("impact\nenergy J", "start\ntime s", "settled\ns")  # columns of the steps of a duty
 MOST_SHAFTS = 6  # with a column each in a table
 LONGEST = 70  # characters of a name in the head of a page
 SAME = 0.005  # a peak within this share of another is the same
@@ -188,6 +192,7 @@ def document(report: Report) -> str:
         "robustness": "Robustness to wear and load" if report.choice.mapped else "",
         "sheets": "Parameter sheets for the inverter",
         "life": "Fatigue life of the shaft line" if lasts else "",
+        "duty": "" if drive.duty is None else "Duty: stops, reversals, jogs and the life of a shift",
         "validity": "Assumptions and validity",
         "provenance": "About this document",
     }
@@ -214,7 +219,7 @@ def document(report: Report) -> str:
         "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
         "maps_figure": maps_figure, "starts": starts,
-        "chains": chains, "lives": lives,
+        "chains": chains, "lives": lives, "duties": duties, "duty_steps": duty_steps,
         "output": "|#at the output, N m" if drive.gear else "",
         "strategies": strategies, "equal_time": equal_time,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
@@ -285,6 +290,20 @@ def equal_time(comparison: Comparison) -> TextTable:
     return starts.comparison_table(rows, (*starts.PEAK_COLUMNS, *starts.TIME_COLUMNS), title)
 
 
+def duty_steps(row: DutyRow) -> TextTable:
+    """The steps of a duty under a strategy, with the columns for which a page has room."""
+    run = row.run
+    assert run is not None
+
+    def margin(step: StepRun) -> str:  # the sentence above names the limit
+        return duties.against_limits(run.margins_of(step)).partition(",")[0]
+
+    columns = {one.heading: one for one in duties.step_columns(run, row.life)}
+    columns["limits"] = columns["limits"]._replace(of=margin)
+    chosen = [one for heading, one in columns.items() if heading not in LEFT_OUT]
+    return TextTable.of_data("Steps", chosen, run.rows, bold=[run.worst.number - 1], keys=2)
+
+
 def functions(report: Report) -> list[tuple[str, str]]:
     """The functions of inverters that these sheets need: keys and names."""
     low = min((float(np.min((sheet.rounded or sheet.exact).u)) for sheet in report.sheets), default=0.0)
@@ -313,6 +332,8 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     project, units, gear = report.project, units_of(report.drive), report.drive.gear
     rows, absent = list[list[str]](), list[str]()
     for path, (parameter, value) in report.drive.parameters_by_path().items():
+        if parameter.table in OWN_SECTION:
+            continue
         source, si, meaning = project.source_of(path), parameter.unit, of_part(report.drive, path, parameter)
         if value is None or value == "" or parameter.name in HIDDEN:
             continue

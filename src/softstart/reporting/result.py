@@ -42,6 +42,7 @@ from softstart.start.comparison import (
     set_for_limits,
 )
 from softstart.start.demand import ControllerLike
+from softstart.start.duty_comparison import DutyComparison, compare_duty
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
@@ -183,6 +184,20 @@ class Report(Result):
             return " ".join(map(fact_of, getattr(error, "sentences", [str(error)])))
 
     @cached_property
+    def duties(self) -> DutyComparison | str:
+        """The duty of the machine under `direct` and the strategies with a sheet, or why there is none.
+
+        Empty for a machine without a duty.
+        """
+        if self.drive.duty is None:
+            return ""
+        rows = dict.fromkeys([self.choice.direct, *self.choice.of_sheets])
+        try:
+            return compare_duty(self.drive, [row.controller for row in rows])
+        except (InputError, SimulationError) as error:
+            return " ".join(getattr(error, "sentences", [str(error)]))
+
+    @cached_property
     def life_gain(self) -> float | None:
         """Life of the shaft line under the chosen strategy over that of `direct`, if it is known."""
         best = self.choice.chosen
@@ -248,6 +263,7 @@ class Report(Result):
             "limit": self.limit.summary(),
             "life": life.summary() if isinstance(life, Fatigue) else life,
             "life_gain": self.life_gain,
+            "duty": duties.summary() if isinstance(duties := self.duties, DutyComparison) else duties or None,
             "sheets": [sheet.summary() for sheet in self.sheets],
             "equal_time": None if self.equal_time is None else self.equal_time.summary(),
             "provenance": self.provenance,
