@@ -337,7 +337,7 @@ def check_duty(
     """
     if stop is not None and stop not in get_args(StopBy):
         *first, last = map(show, get_args(StopBy))
-        meant = nearest(stop, get_args(StopBy))
+        meant = nearest(stop, get_args(StopBy)) if isinstance(stop, str) else None
         remedy = f"; did you mean {show(meant)}?" if meant else "."
         raise InputError(f"stop = {show(stop)}: the stop is {', '.join(first)} or {last}{remedy}")
     if machine.motor is None:

@@ -49,7 +49,9 @@ class Status(Enum):
         "stiffness and inertias, or end the run earlier (until)."
     )
     CARRIED_OUT = "The duty was carried out."
-    NOT_CARRIED_OUT = "The duty was given up: a step cannot be finished, or does not end."
+    NOT_CARRIED_OUT = (
+        "The duty was given up: a step cannot be finished, or does not end; run_duty says which."
+    )
 
     @property
     def finished(self) -> bool:

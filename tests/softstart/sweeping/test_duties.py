@@ -34,7 +34,7 @@ def figures_of(run: DutyRun) -> dict[str, float]:
         "contacts": sum(one.contacts for one in last),
         "impact_energy": float(np.sum([one.impact_energy for one in last])),
         "damage": run.life().worst.damage,
-        **({"margin": min(margins), "keeps_limits": run.limits_kept} if margins else {}),
+        **({"margin": min(margins), "keeps_limits": min(margins) >= 0.0} if margins else {}),
     }
 
 
@@ -146,6 +146,7 @@ def test_processes_compute_the_same_bits() -> None:
             'stop = "cost": the stop is "strategy", "torque", "coast" or "brake"',
         ),
         ({"duty": JOG, "figures": ["k_dyn_step_2"]}, "there is no such figure; did you mean k_dyn_step_1?"),
+        ({"duty": DUTY, "stop": 3}, "stop = 3: the stop is"),
         ({"duty": DUTY, "stop": "brake"}, "the machine has no brake"),
         ({"figures": ["damage"]}, 'figures = "damage": there is no such figure'),
     ],
