@@ -105,6 +105,15 @@ def test_damage_of_more_cycles_is_that_of_one() -> None:
     assert five.spectrum[:, 2].sum() == pytest.approx(two.spectrum[:, 2].sum(), rel=0.1)
 
 
+def test_a_single_cycle_is_counted_and_said() -> None:
+    one = run_duty(CRANE, "ramp", THERE_AND_BACK, cycles=1)
+    assert one.life().counted == 1
+    assert one.life().worst.damage > 0.0
+    assert "One cycle: its damage depends" in text_of(one)
+    assert "One cycle" not in text_of(ramp())
+    assert "The duty ends in motion" in text_of(run_duty(CRANE, "ramp", START))
+
+
 def test_life_in_hours_shifts_and_years() -> None:
     (shaft,) = ramp().life().shafts
     assert shaft.cycles == 1.0 / shaft.damage

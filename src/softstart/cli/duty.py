@@ -15,7 +15,7 @@ from softstart.cli import options
 from softstart.cli.completion import one_of
 from softstart.cli.options import command, controller_option, option
 from softstart.cli.running import Output, answers, attributed, controllers_from_options, working
-from softstart.cli.starts import read_numbers
+from softstart.cli.starts import read_part_counts
 from softstart.drive import Duty
 from softstart.errors import InputError
 from softstart.plugins import controller_names
@@ -40,7 +40,7 @@ def _read_duty(name: str, option: str) -> Duty:
 @option("--stop", type=click.Choice(["strategy", "torque", "coast", "brake"]))
 @option("--cycles", options.count(1, 100_000), default="2")
 @option("--slope", options.quantity("1"))
-@option("--estimate-damping", read_numbers)
+@option("--estimate-damping", read_part_counts)
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def duty_command(

@@ -126,7 +126,7 @@ def simulate_command(
     return lambda: data, run_sheet(run, fitted_to)
 
 
-def read_numbers(text: str, option: str) -> dict[str, int]:
+def read_part_counts(text: str, option: str) -> dict[str, int]:
     """The `name=number` pairs of --estimate-damping."""
     pairs = options.read_params(text.split(","), option, "gears=3,couplings=2")
     return {name: whole_number(number, option, 0) for name, number in pairs.items()}
@@ -138,7 +138,7 @@ def read_numbers(text: str, option: str) -> dict[str, int]:
 @options.param_option
 @option("--slope", options.quantity("1"))
 @option("--worn-gap")
-@option("--estimate-damping", read_numbers)
+@option("--estimate-damping", read_part_counts)
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def fatigue_command(

@@ -166,7 +166,7 @@ def life_table(life: DutyLife) -> TextTable:
     return TextTable.of_data("Life", LIFE, life.shafts)
 
 
-def duration(one: ShaftLife) -> str:
+def life_length(one: ShaftLife) -> str:
     """A life in cycles, shifts and years; "" where it is not known."""
     parts = ((one.cycles, "cycles"), (one.hours, "h"), (one.shifts, "shifts"), (one.years, "years"))
     return ", ".join(f"{counted(value)} {unit}" for value, unit in parts if not math.isnan(value))
@@ -187,7 +187,7 @@ def life_conclusion(run: DutyRun, life: DutyLife) -> str:
     step = next(row for row in run.rows if row.number == number)
     where = f" of {worst.shaft}" if len(life.shafts) > 1 else ""
     most = f"most damage in step {name_of(step)} ({100.0 * worst.shares[number - 1]:.3g} %)"
-    length = duration(worst)
+    length = life_length(worst)
     if not length:
         torque = f"damage-equivalent torque {with_unit(float(f'{worst.equivalent_torque:.4g}'), 'N m')}"
         return f"Life{where}: {torque}, {most}."
@@ -261,6 +261,8 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
         yield "Margin: what a step leaves of the limit to which it comes nearest; negative: exceeded."
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
+    elif run.cycles == 1:
+        yield "One cycle: its damage depends on where the machine stood before; compute two or more (--cycles)."
     if run.uses_configured_stop:
         yield f"{name} cannot stop: its stops are by {run.stop}, as configured."
     if ANEW in hows:
@@ -399,7 +401,7 @@ def duty_figure(run: DutyRun, step: StepRun | None = None) -> Figure:
     return figure
 
 
-def traces_of(run: DutyRun, begin: float, end: float) -> tuple[Vector, dict[str, Vector]]:
+def traces_between(run: DutyRun, begin: float, end: float) -> tuple[Vector, dict[str, Vector]]:
     """Instants between two, and the states then."""
     inside = run.t[(run.t >= begin) & (run.t <= end)]
     if inside.size == run.t.size:
@@ -416,7 +418,7 @@ def worst_recorded(run: DutyRun) -> StepRun:
 
 def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """Motor and shaft torques, and the permissible ones."""
-    t, traces = traces_of(run, begin, end)
+    t, traces = traces_between(run, begin, end)
     axes.plot(t, traces["u"], color=COLOURS[1], lw=0.8, label="motor torque u")
     for (name, line), torque in zip(shafts_of(run), traces["T"].T, strict=True):
         axes.plot(t, torque, label=name, **(line | {"lw": 0.9}))
@@ -430,7 +432,7 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
 def draw_speeds(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """The speeds of all masses."""
     units, names = units_of(run.drive), run.drive.mass_names
-    t, traces = traces_of(run, begin, end)
+    t, traces = traces_between(run, begin, end)
     lines = [(name, line_of(i)) for i, name in enumerate(names)]
     if len(lines) == 2:
         lines = [("motor w1", {"color": COLOURS[1]}), ("load w2", {"color": COLOURS[0]})]
@@ -458,7 +460,7 @@ def mark_steps(axes: Axes, run: DutyRun, begin: float, end: float, labels: bool)
 # several strategies ----------------------------------------------------------------------------------------
 
 
-def step_figures(comparison: DutyComparison) -> list[DataColumn]:
+def step_coefficients(comparison: DutyComparison) -> list[DataColumn]:
     """K_dyn of each step, a column each."""
 
     def of_step(i: int) -> Any:
@@ -496,7 +498,7 @@ def duty_comparison_sheet(
     """What is shown of strategies in a duty; `rows` are its rows in another order."""
     machine, rows = comparison.drive, rows or comparison.rows
     runs = [row.run for row in rows if row.run is not None]
-    columns = [DataColumn("strategy", lambda row: row.name), *step_figures(comparison), *COMPARED]
+    columns = [DataColumn("strategy", lambda row: row.name), *step_coefficients(comparison), *COMPARED]
     figures = {"duty": lambda: comparison_map(comparison, rows)}
     files: dict[str, str | Writer] = {"duty.toml": comparison.duty.to_toml()}
     records, stems = [_compared_record(row) for row in rows], list[str]()
@@ -551,7 +553,7 @@ def comparison_conclusions(comparison: DutyComparison) -> list[str]:
         longest = min(lasting, key=lambda row: row.life.worst.damage if row.life else math.inf)
         assert longest.life is not None
         over = "" if math.isnan(longest.relative) else f", {factor(longest.relative)} times that of direct"
-        length = duration(longest.life.worst)
+        length = life_length(longest.life.worst)
         text.append(f"Longest life: {longest.name}{over}{', ' + length if length else ''}.")
     return text
 
