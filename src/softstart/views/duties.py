@@ -262,7 +262,7 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
     elif run.cycles == 1:
-        yield "One cycle: its damage depends on where the machine stood before; compute two or more (--cycles)."
+        yield "One cycle: its damage depends on where the machine stood before; compute two or more."
     if run.uses_configured_stop:
         yield f"{name} cannot stop: its stops are by {run.stop}, as configured."
     if ANEW in hows:
