@@ -108,6 +108,19 @@ def command_text(
     return shlex.join(words)
 
 
+def duty_text(machine: Machine, label: str, controller: Controller, stop: str) -> str:
+    """`softstart duty ...` for a machine with its duty, under one strategy.
+
+    >>> from softstart import Duty, DutyStep
+    >>> from softstart.controller import make_controller
+    >>> machine = Drive.load("conveyor-11kw").replace(duty=Duty([DutyStep("jog", time=0.2)]))
+    >>> duty_text(machine, "ramp", make_controller("ramp", {"time": 0.2}), "coast")
+    'softstart duty belt-conveyor-11-kw-level.toml --stop coast --controller ramp --param time=0.2'
+    """
+    text = command_text(machine, {label: controller}, "duty", *(["--stop", stop] if stop else []))
+    return re.sub(r"--param [\w-]+\.", "--param ", text.replace("--controllers", "--controller"))
+
+
 def profile_of(controller: Controller) -> TorqueProfile | None:
     """The torque profile that a controller plays; None for one that plays none.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from contextlib import suppress
 from functools import partial
 
 from nicegui import ui
@@ -16,6 +17,7 @@ from softstart.page import tasks
 from softstart.page.downloads import (
     command_text,
     drive_file,
+    duty_text,
     file_name,
     profile_file,
     profile_of,
@@ -165,6 +167,7 @@ class ReportPanel(JobPanel):
 def command_line(session: Session, user: Hashable) -> None:
     """What to type in a terminal for the same drive and strategies."""
     command = ui.label().classes("command").props('data-testid="command" tabindex=0')
+    duty = ui.label().classes("command").props('data-testid="duty-command" tabindex=0')
     note = ui.label().classes("panel-hint")
 
     def refresh() -> None:
@@ -172,8 +175,15 @@ def command_line(session: Session, user: Hashable) -> None:
         drawn = {label: inputs.controllers[label] for label in inputs.drawn}
         text = command_text(inputs.machine, drawn)
         command.set_text(text)
-        words = text.replace(",", " ").replace("=", " ").split()
-        files = [word for word in words if word.endswith((".toml", ".csv"))]
+        of_duty = ""
+        with suppress(InputError):  # the tab of the duty says so
+            if inputs.duty is not None:
+                one = inputs.controllers[inputs.selected]
+                of_duty = duty_text(inputs.machine_with_duty, inputs.selected, one, inputs.duty.stop)
+        duty.set_text(of_duty)
+        duty.set_visibility(bool(of_duty))
+        words = f"{text} {of_duty}".replace(",", " ").replace("=", " ").split()
+        files = dict.fromkeys(word for word in words if word.endswith((".toml", ".csv")))
         notes = [f"First save from here: {', '.join(files)}." if files else
                  "It prints the strategies that are drawn as a table in a terminal."]  # fmt: skip
         profiles = sum(profile_of(controller) is not None for controller in drawn.values())

@@ -290,6 +290,10 @@ class FrameBuilder:
             "plausibility_warnings": plausibility_warnings(inputs.machine),
             "assumed": [text for text in inputs.machine.assumed.split("; ") if text],
         }
+        if self.duty_shown:
+            for label in inputs.controllers:
+                session.compute_duty(label)
+                yield {"rows": [row(session, session.result(label))]}
         yield from self._map()
 
     def _map(self) -> Iterator[Frame | None]:
@@ -449,7 +453,9 @@ def row(session: Session, result: Strategy) -> Frame:
         known, flag, trouble = session.at_equal_time(result.name) or EqualTime(None)
         result = Strategy(result.name, None if known is None else known.run, trouble)
     time = math.nan if result.run is None else result.run.limited_time
-    line = outcomes(result) | {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
+    duty = session.duty_k_dyn(result.name)
+    line = outcomes(result) | {"duty": None if duty is None else json_number(duty)}
+    line |= {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
     if known is None:
         empty = dict.fromkeys(("worn", "soft", "settled", "settled_lost", "overshoot"))
         return line | empty | {"limits": "", "flag": flag, "set_to": ""}

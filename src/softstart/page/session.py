@@ -258,6 +258,7 @@ class Session:
         self._at_equal_time: dict[str, tuple[Machine, Controller, str, EqualTime]] = {}
         self._direct: tuple[Machine, Run | None] | None = None
         self._reference: tuple[Reference, Strategy] | None = None
+        self._duty_k_dyn: dict[str, tuple[tuple[Machine, Controller, DutyPlan], float]] = {}
         self._duty: tuple[tuple[Machine, Controller, DutyPlan], DutyResult] | None = None
 
     # the state -----------------------------------------------------------------------------------------
@@ -509,14 +510,28 @@ class Session:
 
         One that takes longer is given up, and is not kept as the result.
         """
-        inputs = self.inputs
-        key = inputs.machine, inputs.controllers[inputs.selected], inputs.plan
+        key = self._duty_key(self.inputs.selected)
         if self._duty is None or self._duty[0] != key:
             result = _in_duty(*key, seconds)
             if result.given_up and seconds < LONGEST_DUTY:
                 return result
             self._duty = key, result
         return self._duty[1]
+
+    def duty_k_dyn(self, label: str) -> float | None:
+        """K_dyn of the duty under a strategy, if it is computed; NaN where it cannot be carried out."""
+        key, k_dyn = self._duty_k_dyn.get(label, (None, None))
+        return k_dyn if key == self._duty_key(label) else None
+
+    def compute_duty(self, label: str) -> None:
+        """Compute the duty under a strategy, and keep its K_dyn alone."""
+        if self.duty_k_dyn(label) is None:
+            key = self._duty_key(label)
+            run = (self.duty_result() if label == self.inputs.selected else _in_duty(*key, LONGEST_DUTY)).run
+            self._duty_k_dyn[label] = key, math.nan if run is None else run.k_dyn
+
+    def _duty_key(self, label: str) -> tuple[Machine, Controller, DutyPlan]:
+        return self.inputs.machine, self.inputs.controllers[label], self.inputs.plan
 
     def compute_row(self, label: str) -> Iterator[None]:
         """Compute the row of a strategy in a comparison, step by step; there is none if its start fails."""
@@ -604,7 +619,8 @@ class Session:
     def close(self) -> None:
         """Release all results and listeners: the user has gone."""
         for kept in (
-            self._listeners, self._results, self._rows, self._at_equal_time, self._past, self._future
+            self._listeners, self._results, self._rows, self._at_equal_time, self._past, self._future,
+            self._duty_k_dyn,
         ):  # fmt: skip
             kept.clear()
         self._reference = self._duty = None

@@ -185,6 +185,16 @@ def test_the_duty_of_a_file_is_shown_saved_and_travels_in_the_link(machine):
     assert session.inputs.machine_with_duty is session.inputs.machine
 
 
+def test_each_strategy_has_the_k_dyn_of_its_worst_step_at_rest(page):
+    rows = {}
+    for frame in page.frames.idle_frames():
+        rows |= {row["name"]: row for row in (frame or {}).get("rows", [])}
+    for name in ("direct", "s-curve"):
+        assert rows[name]["duty"] == run_duty(CONVEYOR, name, PLAIN).k_dyn
+    page.take("duty_add", index=3, do="jog")
+    assert page.frames.main_frame()["rows"][0]["duty"] is None  # it was of another duty
+
+
 def test_a_chain_shows_all_its_shafts():
     chain = Chain.load("crane-4-mass")
     page = Page(chain)

@@ -492,14 +492,18 @@ def test_fields_take_values_at_the_output_of_a_gear_and_its_permissible_torque()
 
 WHATS = [
     "slide", "edit", "reset", "jump", "select", "show", "fix", "remove", "undo", "redo", "hello", "window",
-    "at_time", "?",
+    "at_time", "duty_step", "duty_add", "duty_remove", "duty_move", "duty_time", "?",
 ]  # fmt: skip
 KEYS = [
     "path", "text", "position", "gap", "inertia", "name", "visible", "fixed", "on", "stored",
-    "link", "begin", "end", "stamp",
+    "link", "begin", "end", "stamp", "index", "to", "do", "time",
 ]  # fmt: skip
 JSON = st.recursive(
-    st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
+    st.none()
+    | st.booleans()
+    | st.floats()
+    | st.text(max_size=12)
+    | st.sampled_from(["shaft.gap", "direct", "duty[2].time", "jog"]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
     max_leaves=6,
 )
@@ -510,8 +514,10 @@ JSON = st.recursive(
 def test_no_message_whatever_kills_the_page(message):
     session = Session(controllers=["direct"])
     controls, frames = controls_of(session)
+    frames.duty_shown = True
     controls.take(message)
     frame = frames.main_frame()
+    json.dumps(list(frames.other_frames()), allow_nan=False)
     json.dumps(frame, allow_nan=False)
     assert frame["figure"]["k_dyn"] is not None
     assert "Internal error in softstart" not in str(frame["mistakes"])
