@@ -348,6 +348,7 @@ def test_estimated_damping_is_that_of_fatigue() -> None:
     assert table.drive == lives.drive
     assert table.rows[0].life is not None
     assert table.rows[0].life.worst.equivalent_torque == lives.rows[0].equivalent_torque
+    assert any("from 3 gears and 2 couplings" in note for note in table.notes)
     without = compare_duty(bare, ["direct"], START)
     assert without.rows[0].life is None
     assert without.no_life.startswith("damping is missing")

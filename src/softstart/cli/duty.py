@@ -110,8 +110,8 @@ def duty_command(
     if several:
         rows = compared.ranked if controllers is None else compared.rows
         return compared.summary, duties.duty_comparison_sheet(compared, rows, fitted_to)
-    sheet = duties.duty_sheet(run, slope, fitted_to)
-    return lambda: duties.duty_data(run, slope), replace(sheet, commands=_next_steps(run))
+    sheet = duties.duty_sheet(run, slope, fitted_to, estimate_damping)
+    return lambda: duties.duty_data(run, slope, estimate_damping), replace(sheet, commands=_next_steps(run))
 
 
 WAYS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -84,6 +84,8 @@ class DutyComparison(Result, view="duties.duty_comparison_sheet"):
         One for each strategy, in the order given.
     no_life : str
         Why there are no lives, a sentence; else empty.
+    estimate : mapping of str to int
+        Numbers of gears and couplings from which the damping is estimated; empty if it is given.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class DutyComparison(Result, view="duties.duty_comparison_sheet"):
     duty: Duty
     rows: tuple[DutyRow, ...]
     no_life: str = ""
+    estimate: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def ranked(self) -> tuple[DutyRow, ...]:
@@ -114,6 +117,7 @@ class DutyComparison(Result, view="duties.duty_comparison_sheet"):
         return {
             **self.drive.identity,
             "no_life": self.no_life,
+            "damping_estimated_from": dict(self.estimate) or None,
             "strategies": [row.summary() for row in self.rows],
         }
 
@@ -192,7 +196,7 @@ def compare_duty(
         direct = named or _tried(machine, REFERENCE, cycle, stop, cycles, fitted_to)
         reference = direct.life(slope) if isinstance(direct, DutyRun) else None
     rows = tuple(_row(name, run, slope, reference, not no_life) for name, run in runs)
-    return DutyComparison(machine, cycle, rows, no_life)
+    return DutyComparison(machine, cycle, rows, no_life, dict(estimate_damping or {}))
 
 
 def _tried(

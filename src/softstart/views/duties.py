@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from softstart.views.drawing import (
     line_of,
     new_figure,
 )
-from softstart.views.fatigue import SPECTRUM, counted, factor, slope_sentence
+from softstart.views.fatigue import SPECTRUM, counted, estimated_damping, factor, slope_sentence
 from softstart.views.markdown import file_stem
 from softstart.views.numbers import DataColumn, TextTable, number, plural, short, units_of, with_unit
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
@@ -307,8 +307,16 @@ def duty_facts(run: DutyRun) -> list[list[str]]:
     ]
 
 
-def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | None = None) -> Sheet:
-    """What is shown of a machine in a duty; `slope` is that of the S-N curve, if another."""
+def duty_sheet(
+    run: DutyRun,
+    slope: float | None = None,
+    fitted_to: Machine | None = None,
+    estimate: Mapping[str, int] | None = None,
+) -> Sheet:
+    """What is shown of a machine in a duty; `slope` is that of the S-N curve, if another.
+
+    `estimate`: numbers of gears and couplings from which the damping is estimated.
+    """
     life, reason = life_or_reason(run, slope)
     values, stem = parameters_of(run), file_stem(run.controller_name)
     columns = step_columns(run, life)
@@ -339,6 +347,7 @@ def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | No
         notes=[
             *duty_notes(run),
             *([f"No life: {reason}"] if life is None else life_notes(run.drive, life)),
+            f"{estimated_damping(run.drive, estimate)}." if estimate else "",
             *run.drive.warnings,
         ],
         figures={
@@ -353,7 +362,9 @@ def duty_sheet(run: DutyRun, slope: float | None = None, fitted_to: Machine | No
     )
 
 
-def duty_data(run: DutyRun, slope: float | None = None) -> dict[str, object]:
+def duty_data(
+    run: DutyRun, slope: float | None = None, estimate: Mapping[str, int] | None = None
+) -> dict[str, object]:
     """All figures as plain data, those of the life too."""
     life, reason = life_or_reason(run, slope)
     margins = run.margins(life)
@@ -363,6 +374,7 @@ def duty_data(run: DutyRun, slope: float | None = None) -> dict[str, object]:
         "limits_kept": kept,
         "life": None if life is None else life.summary(),
         "no_life": reason,
+        "damping_estimated_from": estimate,
     }
 
 
@@ -521,6 +533,7 @@ def duty_comparison_sheet(
             *stop_notes(runs),
             *starts_note(runs[0]),
             *(life_notes(machine, lives[0]) if lives else [f"No life: {comparison.no_life}"]),
+            f"{estimated_damping(machine, comparison.estimate)}." if comparison.estimate else "",
             *machine.warnings,
         ],
         figures=figures,

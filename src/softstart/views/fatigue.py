@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,6 +125,12 @@ def slope_sentence(curve: SNCurve, given: bool) -> str:
     return f"Slope of the S-N curve: m = {short(curve.slope)}{origin}."
 
 
+def estimated_damping(machine: Machine, estimate: Mapping[str, int]) -> str:
+    """From what the damping of a machine is estimated, the begin of a sentence."""
+    parts = " and ".join(f"{count} {name}" for name, count in estimate.items())
+    return f"Damping is estimated (ratio {100.0 * machine.damping_ratio:.2g} % from {parts})"
+
+
 def fatigue_notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     drive, limits, curve = found.drive, found.drive.limits, found.curve
@@ -132,11 +138,8 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     ratio = f"{100.0 * drive.damping_ratio:.2g} %"
     damping = f"Damping ratio of the {'first natural vibration' if several else 'shaft'}: {ratio}."
     if found.estimate:
-        parts = " and ".join(f"{count} {name}" for name, count in found.estimate.items())
-        damping = (
-            f"Damping is estimated (ratio {ratio} from {parts}); lives are also given for half and twice the "
-            "estimate."
-        )
+        estimated = estimated_damping(drive, found.estimate)
+        damping = f"{estimated}; lives are also given for half and twice the estimate."
     text = [f"{EQUIVALENT} {slope_sentence(curve, found.slope_given)}", damping]
     if worn:
         over = f"{limits.life / 3600.0 / HOURS_PER_YEAR:.3g} years" if limits.life else "the life"

@@ -81,6 +81,19 @@ def test_one_strategy(done, as_json):
     assert max(map(len, out.splitlines())) <= 100
 
 
+def test_estimated_damping(done, as_json, place):
+    (place / "undamped.toml").write_text((CRANE + CYCLE).replace("damping = 1.0", ""))
+    words = ("duty", "undamped.toml", "--controller", "ramp")
+    bare = as_json(*words)
+    assert bare["life"] is None
+    assert bare["no_life"].startswith("damping is missing in motor - load")
+    said = as_json(*words, "--estimate-damping", "gears=3,couplings=2")
+    assert said["damping_estimated_from"] == {"gears": 3, "couplings": 2}
+    assert said["life"]["shafts"][0]["cycles_to_failure"] > 0.0
+    shown = " ".join(done(*words, "--estimate-damping", "gears=3,couplings=2").split())
+    assert "Damping is estimated (ratio 4 % from 3 gears and 2 couplings)." in shown
+
+
 def test_what_next(done):
     """All strategies, and the other stops that this machine has; both commands run."""
     shown = done(*RAMP, "--param", "time=0.1 s", "--stop=torque", "--cycles", "1").splitlines()
