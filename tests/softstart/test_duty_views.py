@@ -322,7 +322,25 @@ def test_strategies_side_by_side() -> None:
     headings = [column.heading for column in shown.columns]
     assert headings[:6] == ["strategy", "K\n1 start", "K\n2 hold", "K\n3 reverse", "K\n4 stop", "K\n5 jog"]
     assert "ramp" in " ".join(table.notes)
-    assert table.figures["duty"]().axes[0].get_yticklabels()[0].get_text() == "speed-ramp"
+
+
+@pytest.mark.slow
+def test_the_map_strikes_out_what_exceeds_a_limit() -> None:
+    """A line through each cell whose step exceeds a limit; the first row is above."""
+    table = compare_duty(CRANE, ["ramp", "speed-ramp"], THERE_AND_BACK)
+    (axes,) = table.figures["duty"]().axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["speed-ramp", "ramp"]
+    struck = {
+        (round(float(np.mean(one.get_xdata()))), round(float(np.mean(one.get_ydata())))) for one in axes.lines
+    }
+    runs = [row.run for row in reversed(table.rows)]
+    broken = {
+        (step, row)
+        for row, run in enumerate(runs)
+        for step, one in enumerate(run.rows if run else ())
+        if run and not all(margin.kept for margin in run.margins_of(one))
+    }
+    assert struck == broken != set()
 
 
 def test_a_duty_that_cannot_be_finished_has_a_sentence() -> None:
