@@ -324,7 +324,6 @@ def test_strategies_side_by_side() -> None:
     assert "ramp" in " ".join(table.notes)
 
 
-@pytest.mark.slow
 def test_the_map_strikes_out_what_exceeds_a_limit() -> None:
     """A line through each cell whose step exceeds a limit; the first row is above."""
     table = compare_duty(CRANE, ["ramp", "speed-ramp"], THERE_AND_BACK)

@@ -126,7 +126,6 @@ def test_several_strategies(done, as_json):
     assert "Lowest K_dyn of the worst step: speed-ramp" in out
 
 
-@pytest.mark.slow
 def test_compare_ranks_all(done, place):
     """By the K_dyn of the worst step; a plain controller of one's own may be among them."""
     out = done("duty", "crane.toml", "--controllers", "direct,own.py:Good,speed-ramp", "--json")
