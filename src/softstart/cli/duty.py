@@ -37,7 +37,7 @@ def _read_duty(name: str, option: str) -> Duty:
 @options.param_option
 @options.fitted_to_option
 @option("--duty", _read_duty, shell_complete=one_of(Duty.LIBRARY.names))
-@option("--stop", type=click.Choice(["strategy", "torque", "coast", "brake"]))
+@options.stop_option
 @option("--cycles", options.count(1, 100_000), default="2")
 @option("--slope", options.quantity("1"))
 @option("--estimate-damping", read_part_counts)
@@ -69,9 +69,6 @@ def duty_command(
         repeated.
     --duty FILE
         The file, or the name of a shipped duty, instead of the [[duty]] of DRIVE.
-    --stop strategy|torque|coast|brake
-        How the machine stops where the step does not say it. Default: the strategy if it can stop, else
-        torque if motor.minimum_torque is below 0, else coast.
     --cycles N
         Number of cycles. Default: 2.
     --slope M

@@ -455,7 +455,9 @@ def _read_fitted_to(name: str, option: str) -> Drive:
 until_option = option("--until", quantity("s", above=0.0))
 fitted_to_option = option("--fitted-to", _read_fitted_to, shell_complete=one_of(drive_names))
 json_option = option("--json as_json", is_flag=True)
-duty_option = option("--duty", _read_duty, is_flag=False, flag_value="")
+duty_option = option(
+    "--duty", _read_duty, is_flag=False, flag_value="", shell_complete=one_of(Duty.LIBRARY.names)
+)
 stop_option = option("--stop", type=click.Choice(get_args(StopBy)))
 cycles_option = option("--cycles", count(1, 100_000))
 workers_option = option("--workers", count())
