@@ -67,6 +67,15 @@ class Step:
     def lowest(self) -> np.ndarray:
         return np.min([one.lowest for one in self.phases], axis=0)
 
+    @property
+    def impacts(self) -> np.ndarray:
+        return np.sum([one.impacts for one in self.phases], axis=0)
+
+    @property
+    def contacts(self) -> int:
+        """How often flanks met."""
+        return sum(kind == "closed" for one in self.phases for _, kind, _ in one.events)
+
 
 class Player:
     """A cycle of a case on the oracle, step by step."""

@@ -51,6 +51,7 @@ class PhaseEnd:
     events: list[tuple[float, str, int]]
     since: float  # from when on all masses are in the band; NaN if they are not
     energy: float  # kinetic and elastic
+    impacts: np.ndarray  # kinetic energy of the relative motion as the flanks of each shaft meet, their sum
 
 
 class PhaseOracle(ChainOracle):
@@ -61,6 +62,7 @@ class PhaseOracle(ChainOracle):
         self.duty, self.until, self.reason = duty, list(until), ""
         self.begin_angle, speeds = float(duty.y[-1]), duty.y[duty.n - 1 : 2 * duty.n - 1]
         self.place = np.where(np.abs(speeds) <= duty.band, 0.0, np.sign(speeds))  # in, above, below the band
+        self.impacts = np.zeros(given.c.size)
         super().__init__(given, path, math.inf, duty.rtol, 2.0 * path.t_end if lock else 0.0, duty.most)
         self.y, self.form, self.size = duty.y.copy(), [*duty.form], duty.size
         self.side, self.sign = duty.side.copy(), duty.sign.copy()
@@ -118,6 +120,14 @@ class PhaseOracle(ChainOracle):
             ends = {self.g.motor: ("motor", 0.0), self.load: ("load", 0.0)}
             if name == "stop" and any(one[:2] == ends.get(k) for one in self.until):
                 self.reason = ends[k][0]
+
+    def touch(self, k: int, side: float, overlap: bool = False) -> None:
+        if not overlap:
+            light = 1.0 / self.g.J
+            light[self.g.motor] *= not self.held  # a lock holds it fast
+            v = self.y[self.n - 1 + k] - self.y[self.n + k]
+            self.impacts[k] += 0.5 * v**2 / (light[k] + light[k + 1])
+        super().touch(k, side, overlap)
 
     def note(self, y: np.ndarray) -> None:
         T = self.torques(y)
@@ -217,7 +227,7 @@ class DutyOracle:
         events = [(float(begin + t), kind, place) for t, kind, place in run.events]
         found = PhaseEnd(
             run.reason, begin, self.time, run.y[: self.n - 1].copy(), w, float(run.y[-1]), T, self.u,
-            run.highest, run.lowest, events, self.since, self.energy(),
+            run.highest, run.lowest, events, self.since, self.energy(), run.impacts,
         )  # fmt: skip
         self.ends.append(found)
         return found

@@ -181,6 +181,18 @@ def test_lag_and_slew_go_on_over_phases() -> None:
     assert J1 * third.w[0] + J2 * third.w[1] == pytest.approx(momentum, rel=1e-12)
 
 
+def test_the_energy_of_an_impact() -> None:
+    """Through half the gap under constant torque: v^2 = u gap/J1 as the flanks meet; with a lock v = w2."""
+    u, gap = 12.0, 0.4
+    given = two_masses(gap=[gap], law=["no-pull"], w0=[0.0, 0.0])
+    run = duty(given)
+    end = run.phase(Until("time", 1.01 * math.sqrt(gap * J1 / u)), torque=[(0.0, u)])
+    assert end.impacts == pytest.approx([0.5 * REDUCED * u * gap / J1], rel=1e-11)
+    run = duty(two_masses(gap=[gap], law=["no-pull"], w0=[0.0, -3.0]))
+    run.brake = math.inf
+    assert run.phase(Until("time", 0.07)).impacts == pytest.approx([0.5 * J2 * 9.0], rel=1e-11)
+
+
 GAP: dict[str, Any] = {
     "gap": [0.4], "law": ["no-pull"], "d": [4.0], "w0": [0.0, 0.0], "Mc": [0.5, 6.0], "reactive": [True, True]
 }  # fmt: skip

@@ -68,18 +68,24 @@ def differences(case: Case, run: DutyRun, steps: list[Step]) -> dict[str, float]
     """
     assert len(run.executed) >= len(steps)
     peak = max(float(np.abs([step.highest, step.lowest]).max()) for step in steps)
-    found: dict[str, float] = dict.fromkeys(("time", "w", "twist", "phi", "T", "peaks", "since"), 0.0)
+    found: dict[str, float] = dict.fromkeys(
+        ("time", "w", "twist", "phi", "T", "peaks", "since", "impacts"), 0.0
+    )
 
     def note(name: str, mine: Any, theirs: Any, scale: float) -> None:
         apart = np.abs(np.asarray(mine) - np.asarray(theirs)).max() / scale
         found[name] = max(found[name], float(apart) if np.isfinite(apart) else math.inf)
 
+    energy = 0.5 * float(case.given.J.sum()) * case.target**2
     length, twist = steps[-1].end.time, float(np.max(peak / case.given.c + 0.5 * case.given.gap))
     for ran, step in zip(run.executed, steps, strict=False):
         note("time", [ran.begin, ran.end], [step.phases[0].begin, step.end.time], length)
         note("peaks", [ran.largest, ran.smallest], [step.highest, step.lowest], peak)
         if step.do in ("stop", "load", "brake") and step.end.reason == "stand":
             note("since", ran.begin + ran.time, step.end.since, length)
+        note("impacts", ran.impact_energy, step.impacts, energy)
+        if case.given.J.size == 2 and step is not steps[0]:  # as a start in contact it counts one more
+            assert ran.contacts == step.contacts
         for end in step.phases:
             before = run.at(min(end.time, run.executed[-1].end))
             note("w", before["w"][0], end.w, case.target)
