@@ -76,7 +76,10 @@ class FrameBuilder:
         self._duty = fields_of(inputs.plan, self.duty_step)
         if self._origin is not origin:
             self.axes, self._machine = machines.axes_about(origin), machines.parameter_fields(origin)
-            empty = {machines.LIMITS: not origin.limits, machines.GEAR: not origin.gear, machines.MORE: True}
+            empty = {
+                machines.LIMITS: not origin.limits, machines.GEAR: not origin.gear,
+                machines.BRAKE: origin.brake_torque == 0.0, machines.MORE: True,
+            }  # fmt: skip
             self._folded = tuple(title for title, folded in empty.items() if folded)
             self.mistakes.clear()
         elif self._fields_of == (label, type(controller)):

@@ -35,7 +35,12 @@ DELTA = "\N{GREEK SMALL LETTER DELTA}"
 
 HEAD = "Units"  # the group that stands in the head of the page
 UNITS = ("deg, rpm", "rad, rad/s", "arcmin, rpm", "mm on 80 mm, rpm")
-LIMITS, GEAR, MORE = "Limits", "Gear", "more parameters"  # groups that are folded where they are empty
+LIMITS, GEAR, BRAKE, MORE = (
+    "Limits",
+    "Gear",
+    "Brake",
+    "more parameters",
+)  # groups that are folded where they are empty
 # by table of a machine: its fields in their order; of a chain, a mass and a shaft take turns
 FIELDS: Mapping[str, str] = {
     "": "units name",
@@ -45,6 +50,7 @@ FIELDS: Mapping[str, str] = {
     "shaft": "gap stiffness damping damping_ratio contact_law permissible_torque",
     "load": "inertia torque kind friction viscous_friction",
     "start": "target_speed position brake release initial_load_speed",
+    "brake": "torque closing_delay opening_delay",
     "gear": "ratio efficiency",
     "limits": "shaft_torque output_torque start_time starts_per_hour life fatigue.slope fatigue.torque "
     "fatigue.cycles",
@@ -262,7 +268,11 @@ def without(machine: Machine, path: str) -> Machine:
     >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
     None
     """
-    parameter = machine.parameter_value(path)
+    assert isinstance(machine, Drive | Chain)
+    own = {p.path: p.name for p in machine.PARAMETERS.values()}
+    if path in own:
+        return machine.replace(**{own[path]: None})
+    parameter = machine.parameter_value(path)  # of a part of a chain
     assert parameter is not None
     return machine.with_values({parameter.name: None})
 

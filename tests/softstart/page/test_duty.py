@@ -125,6 +125,18 @@ def test_a_wrong_value_is_said_beside_its_field_and_changes_nothing(page, step, 
     assert page.session.inputs is before
 
 
+@pytest.mark.parametrize("machine", [CONVEYOR, Chain.load("crane-4-mass")])
+def test_a_brake_is_given_and_taken_back(machine):
+    page = Page(machine)
+    page.take("edit", path="brake.torque", text="300")
+    frame = page.take("edit", path="brake.closing_delay", text="60 ms")
+    assert (frame["fields"]["brake.torque"]["text"], frame["mistakes"]) == ("300", {})
+    assert (page.session.inputs.machine.brake, page.session.inputs.machine.closing_delay) == ("motor", 0.06)
+    page.take("edit", path="brake.closing_delay", text="0")
+    page.take("edit", path="brake.torque", text="")
+    assert page.session.inputs.machine.brake == "none"
+
+
 def test_an_order_that_cannot_be_is_a_sentence_and_nothing_is_lost(page):
     page.take("duty_move", index=0, to=2)
     assert page.steps == ["hold", "stop", "start"]

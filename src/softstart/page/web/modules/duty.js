@@ -2,7 +2,7 @@
 import { DutyPlot, LEFT, RIGHT } from "./duty_plot.js";
 import { button, element, fixed, put, significant } from "./numbers.js";
 
-const NARROWEST = 46; // px of a step, where there is room
+const NARROWEST = 53; // px of a step, where there is room
 const SHORTEST = 5; // px of a step whose edge is drawn
 const FAR = 5; // px, from which on a press is a drag
 const STEP = 1.1; // factor of a time, by key
@@ -138,7 +138,11 @@ export class Duty {
       block.setAttribute("aria-selected", String(index === this.selected));
       block.tabIndex = index === this.selected ? 0 : -1;
     });
-    [...this.body.children].forEach((row, index) => row.classList.toggle("selected", index === this.selected));
+    [...this.body.children].forEach((row, index) => {
+      const chosen = index === this.selected;
+      if (chosen && !row.classList.contains("selected")) row.scrollIntoView({ block: "nearest" });
+      row.classList.toggle("selected", chosen);
+    });
     const last = this.view.steps.length - 1;
     this.tools.earlier.disabled = this.selected === 0;
     this.tools.later.disabled = this.selected === last;

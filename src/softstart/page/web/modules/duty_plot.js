@@ -3,7 +3,7 @@ import { label, sharp, significant, stroke, ticks, write } from "./numbers.js";
 import { indexAt } from "./trace.js";
 
 export const LEFT = 52, RIGHT = 12;
-const TOP = 20, BOTTOM = 22, BETWEEN = 24;
+const TOP = 20, BOTTOM = 8, AXIS = 22, BETWEEN = 24; // below: with an axis of time where a step is shown alone
 const SHARES = [0.64, 0.36];
 const DASHED = [5, 3];
 
@@ -50,7 +50,7 @@ export class DutyPlot {
     if (alone) this.places = [{ ...this.places[selected], x: LEFT, w: this.w }];
     let y = TOP;
     const panels = SHARES.map((share) => {
-      const panel = { y, h: Math.floor((height - TOP - BOTTOM - BETWEEN) * share) };
+      const panel = { y, h: Math.floor((height - TOP - (alone ? AXIS : BOTTOM) - BETWEEN) * share) };
       y += panel.h + BETWEEN;
       return panel;
     });
@@ -63,11 +63,6 @@ export class DutyPlot {
       const marks = ticks(0, place.length, Math.round(this.w / 90));
       for (const t of marks) write(pen, label(t, marks.digits), this.x(place, t), foot, quiet, "center");
       write(pen, "s", LEFT + this.w, foot, quiet, "right");
-    } else {
-      for (const place of this.places) {
-        const text = `${significant(place.length, 3)} s`;
-        if (pen.measureText(text).width < place.w - 4) write(pen, text, place.x + place.w / 2, foot, quiet, "center");
-      }
     }
     if (this.hovered !== null) this.readout(panels);
   }
@@ -105,7 +100,7 @@ export class DutyPlot {
       pen.fillStyle = shade;
       pen.fillRect(chosen.x, panel.y, Math.min(chosen.w, LEFT + w - chosen.x), panel.h);
     }
-    const marks = ticks(panel.low, panel.high, Math.max(2, Math.round(panel.h / 34)));
+    const marks = ticks(panel.low, panel.high, Math.max(3, Math.round(panel.h / 30)));
     for (const mark of marks) {
       this.across(panel, mark, Math.abs(mark) < 1e-12 ? line : grid, []);
       write(pen, label(mark, marks.digits), LEFT - 7, Math.round(this.y(panel, mark)) + 0.5, quiet, "right", "middle");
