@@ -51,13 +51,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softstart.reporting.result import Report
-    from softstart.start.duty import StepRun
     from softstart.start.duty_comparison import DutyRow
 
 HERE = Path(__file__).parent
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
 OWN_SECTION = ("duty", "shift")  # tables of a machine that are shown with the duty
-LEFT_OUT = ("impact\nenergy J", "start\ntime s", "settled\ns")  # columns of the steps of a duty
+LEFT_OUT = (
+    "to the limit",
+    "impact\nenergy J",
+    "start\ntime s",
+    "settled\ns",
+)  # columns of the steps of a duty
 MOST_SHAFTS = 6  # with a column each in a table
 LONGEST = 70  # characters of a name in the head of a page
 SAME = 0.005  # a peak within this share of another is the same
@@ -294,14 +298,8 @@ def duty_steps(row: DutyRow) -> TextTable:
     """The steps of a duty under a strategy, with the columns for which a page has room."""
     run = row.run
     assert run is not None
-
-    def margin(step: StepRun) -> str:  # the sentence above names the limit
-        return duties.against_limits(run.margins_of(step)).partition(",")[0]
-
-    columns = {one.heading: one for one in duties.step_columns(run, row.life)}
-    columns["limits"] = columns["limits"]._replace(of=margin)
-    chosen = [one for heading, one in columns.items() if heading not in LEFT_OUT]
-    return TextTable.of_data("Steps", chosen, run.rows, bold=[run.worst.number - 1], keys=2)
+    columns = [one for one in duties.step_columns(run, row.life) if one.heading not in LEFT_OUT]
+    return TextTable.of_data("Steps", columns, run.rows, bold=[run.worst.number - 1], keys=2)
 
 
 def functions(report: Report) -> list[tuple[str, str]]:
