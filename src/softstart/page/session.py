@@ -53,7 +53,7 @@ PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are
 MAX_AT_TIME = 10.0  # times the settled time of direct: a longer time sets nothing else
 MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that takes 64 of them
 LONGEST_TIME = 40  # characters
-LONGEST_DUTY = 3.0  # s of computation
+LONGEST_DUTY, OTHER_DUTY = 3.0, 0.5  # s of computation under the selected strategy, and any other one
 TOO_LONG_DUTY = (
     "The duty takes too long to be carried out while you wait; use softstart duty, or less repetitions."
 )
@@ -527,7 +527,7 @@ class Session:
         """Compute the duty under a strategy, and keep its K_dyn alone."""
         if self.duty_k_dyn(label) is None:
             key = self._duty_key(label)
-            run = (self.duty_result() if label == self.inputs.selected else _in_duty(*key, LONGEST_DUTY)).run
+            run = (self.duty_result() if label == self.inputs.selected else _in_duty(*key, OTHER_DUTY)).run
             self._duty_k_dyn[label] = key, math.nan if run is None else run.k_dyn
 
     def _duty_key(self, label: str) -> tuple[Machine, Controller, DutyPlan]:

@@ -294,11 +294,11 @@ export class Duty {
       to = Math.min(place, others.length);
       this.marker.hidden = false;
       this.marker.style.left = `${mark - 1}px`;
-    }, () => {
+    }, (dropped) => {
       this.marker.hidden = true;
       block.classList.remove("dragged");
       block.style.transform = "";
-      if (to !== null && to !== index) this.place(index, to);
+      if (dropped && to !== null && to !== index) this.place(index, to);
     });
   }
 
@@ -322,9 +322,9 @@ export class Duty {
 
   follow(part, event, move, end) {
     part.setPointerCapture(event.pointerId);
-    const stop = () => {
+    const stop = ({ type }) => {
       for (const [kind, act] of Object.entries(acts)) part.removeEventListener(kind, act);
-      end();
+      end(type === "pointerup");
     };
     const acts = { pointermove: move, pointerup: stop, pointercancel: stop };
     for (const [kind, act] of Object.entries(acts)) part.addEventListener(kind, act);

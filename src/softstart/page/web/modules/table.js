@@ -6,7 +6,7 @@ import { button, element, fixed, put, significant } from "./numbers.js";
 const COLUMNS = [
   ["name", "strategy", "", null, "Names in their alphabetical order"],
   ["k_dyn", "K", "dyn", (row) => fixed(row.k_dyn, 3), "Peak of the shaft torque over its mean while the drive accelerates"],
-  ["duty", "K duty", "", (row) => fixed(row.duty, 3), "K of the worst step of the duty; a dash where the strategy cannot carry it out"],
+  ["duty", "K duty", "", (row) => fixed(row.duty, 3), "K of the worst step of the duty; a dash where the strategy cannot carry it out, or it takes too long here"],
   ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3), "K when wear has made the gap four times as wide, and the controller is as it was"],
   ["soft", "K 3 Hz", "", (row) => fixed(row.soft, 3), "K at an elastic frequency of 3 Hz, the soft end of a stiffness that no data sheet tells; the controller is set up for 30 Hz"],
   ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
