@@ -298,6 +298,21 @@ def test_the_figure_has_the_trace_and_the_steps() -> None:
     assert step.number == run.worst.number
 
 
+def test_the_trace_has_all_peaks_and_a_bounded_number_of_instants(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where many shafts rattle, of which the small reversals are left out."""
+    whole = run_duty(CRANE, "ramp", THERE_AND_BACK)
+    assert whole.t.size > 3000
+    monkeypatch.setattr("softstart.start.duty.MOST_INSTANTS", 40)
+    few = run_duty(CRANE, "ramp", THERE_AND_BACK)
+    assert few.t.size < whole.t.size
+    for run in (whole, few):
+        for one in run.executed:
+            inside = (run.t >= one.begin) & (run.t < one.end)
+            torque = run.traces["T"][inside, 0]
+            assert torque.max() == pytest.approx(one.largest[0], abs=1e-2 * one.peak_torque)
+            assert torque.min() == pytest.approx(one.smallest[0], abs=1e-2 * one.peak_torque)
+
+
 @pytest.mark.slow
 def test_a_duty_in_a_notebook_and_as_one_line() -> None:
     run = ramp()

@@ -100,8 +100,9 @@ def duty_command(
             machine = with_estimated_damping(drive, estimate_damping) if estimate_damping else drive
             curve_of(machine, slope)  # a wrong slope is told before anything is computed
             run = softstart.run_duty(
-                machine, strategies[0], duty, stop=stop, cycles=cycles, fitted_to=fitted_to
-            )
+                machine, strategies[0], duty, stop=stop, cycles=cycles, fitted_to=fitted_to,
+                progress=lambda one: progress(f"cycle {one.cycle} of {cycles}, step {one.number}"),
+            )  # fmt: skip
     from softstart.views import duties
 
     if several:

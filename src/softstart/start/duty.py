@@ -20,7 +20,6 @@ from softstart.controller.base import Controller, label_of
 from softstart.drive import Drive, Machine
 from softstart.drive.duty import Duty, DutyStep, check_duty, way_of_stop
 from softstart.errors import InputError
-from softstart.kernel import records as rec
 from softstart.results import OneLine, Result
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.duty_cycle import DutyCycle, Phase
@@ -33,6 +32,7 @@ from softstart.start.trajectory import FIRST_ROWS
 
 KEPT_CYCLES = 2  # whose trace is kept
 PLOT_POINTS = 3000
+MOST_INSTANTS = 10_000  # of reversals, and of events, of a trace
 STILL_IN_TRACE = 1e-4  # of the mean torque: smaller reversals need no instant of the trace
 
 
@@ -70,6 +70,8 @@ class StepRun(OneLine):
         Largest impulse of each rigid gap, N m s.
     phases : tuple of Phase
         What is recorded of it; empty beyond the first cycles.
+    turns : tuple of array of shape (k, 2)
+        Time and torque of the turning points of each shaft; empty beyond the first cycles.
     """
 
     number: int
@@ -87,6 +89,7 @@ class StepRun(OneLine):
     impact_energy: Vector
     impulses: Vector
     phases: tuple[Phase, ...] = ()
+    turns: tuple[Matrix, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """The figures under the names used everywhere."""
@@ -195,7 +198,7 @@ class DutyRun(Result, view="duties.duty_sheet"):
             for n, each in sorted(of_step.items())
         )
 
-    @property
+    @cached_property
     def regulated(self) -> bool:
         """Whether the strategy holds the speed, so that the load settles in a band on both sides of it."""
         return self.controller.regulation(self.drive.design_drive) is not None
@@ -277,17 +280,27 @@ class DutyRun(Result, view="duties.duty_sheet"):
 
     @cached_property
     def t(self) -> Vector:
-        """Instants of the traces of the first two cycles, s: a grid, events and reversals of torque."""
-        last = self.phases[-1].end
-        instants = [np.linspace(0.0, last, PLOT_POINTS)]
-        for phase in self.phases:
-            edges = phase.trajectory.states[:, rec.S_START] + phase.time
-            turns = [
-                phase.trajectory.turning_points(k, STILL_IN_TRACE * self.base_torque)[:, 0]
-                for k in range(len(self.drive.shaft_names))
-            ]
-            instants += [edges, np.nextafter(edges, 0.0), *(turn + phase.time for turn in turns)]
-        return np.unique(np.concatenate(instants).clip(0.0, last))
+        """Instants of the traces of the first two cycles, s: a grid, events, reversals of torque."""
+        last, still = self.phases[-1].end, STILL_IN_TRACE * self.base_torque
+        turns = self._reversals(still)
+        while turns.size > MOST_INSTANTS + 2 * len(self.phases):  # many shafts that rattle
+            still *= 4.0
+            turns = self._reversals(still)
+        edges = np.concatenate([phase.trajectory.events["time"] + phase.time for phase in self.phases])
+        edges = edges if edges.size <= MOST_INSTANTS else edges[:0]
+        grid = np.linspace(0.0, last, PLOT_POINTS)
+        whole = np.concatenate([grid, edges, np.nextafter(edges, 0.0), turns])
+        return np.unique(whole.clip(0.0, last))
+
+    def _reversals(self, still: float) -> Vector:
+        """When the torque of any shaft has turned by more than `still`, N m, and steps begin, both sides."""
+        recorded = [one for one in self.executed if one.phases]
+        begins = np.array([phase.begin for phase in self.phases])
+        found = [begins, np.nextafter(begins, 0.0)]
+        for points in (points for one in recorded for points in one.turns):
+            large = np.abs(np.diff(points[:, 1])) > still
+            found.append(points[np.append(large, False) | np.append(False, large), 0])
+        return np.concatenate(found)
 
     @cached_property
     def traces(self) -> dict[str, Vector]:
@@ -453,7 +466,8 @@ def duty_run(
     for ran, turns in carried_out(machine, controller, design, duty, stop, count, still):
         if progress is not None:
             progress(ran)
-        executed.append(ran if ran.cycle <= KEPT_CYCLES else replace(ran, phases=()))
+        kept = ran.cycle <= KEPT_CYCLES
+        executed.append(replace(ran, turns=tuple(turns)) if kept else replace(ran, phases=()))
         if ran.cycle > 1 or count == 1:
             points.append(turns)
     shafts = range(len(machine.shaft_names))
