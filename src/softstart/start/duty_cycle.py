@@ -124,6 +124,7 @@ class DutyCycle:
             row.encoder_phase *= self.sense
         else:
             row.encoder_phase = self._encoder_phase(row.encoder, begins)
+            masses[0].view(rec.MASS)[:, 0]["w0"] = state.w[: self.rows.count]  # for the balance of energy
         if self.closed and math.isfinite(self.machine.brake_torque):
             masses[0].view(rec.MASS)[int(row.motor), 0].friction += self.machine.brake_torque
         return replace(self.rows, machines=machines, masses=masses)

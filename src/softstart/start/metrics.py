@@ -74,8 +74,7 @@ def energy_balance(trajectory: Trajectory) -> Energy:
     motor, exciting, load, ground, shafts, gears, elastic = trajectory.work().tolist()
     masses = trajectory.input.masses[0].view(rec.MASS)[:, 0]
     moves = np.isfinite(masses["J"])
-    first, last = trajectory.of_masses("speed")[[0, -1]]
-    gained = last**2 - first**2
+    gained = trajectory.of_masses("speed")[-1] ** 2 - masses["w0"] ** 2
     kinetic = 0.5 * float(masses["J"][moves] @ gained[moves])
     struck = np.isin(trajectory.events["kind"], [rec.IMPACT, rec.SETTLED])
     impacts = float(trajectory.events["value"][struck].sum())
