@@ -148,6 +148,7 @@ class FrameBuilder:
             "mapped": self.axes is not None,
             "soft": inputs.soft_drive is not None,
             "at_time": inputs.at_time,
+            "duty_step": self.duty_step,
             # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
             "here": inputs.machine.gap_and_inertia,
             "angle": (units.of("rad"), units.size("rad")),

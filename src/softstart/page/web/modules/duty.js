@@ -75,8 +75,8 @@ export class Duty {
     if (!this.kinds.childElementCount) {
       this.kinds.append("add", ...Object.entries(view.kinds).map(([kind, meaning]) => button(kind, `Add behind the selected step: ${meaning}`, () => this.add(kind), { "aria-label": `add ${kind}` })));
     }
-    if (this.asked <= this.stamp) this.selected = view.selected;
-    this.selected = Math.min(this.selected ?? 0, view.steps.length - 1);
+    // a step that was added a moment ago may not be among those of this view
+    if (!(this.asked > this.stamp)) this.selected = view.selected;
     if (!view.trace) this.alone = false;
     put(this.status, view.trouble || (view.waits ? "Computing ..." : ""));
     this.status.classList.toggle("wrong", Boolean(view.trouble));
@@ -95,9 +95,14 @@ export class Duty {
     this.lay();
   }
 
-  // the server knows what was pressed before this stamp; `mistake` belongs to no field
-  answered(stamp, mistake) {
+  // the server knows what was pressed before this stamp; `mistake` belongs to no field, `step` is selected
+  answered(stamp, mistake, step) {
     this.stamp = stamp;
+    if (this.view && !(this.asked > stamp) && step !== this.selected) {
+      this.selected = step;
+      this.mark();
+      this.draw();
+    }
     put(this.refused, mistake);
     this.refused.hidden = !mistake;
   }
@@ -129,17 +134,21 @@ export class Duty {
       block.title = `${index + 1} ${this.view.kinds[step.do]}`;
     });
     this.mark();
-    if (focused) this.blocks[this.selected].block.focus();
+    if (focused) this.blocks[this.place].block.focus();
   }
 
-  // which step is selected
+  // the selected step among those that are shown
+  get place() {
+    return Math.min(this.selected, this.view.steps.length - 1);
+  }
+
   mark() {
     this.blocks.forEach(({ block }, index) => {
-      block.setAttribute("aria-selected", String(index === this.selected));
-      block.tabIndex = index === this.selected ? 0 : -1;
+      block.setAttribute("aria-selected", String(index === this.place));
+      block.tabIndex = index === this.place ? 0 : -1;
     });
     [...this.body.children].forEach((row, index) => {
-      const chosen = index === this.selected;
+      const chosen = index === this.place;
       if (chosen && !row.classList.contains("selected")) row.scrollIntoView({ block: "nearest" });
       row.classList.toggle("selected", chosen);
     });
@@ -198,7 +207,7 @@ export class Duty {
   }
 
   draw() {
-    if (this.view) this.plot.draw(this.view, this.widths, this.selected, Boolean(this.alone));
+    if (this.view) this.plot.draw(this.view, this.widths, this.place, Boolean(this.alone));
   }
 
   // ---- what a hand does
@@ -222,10 +231,10 @@ export class Duty {
   move(by) {
     const to = this.selected + by;
     if (to < 0 || to >= this.view.steps.length) return;
-    this.place(this.selected, to);
+    this.drop(this.selected, to);
   }
 
-  place(index, to) {
+  drop(index, to) {
     this.selected = to;
     this.asked = this.say({ what: "duty_move", index, to });
   }
@@ -258,7 +267,7 @@ export class Duty {
     event.preventDefault();
     if (!by) acts[event.key]();
     else if (event.altKey) this.move(by);
-    else if (event.shiftKey) this.time(this.selected, this.view.steps[this.selected].length * STEP ** by);
+    else if (event.shiftKey) this.time(this.place, this.view.steps[this.place].length * STEP ** by);
     else this.go(Math.min(Math.max(this.selected + by, 0), last));
   }
 
@@ -298,7 +307,7 @@ export class Duty {
       this.marker.hidden = true;
       block.classList.remove("dragged");
       block.style.transform = "";
-      if (dropped && to !== null && to !== index) this.place(index, to);
+      if (dropped && to !== null && to !== index) this.drop(index, to);
     });
   }
 

@@ -83,7 +83,7 @@ export class Instrument {
       this.controls.build(frame);
       this.controls.show(fields, mistakes, stamp);
       this.figure.tell(mistakes[""] ?? "");
-      this.duty.answered(stamp, mistakes[""] ?? "");
+      this.duty.answered(stamp, mistakes[""] ?? "", frame.duty_step);
       put(this.driveName, drive);
       document.title = `softstart: ${(this.driveName.title = drive)}`;
       this.advice.classList.add("old"); // it is of the drive as it was when it was last at rest
