@@ -274,3 +274,11 @@ def test_a_load_that_changes_takes_time() -> None:
     run = run_duty(drive, "direct", Duty(steps))
     for step in run.executed:
         assert 0.0 <= step.time <= step.end - step.begin
+
+
+def test_a_load_that_the_motor_cannot_hold_back_is_refused() -> None:
+    hoist = Drive.load("hoist-15kw").replace(brake_torque=300.0)
+    down = Duty([DutyStep("start", set_speed=-50.0), DutyStep("hold", time=1), DutyStep("brake")])
+    with pytest.raises(SimulationError, match=r"\[duty\] 2.*-120 N\*m that hold the load.*minimum_torque"):
+        run_duty(hoist, "direct", down)
+    assert run_duty(hoist.replace(minimum_torque=-250.0), "direct", down).executed[1].time == 1.0

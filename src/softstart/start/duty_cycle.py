@@ -155,6 +155,7 @@ class DutyCycle:
         on_gap = begins and bool(self.controller.sensors & Sensor.STAGE)
         if not self.begun:
             recorder.begin(until, on_gap)
+            recorder.state.contacts = 0.0  # a start in contact closes no gap
             self.begun = True
         else:
             if begins:
@@ -275,7 +276,7 @@ class DutyCycle:
             if math.isinf(until) and not reached:
                 self._give_up(step, f"the load does not reach its set speed within {self.patience:.4g} s")
             if reached and not math.isinf(until) and self.now < until:
-                yield self._held(until, travel)
+                yield self._held(step, until, travel)
         self._check_travel(step)
 
     def _settling(self, regulation: Regulation, began: float, change: float) -> dict[str, float]:
@@ -301,11 +302,15 @@ class DutyCycle:
         if step.angle is not None and not math.isnan(self.recorder.state.travel_end) and step.time is None:
             self._give_up(step, f"the load does not turn by {step.angle:.4g} rad")
 
-    def _held(self, until: float, travel: dict[str, float]) -> Phase:
+    def _held(self, step: DutyStep, until: float, travel: dict[str, float]) -> Phase:
         """Behind a torque strategy: in a line to the torque that holds the load, then that."""
         self.go = None
         forward, period = self.forward, float(self.rows.machine.period)
         hold = forward * holding_torque(self.rows, self.speed)
+        limits, room = self.rows.machine, HELD * self.machine.motor.starting_torque
+        if not limits.u_min - room <= hold <= limits.u_max + room:
+            key = "minimum_torque" if hold < limits.u_min else "maximum_torque"
+            self._give_up(step, f"the motor has not the {hold:.4g} N*m that hold the load; see motor.{key}")
         torque = forward * float(self.recorder.state.u_ref)
         lines = [(hold, math.inf, 0.0)]
         if torque != hold and period > 0.0:
@@ -323,7 +328,7 @@ class DutyCycle:
         length = math.inf if step.time is None else step.time
         until = began + (length if step.angle is None else min(length, self._journey(step.angle)))
         if self.go is None or self.regulation is None:
-            yield self._held(until, travel)
+            yield self._held(step, until, travel)
         else:
             command = {} if self.speed == before else {"command_since": began}
             fields = {"set_speed": self.sense * self.speed, **command, **travel}
