@@ -21,6 +21,14 @@ def elastic_period(g: Given) -> float:
     return float(2 * math.pi / math.sqrt(eigvalsh(K, np.diag(g.J))[1]))
 
 
+def held_period(g: Given) -> float:
+    """Dunkerley's bound of the longest period with the motor held and all gaps closed."""
+    total = 0.0
+    for i, J in enumerate(g.J):
+        total += J * sum(1.0 / g.c[k] for k in range(min(i, g.motor), max(i, g.motor)))
+    return float(2 * math.pi * math.sqrt(total))
+
+
 @dataclass
 class Case:
     """A machine, the torque of its starts forwards, and the steps of one cycle."""
@@ -101,7 +109,7 @@ class Player:
     def start(self, set_speed: float = math.nan, time: float = math.inf, angle: float = math.inf) -> None:
         """The torque of the start, until the load has its speed; then on to the time or angle of the step.
 
-        A brake holds the motor fast until it is open.
+        A brake holds the motor fast until it is open; but for torque proving the start begins then.
         """
         o, case, speed = self.oracle, self.case, self.case.target if math.isnan(set_speed) else set_speed
         stood, self.speed, ends = self.speed == 0.0, speed, ends_of(self.oracle, time, angle)
@@ -112,8 +120,7 @@ class Player:
                 o.phase(Until("proved", 0.0, self.way), torque=torque)
                 torque = None
             if case.opening > 0.0:
-                o.phase(Until("time", case.opening), torque=torque)
-                torque = None
+                o.phase(Until("time", case.opening), torque=None if case.proving else REST)
         o.brake = 0.0
         end = o.phase(Until("load", speed, self.way), *ends(self.way), torque=torque)
         if end.reason == "load" and min(time, angle) < math.inf:
@@ -187,8 +194,8 @@ class Player:
             o.phase(Until("motor", way * still, -way), torque=REST)
 
     def rest(self, ends: Any) -> None:
-        """Without torque until all masses have stood for one elastic period, or to the time of the step."""
-        end = self.oracle.phase(Until("stand", self.period), *ends(), torque=REST)
+        """Without torque until all masses have stood for a period, or to the time of the step."""
+        end = self.oracle.phase(Until("stand", held_period(self.oracle.given)), *ends(), torque=REST)
         self.oracle.watch(False)
         if end.reason == "stand" and ends():
             self.oracle.phase(*ends(), torque=REST)

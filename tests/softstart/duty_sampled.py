@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from tests.duty_cases import Case, Player, ends_of, given_of
+from tests.duty_cases import REST, Case, Player, ends_of, given_of, held_period
 from tests.duty_oracle import Until
 
 from softstart.controller import Measured, PlainController
@@ -75,8 +75,8 @@ class SampledPlayer(Player):
         self.since, self.run = self.now, 1.0
         if stood and self.case.brake > 0.0:
             o.brake = math.inf
-            opens = ends_of(o, self.case.opening)
-            self.follow(opens)
+            o.phase(*ends_of(o, self.case.opening)(), torque=REST)
+            self.zero, self.since = o.time, 0.0  # the strategy begins when the brake is open
         o.brake = 0.0
         reaches = [] if self.holds else [Until("load", self.speed, self.way)]
         reason = self.follow(lambda: [*reaches, *left(self.way)])
@@ -102,7 +102,7 @@ class SampledPlayer(Player):
         self.run, self.since = 0.0, self.now
         self.oracle.watch()
         self.oracle.rest_from = self.oracle.time
-        self.follow(lambda: [Until("stand", self.period)])
+        self.follow(lambda: [Until("stand", held_period(self.oracle.given))])
         self.oracle.rest_from = None
         self.oracle.watch(False)
         self.speed = 0.0

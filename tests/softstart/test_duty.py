@@ -282,3 +282,27 @@ def test_a_load_that_the_motor_cannot_hold_back_is_refused() -> None:
     with pytest.raises(SimulationError, match=r"\[duty\] 2.*-120 N\*m that hold the load.*minimum_torque"):
         run_duty(hoist, "direct", down)
     assert run_duty(hoist.replace(minimum_torque=-250.0), "direct", down).executed[1].time == 1.0
+
+
+@pytest.mark.parametrize("name", ["ramp", "shaped", "speed-ramp", "take-up", "state-feedback"])
+def test_a_strategy_begins_when_its_brake_is_open(name: str) -> None:
+    """Not against it: the same start, later by the opening delay, alone and in a duty."""
+    free = CONVEYOR.replace(start_position="driving-flank", encoder_lines=0, torque_noise=0)
+    held = free.replace(brake_torque=200.0, opening_delay=0.08)
+    one, two = simulate(free, name, fitted_to=free), simulate(held, name, fitted_to=free)
+    assert two.k_dyn == pytest.approx(one.k_dyn, rel=1e-9)
+    assert two.limited_time == pytest.approx(one.limited_time + 0.08, rel=1e-9)
+    assert two.release_time == 0.08
+    duty = Duty([DutyStep("start"), DutyStep("brake"), DutyStep("hold", time=1.0)])
+    first, again = run_duty(held, name, duty, fitted_to=free).executed[::3]
+    assert first.start_time == pytest.approx(two.limited_time, rel=1e-9)
+    assert again.start_time == pytest.approx(two.limited_time, rel=0.05)
+
+
+def test_a_machine_stands_when_its_load_does_not_swing_back() -> None:
+    """The load on the held motor swings more slowly than both masses: it stands for one of its periods."""
+    crane = Drive.load("long-travel-3kw").replace(brake_torque=36.0, closing_delay=0.06)
+    run = run_duty(crane, "direct", Duty([DutyStep("start"), DutyStep("brake"), DutyStep("hold", time=2.0)]))
+    for step in run.executed[2::3]:
+        assert run.k_dyn_of(step) < 0.13  # what friction holds, 5 N m
+        assert abs(step.angle) < 0.02

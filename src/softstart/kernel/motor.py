@@ -169,6 +169,14 @@ def note_excess(s: Record) -> None:
     s.excess_time += length
 
 
+@inner
+def own_time(s: Record) -> float:
+    """The time by the clock of the controller, which begins with it."""
+    if s.begins_at == 0.0:
+        return float(s.time)
+    return float(s.ask_own if s.time == s.ask_at else s.time - s.begins_at)
+
+
 @separately_compiled(types.void(WORK_TYPE, types.int64, MEASURED_TYPE))
 def sample(s: Record, sees: int, measured: Record) -> None:
     """What the controller sees now: the encoder rounds, and what it has not declared is NaN.
@@ -188,7 +196,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
             speed = (angle - s.sample_angle) / (s.time - s.sample_time)
     s.sample_angle = angle
     s.sample_time = s.time
-    measured.time = s.time
+    measured.time = own_time(s)
     measured.motor_angle = angle
     measured.motor_speed = speed
     measured.motor_torque = s.sense * s.u
@@ -214,9 +222,13 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
     if ask_again == -math.inf:
         s.ask_on_gap = 0.0
         ask_again = math.inf
-    if math.isnan(torque) or not ask_again > s.time:
+    own = own_time(s)
+    if math.isnan(torque) or not ask_again > own:
         return BAD_COMMAND
-    end = torque if slope == 0.0 else torque + slope * (ask_again - s.time)
+    end = torque if slope == 0.0 else torque + slope * (ask_again - own)
+    until = ask_again + s.begins_at
+    if until <= s.time:  # by rounding
+        until = np.nextafter(s.time, math.inf)
     if slope != 0.0 and not math.isfinite(end):
         return BAD_COMMAND
     note_excess(s)
@@ -224,9 +236,9 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
     if demand == torque and min(max(end, s.u_min), s.u_max) == end:
         if not put(s, s.time + s.dead_time, demand, slope):
             return QUEUE_FULL
-    elif not put_cut(s, torque, slope, end, ask_again):
+    elif not put_cut(s, torque, slope, end, until):
         return QUEUE_FULL
-    s.ask_at = ask_again
+    s.ask_at, s.ask_own = until, ask_again
     s.asked += 1.0
     if s.contacts == 1.0 and math.isnan(s.contact_torque):  # the start is in contact
         immediate = s.lag == 0.0 and s.rate == math.inf and s.dead_time == 0.0

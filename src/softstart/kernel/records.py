@@ -70,6 +70,7 @@ class MachineRecord:
     noise_seed: float
     dead_time: float
     release_at: float  # when the motor's brake is released: 0 no brake, inf by torque proving
+    begins_at: float  # when the controller begins, where it waits for its brake to open, s
     opening_delay: float  # for how long the brake still holds after torque proving, s
     initial_torque: float
     target: float
@@ -316,6 +317,7 @@ class StartState:
     slew_end: float  # when, in this span, it has come to the demand; inf if it does not
     on_line: float  # 1 where the lag's exponential has died away: u is a line
     ask_at: float
+    ask_own: float  # the same by the clock of the controller, to the last digit
     ask_on_gap: float
     sample_angle: float
     sample_time: float

@@ -15,7 +15,7 @@ from softstart.kernel.guard import bounded, check, follow
 from softstart.kernel.jit import as_record, compiled_as, inner, separately_compiled
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
-    NEW_STATE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue, note_excess,
+    NEW_STATE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue, note_excess, own_time,
     sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
@@ -84,7 +84,8 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
         work[j] = 0.0
     s.pending = 0.0
     s.beyond_limits = 0.0
-    s.ask_at = 0.0
+    s.ask_at = s.command_since = s.begins_at
+    s.ask_own = 0.0
     s.ask_on_gap = 1.0 if on_gap else 0.0
     s.demand_slope = 0.0
     s.sample_angle = 0.0
@@ -93,7 +94,7 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     s.start_time = s.release_time = s.first_contact = s.impact_speed = math.nan
     s.contact_torque = s.stage_2_end = s.settled = s.overshoot = math.nan
     s.run = s.sense = s.toward = 1.0
-    s.command_since = s.ends_at_target = s.still = 0.0
+    s.ends_at_target = s.still = 0.0
     s.slow = s.travel_end = math.nan
     s.watch.fault = s.watch.begun = 0.0
     s.highest_speed = s.w0[s.at_load]
@@ -151,8 +152,8 @@ def begin_step(s: Record, begins: bool) -> None:
         for k in range(s.n - 1):
             s.last_impact_time[k] -= s.time
             s.peak_time[k] = 0.0
-        s.time = s.phi = s.ask_at = s.sample_angle = s.sample_time = s.command_since = s.asked = 0.0
-        s.ask_on_gap = 0.0
+        s.time = s.phi = s.sample_angle = s.sample_time = s.asked = s.ask_on_gap = s.ask_own = 0.0
+        s.ask_at = s.command_since = s.begins_at
     s.start_time = s.release_time = s.first_contact = s.impact_speed = s.contact_torque = math.nan
     s.stage_2_end = s.settled = s.overshoot = s.slow = s.travel_end = math.nan
     s.excess = s.excess_time = s.gap_events = s.contacts = s.events = s.n_spans = s.n_events = 0.0
@@ -470,8 +471,9 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
             # impacts at shrinking intervals: their sum is a geometric series in the restitution, as in [R]
             ratio = -s.twist[where, 1] / s.twist[where, 2]
             rest = h * ratio / (1.0 - s.restitution[where])
-        if handle(s, event, where, press, rest, h) != 0 and s.ask_on_gap != 0.0:
-            s.ask_at = s.time
+        gap = handle(s, event, where, press, rest, h) != 0
+        if gap and s.ask_on_gap != 0.0 and s.time >= s.begins_at:
+            s.ask_at, s.ask_own = s.time, s.time - s.begins_at
         note_events(work, events)
         if s.events > s.event_cap:
             return EVENT_LIMIT
@@ -508,7 +510,8 @@ def check_sample(s: Record, m: Record, sees: int) -> float:
 def follow_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the answer of a guarded controller, or after a fault no torque."""
     if s.fault != NO_FAULT:
-        return int(take_answer(s, bounded(0.0, s.u_min, s.u_max), s.time + s.guard.period, 0.0))
+        ask_again = own_time(s) + s.guard.period
+        return int(take_answer(s, bounded(0.0, s.u_min, s.u_max), ask_again, 0.0))
     follow(s.guard, s.watch, torque, ask_again, slope)
     return int(take_answer(s, torque, ask_again, slope))
 

@@ -379,12 +379,13 @@ def run_duty(
 ) -> DutyRun:
     """A machine through cycles of a duty, exactly: each step begins in the state that the last has left.
 
-    Start and reversal follow the strategy. One that cannot reverse is started anew in the other direction,
-    in motion. Backwards a torque strategy sees and demands everything with the other sign. Where the load has
+    Start and reversal follow the strategy. One that cannot reverse is started anew in the other direction, in
+    motion. Backwards a torque strategy sees and demands everything with the other sign. Where the load has
     its set speed such a strategy is over: its torque goes in a straight line, in one elastic period, to the
     one that holds the load. A stop is by the strategy, if it can, or by a torque, by coasting, or by the
-    brake; it ends when all masses stand: within 1 % of the target speed for one elastic period. An unknown
-    start position is tried for the first step only; the duty goes on from the one with the largest |T|.
+    brake; it ends when all masses stand: within 1 % of the target speed for one period of the load on the
+    held motor. An unknown start position is tried for the first step only; the duty goes on from the one with
+    the largest |T|.
 
     Parameters
     ----------

@@ -79,6 +79,7 @@ class DutyCycle:
         self.sense = 1.0  # frame of the controller
         self.speed = 0.0  # commanded speed, rad/s; 0 at standstill
         self.time = self.angle = 0.0  # of the duty at the zero of the recorder
+        self.begins_at = 0.0  # when the controller in command has begun, which waits for its brake
         self.began = 0.0  # when the phase began, of the recorder
         self.since = np.full(self.rows.count, math.nan)  # since when each mass stands, in a stop
         self.starts = self.step = self.cycle = 0
@@ -110,7 +111,7 @@ class DutyCycle:
 
     # ---- phases ------------------------------------------------------------------------------------------
 
-    def _input(self, begins: bool, release_at: float) -> KernelInput:
+    def _input(self, begins: bool, release_at: float, begins_at: float) -> KernelInput:
         """The machine as it is now, with its brake, for the commanded speed."""
         machines, masses = self.rows.machines.copy(), self.rows.masses.copy()
         row, state = machines[0].view(rec.MACHINE)[0], self.recorder.state
@@ -118,7 +119,7 @@ class DutyCycle:
         row.set_speed = self.sense * self.speed
         row.longest = math.inf
         row.event_cap = (state.asked if self.begun else 0.0) + MAX_EVENTS
-        row.release_at = release_at
+        row.release_at, row.begins_at = release_at, begins_at
         row.noise_seed += max(self.starts - 1, 0)  # another noise in each start
         if not self.begun:
             row.encoder_phase *= self.sense
@@ -151,7 +152,8 @@ class DutyCycle:
         if lines:
             self.sense = self.forward if self.speed != 0.0 else self.sense
         locked = self.closed and math.isinf(self.machine.brake_torque)
-        recorder.input = self._input(begins, NEVER_RELEASED if locked else release_at)
+        begins_at = 0.0 if lines else self.begins_at
+        recorder.input = self._input(begins, NEVER_RELEASED if locked else release_at, begins_at)
         on_gap = begins and bool(self.controller.sensors & Sensor.STAGE)
         if not self.begun:
             recorder.begin(until, on_gap)
@@ -252,16 +254,19 @@ class DutyCycle:
                 f'[duty] {self.step + 1}, do = "{step.do}": the motor still moves, and its brake is to hold '
                 f"it until it is open ({self.where}); let the stop before it end by itself, without a time."
             )
+        if begins:
+            self.begins_at = float(self.rows.machine.begins_at) if release > 0.0 else 0.0
+        seen = began + (self.begins_at if begins else 0.0)
         self.closed = False
         travel = {} if step.angle is None else self._travel(step.angle, begins)
         until = began + (math.inf if step.time is None else step.time)
         if step.angle is not None:
             until = min(until, began + self._journey(step.angle))
-        command = {"run": 1.0, "set_speed": self.sense * self.speed, "command_since": began}
+        command = {"run": 1.0, "set_speed": self.sense * self.speed, "command_since": seen}
         fields = {**command, **travel}
         held = not (last and math.isinf(until))
         if self.regulation is not None:
-            fields |= self._settling(self.regulation, began, abs(self.speed - before) / self.target)
+            fields |= self._settling(self.regulation, seen, abs(self.speed - before) / self.target)
         else:
             fields |= {"ends_at_target": 1.0 if held else 0.0, "time_limit": began + self.patience}
         phase = self.phase(step.do, self.go, until, begins=begins, release_at=release, fields=fields)
@@ -393,9 +398,8 @@ class DutyCycle:
         return self.patience + (PATIENT * momentum / torque if torque > 0.0 else 0.0)
 
     def _watched(self, dwell: float | None = None) -> dict[str, float]:
-        """That a phase ends once all masses have stood for an elastic period, or are watched only."""
-        period = float(self.rows.machine.period)
-        return {"still": STANDING * self.target, "dwell": period if dwell is None else dwell}
+        """That a phase ends once all masses have stood for `held_period`, or are watched only."""
+        return {"still": STANDING * self.target, "dwell": held_period(self.rows) if dwell is None else dwell}
 
     def _close(self, step: DutyStep) -> Iterator[Phase]:
         """The brake is commanded, and closes after its delay; the strategy is in command until then."""
@@ -438,6 +442,21 @@ class DutyCycle:
             yield from self._motor_stands(step)
         if time is not None and self.now < until:
             yield self.phase("pause", self.go or ZERO, until)
+
+
+def held_period(machine_input: KernelInput) -> float:
+    """An upper bound of the longest period with the motor held and all gaps closed, s, after Dunkerley.
+
+    2 pi sqrt(sum of J flexibility), over the masses beside the motor; of a drive the period itself.
+    """
+    inertias = machine_input.masses[0].view(rec.MASS)[:, 0]["J"]
+    shafts, motor = machine_input.shafts[0].view(rec.SHAFT)[:, 0], int(machine_input.machine.motor)
+    flexibility = np.where(
+        shafts["rigid"] == 0.0, 1.0 / np.where(shafts["c"] > 0.0, shafts["c"], np.inf), 0.0
+    )
+    before, behind = np.cumsum(flexibility[:motor][::-1])[::-1], np.cumsum(flexibility[motor:])
+    moves = np.where(np.isfinite(inertias), inertias, 0.0)
+    return 2.0 * math.pi * math.sqrt(float(moves[:motor] @ before + moves[motor + 1 :] @ behind))
 
 
 def holding_torque(machine_input: KernelInput, speed: float) -> float:

@@ -100,9 +100,9 @@ class KernelInput:
         columns["band_low"], columns["band_high"] = (
             (1.0 + sign * band) * columns["target"] for sign in (-1, 1)
         )
-        columns["command_end"], columns["dwell"] = end, dwell
+        columns["command_end"], columns["dwell"] = columns["begins_at"] + end, dwell
         if not given:  # a loop that has not settled by then keeps oscillating, or the load runs away
-            latest = PATIENT * (end + dwell) + SLOW_SHARE * columns["time_limit"]
+            latest = columns["begins_at"] + PATIENT * (end + dwell) + SLOW_SHARE * columns["time_limit"]
             columns["time_limit"] = np.minimum(latest, columns["longest"])
         return replace(self, machines=machines)
 
@@ -228,7 +228,8 @@ def _of_drive(drive: Drive) -> tuple[KernelInput, Vector]:
     named["period"] = column(drive.elastic_period)
     _motor(named, drive, column)
     named["target"], named["release_at"] = target, column(drive.release_time)
-    named["opening_delay"] = column(drive.opening_delay)
+    named["opening_delay"] = delay = column(drive.opening_delay)
+    named["begins_at"] = np.where(named["release_at"] == delay, delay, 0.0)  # not by torque proving
     named["load"] = 1.0
     for i, (J, ground, w0) in enumerate(((J1, b1, w1), (J2, b2, w2))):
         masses["J"][:, i], masses["ground"][:, i], masses["w0"][:, i] = J, ground, w0
@@ -294,7 +295,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, PeriodicTorque]) -> t
     if motor is None:
         return made, np.array([math.inf])
     _motor(named, motor)
-    named["release_at"] = chain.release_time
+    named["release_at"] = named["begins_at"] = chain.release_time
     named["initial_torque"] = motor.initial_torque
     heavier = 1.0 / arrays.efficiency_from_motor
     _guard_chain(made, arrays, heavier)
