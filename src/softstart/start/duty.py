@@ -156,7 +156,7 @@ class DutyRun(Result, view="duties.duty_sheet"):
     >>> duty = Duty(steps=[DutyStep(do="start"), DutyStep(do="hold", time=1), DutyStep(do="stop")])
     >>> run = run_duty("conveyor-11kw", "ramp", duty)
     >>> [(row.step.do, round(run.k_dyn_of(row), 3)) for row in run.rows]
-    [('start', 1.078), ('hold', 1.0), ('stop', 0.215)]
+    [('start', 1.159), ('hold', 1.0), ('stop', 0.215)]
     """
 
     drive: Any  # a Machine

@@ -93,7 +93,7 @@ class DutyComparison(Result, view="duties.duty_comparison_sheet"):
     >>> duty = Duty([DutyStep("start"), DutyStep("hold", time=1), DutyStep("stop")])
     >>> table = compare_duty("conveyor-11kw", ["direct", "ramp"], duty)
     >>> [(row.name, row.run.worst.step.do, round(row.k_dyn, 3)) for row in table.rows]
-    [('direct', 'start', 1.655), ('ramp', 'start', 1.078)]
+    [('direct', 'start', 1.857), ('ramp', 'start', 1.159)]
     """
 
     drive: Any  # a Machine
