@@ -41,6 +41,15 @@ _TERMS = {
 TERMS = {word: sentence for words, sentence in _TERMS.items() for word in words}
 
 
+# other words for a key or a choice, and the word here: it is meant only where it is valid
+SYNONYMS = {
+    **dict.fromkeys(("pause", "wait", "dwell"), "hold"),
+    **dict.fromkeys(("brems", "bremse", "bremsen"), "brake"),
+    "halt": "stop",
+    "speed": "set_speed",
+}
+
+
 def term(name: str) -> str | None:
     """What a word of the field is called here, as the end of a sentence; None for any other word.
 
@@ -81,10 +90,14 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
     'reduced-first-stage'
     >>> nearest("pulse", ["direct", "pulse-coast-hold"]), nearest("star-delta", ["acceleration-delay"])
     ('pulse-coast-hold', None)
+    >>> nearest("pause", ["start", "stop", "hold"])
+    'hold'
     """
     if len(name) > LONGEST:
         return None
     plain, folded = name.casefold(), {one.casefold(): one for one in reversed(list(valid))}
+    if (synonym := SYNONYMS.get(plain)) in folded:
+        return folded[synonym]
     most = min(max(1, len(plain) // LETTERS_A_SLIP), len(plain) - 1)
     distances = {one: slips(plain, one, most) for one in folded}
     least = min(distances.values(), default=most + 1)

@@ -47,6 +47,26 @@ REFUSED |= {("duty", one): "runs away" for one in ("undamped", "crane-4-mass", "
 CHAINS = LIBRARY.names()
 MACHINES = (*library.names(), *SHEETS, *CHAINS)
 QUICK = (("fatigue", "crane-4amtkf"), ("sweep", "hoist"), *(("fatigue", machine) for machine in SHEETS))
+WITH_DUTY = COMMANDS | {
+    "duty": "duty {} --controller ramp",
+    "optimize": "optimize {} --start-time 1.2x",
+    "plan": "plan {}",
+    "tune": "tune {} --controller shaped --duty",
+    "sweep": "sweep {} --controller shaped --axis shaft.gap=1x:2x:2 --duty",
+}
+WITH_DUTY.pop("reduce")  # of a chain
+OF_DUTY = """
+[brake]
+torque = "300 N*m"
+opening_delay = "50 ms"
+[[duty]]
+do = "start"
+[[duty]]
+do = "stop"
+by = "coast"
+[shift]
+cycles_per_hour = 30
+"""
 CELLS = [(cell, machine) for cell in COMMANDS for machine in (CHAINS if cell == "reduce" else MACHINES)]
 
 
@@ -76,3 +96,18 @@ def test_a_default_works(cell: str, machine: str, capfd: pytest.CaptureFixture[s
     if cell in ("optimize", "pareto") and len(one.positions) > 1:  # feedback may be lower
         assert "est fixed profile" in out
         assert not re.search("least K_dyn|optimum", out, re.IGNORECASE), out
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        pytest.param(one, marks=() if one in ("simulate", "fatigue", "duty") else pytest.mark.slow)
+        for one in WITH_DUTY
+    ],
+)
+@pytest.mark.usefixtures("place")
+def test_every_command_takes_a_file_with_a_duty(cell: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """Of a drive with a brake and a shift; a duty that is not asked for changes nothing."""
+    text = Drive.load("conveyor-11kw").to_toml() + OF_DUTY
+    Path("braked.toml").write_text(text, encoding="utf-8")
+    assert main(WITH_DUTY[cell].format("braked.toml").split()) == 0, capfd.readouterr().err

@@ -49,7 +49,8 @@ def test_a_schedule_is_read_back_to_the_bit(tmp_path):
 def test_a_robust_set_is_read_back_to_the_bit(tmp_path):
     gains = {"time": 1.0 / 3.0, "initial": 0.1 + 0.2}
     duty = Duty([DutyStep("start"), DutyStep("stop", by="coast")], shift=Shift(cycles_per_hour=4))
-    saved = RobustFile("ramp", gains, CRANE.replace(damping=0.1, torque_lag="2 ms", duty=duty))
+    brake = {"brake_torque": "90 N*m", "opening_delay": "50 ms", "closing_delay": "60 ms"}
+    saved = RobustFile("ramp", gains, CRANE.replace(damping=0.1, torque_lag="2 ms", duty=duty, **brake))
     assert read_gains(robust_text(saved, {"worst": 1.0}), tmp_path / "x.toml") == saved
 
 

@@ -26,17 +26,13 @@ if TYPE_CHECKING:
     from softstart.start.duty import DutyRun
 
 
-def _read_duty(name: str, option: str) -> Duty:
-    return Duty.load(name)
-
-
 @command("duty")
 @controller_option("--controller")
 @option("--controllers", options.read_names, shell_complete=one_of(controller_names))
 @option("--compare", is_flag=True)
 @options.param_option
 @options.fitted_to_option
-@option("--duty", _read_duty, shell_complete=one_of(Duty.LIBRARY.names))
+@options.duty_file_option
 @options.stop_option
 @option("--cycles", options.count(1, 100_000), default="2")
 @option("--slope", options.quantity("1"))
@@ -45,8 +41,8 @@ def _read_duty(name: str, option: str) -> Duty:
 @answers(out=True)
 def duty_command(
     *, drive: Machine, controller: str | None, controllers: list[str] | None, compare: bool,
-    params: dict[str, str], fitted_to: Drive | None, duty: Duty | None, stop: str | None, cycles: int,
-    slope: float | None, estimate_damping: dict[str, int] | None,
+    params: dict[str, str], fitted_to: Drive | None, stop: str | None, cycles: int, slope: float | None,
+    estimate_damping: dict[str, int] | None,
 ) -> Output:  # fmt: skip
     """Run a machine through a duty: starts, stops, reversals, jogs, load changes, and the life of a shift.
 
@@ -86,6 +82,8 @@ def duty_command(
             "--controller: give one strategy with --controller, several with --controllers, or --compare for "
             "all of them."
         )
+    typed = options.typed_duty(drive)
+    duty = typed if isinstance(typed, Duty) else None  # that of the machine
     with working("running the duty ...") as progress, attributed():
         asked = controllers if controller is None else [controller]
         strategies = controllers_from_options(asked, params, several=several)

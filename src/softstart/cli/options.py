@@ -59,6 +59,8 @@ from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet, UnknownStiffness, still_assumed
 from softstart.drive.duty import Duty, StopBy
+from softstart.drive.machine import Machine
+from softstart.drive.model import OF_DUTY
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, parsed
@@ -78,6 +80,7 @@ Reader = Callable[[Any, str], Any]
 
 DEFAULT_DRIVE = "crane-4amtkf"
 CODE, SETTINGS, TYPED = "softstart.allow_code", "softstart.settings", "softstart.typed"
+DUTY = "softstart.duty"
 
 
 def drive_names() -> tuple[str, ...]:
@@ -232,6 +235,9 @@ def named_as_options(**also: str) -> Iterator[None]:
     names = flags | also  # `also` wins: an option may stand for an argument of another function
 
     def renamed(sentence: str) -> str:
+        if sentence.startswith("[duty] "):  # found with the machine: which file it is
+            meta = click.get_current_context().meta
+            return f"{meta.get(DUTY) or meta.get(TYPED)}: {sentence}"
         keyword = re.match(r"(\w+)(?= =|:|,| \")", sentence)
         if keyword is None or keyword[1] not in names:
             return sentence
@@ -370,9 +376,11 @@ def option(flag: str, read: Reader | None = None, **settings: Any) -> Decorator:
     return click.option(*flag.split(), callback=None if read is None else reading(read), **settings)
 
 
-def typed_settings() -> tuple[str, ...]:
-    """The texts of --set."""
-    return tuple(click.get_current_context().meta.get(SETTINGS, ()))
+def typed_settings(of_duty: bool = False) -> tuple[str, ...]:
+    """The texts of --set for the machine; or those for the duty, where --duty has a file of its own."""
+    meta = click.get_current_context().meta
+    texts = meta.get(SETTINGS, ())
+    return tuple(one for one in texts if of_duty == bool(meta.get(DUTY) and OF_DUTY.match(one)))
 
 
 def typed_machine() -> str:
@@ -444,8 +452,13 @@ allow_code_option = click.option(
 )  # fmt: skip
 
 
-def _read_duty(name: str, option: str) -> Duty | bool:
-    return Duty.load(name) if name else True
+def typed_duty(given: Machine | Identification | UnknownStiffness) -> Duty | bool | None:
+    """The duty of --duty for this machine, with the changes of --set; True: its own, None: no --duty."""
+    name = click.get_current_context().meta.get(DUTY)
+    if not name:
+        return None if name is None else True
+    machine = given if isinstance(given, Machine) else given.drive
+    return Duty.load_for(machine, name, read_changes(typed_settings(True)))
 
 
 def _read_fitted_to(name: str, option: str) -> Drive:
@@ -455,9 +468,15 @@ def _read_fitted_to(name: str, option: str) -> Drive:
 until_option = option("--until", quantity("s", above=0.0))
 fitted_to_option = option("--fitted-to", _read_fitted_to, shell_complete=one_of(drive_names))
 json_option = option("--json as_json", is_flag=True)
-duty_option = option(
-    "--duty", _read_duty, is_flag=False, flag_value="", shell_complete=one_of(Duty.LIBRARY.names)
-)
+# is_eager: the machine is loaded without the changes of a duty in a file of its own
+duty_file_option = click.option(
+    "--duty", is_eager=True, expose_value=False, shell_complete=one_of(Duty.LIBRARY.names),
+    callback=lambda context, _, name: context.meta.update({DUTY: name}),
+)  # fmt: skip
+duty_option = click.option(
+    "--duty", is_eager=True, expose_value=False, shell_complete=one_of(Duty.LIBRARY.names),
+    callback=lambda context, _, name: context.meta.update({DUTY: name}), is_flag=False, flag_value="",
+)  # fmt: skip
 stop_option = option("--stop", type=click.Choice(get_args(StopBy)))
 cycles_option = option("--cycles", count(1, 100_000))
 workers_option = option("--workers", count())

@@ -87,6 +87,7 @@ def sweep_command(
     """
     if controller is None and not any(text.partition("=")[0].strip() == "controller" for text in grid):
         raise InputError("controller = None: name one, or several as an axis, --axis controller=direct,ramp.")
+    arguments["duty"] = options.typed_duty(drive)
     arguments = {name: value for name, value in arguments.items() if value is not None}
     begin, last = time.monotonic(), None
 

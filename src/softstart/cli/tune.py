@@ -159,6 +159,7 @@ def tune_command(
     """
     arguments = {name: value for name, value in arguments.items() if value is not None or name != "cycles"}
     arguments |= {"schedule": only != "robust", "robust": only != "schedule", "parameters": params}
+    arguments["duty"] = options.typed_duty(drive)
     with (
         kept_state(option_value("out"), STATE, "finished parts") as state,
         working("starting the drive ...") as progress,

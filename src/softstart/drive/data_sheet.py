@@ -121,6 +121,9 @@ class DataSheet(SheetValues):
         if "start" in document and not cls.describes(document):
             reason = "this is the file of a drive already; softstart compare takes it"
             raise InputError(Wording(where).sentence("", reason))
+        if extra := [name for name in ("[brake]", "[[duty]]", "[shift]") if name.strip("[]") in document]:
+            reason = 'a data sheet has none; add it to the drive file that "softstart init" writes from it'
+            raise InputError(Wording(where).sentence(" and ".join(extra), reason))
         return super()._from_document(document, where, also)
 
     @classmethod

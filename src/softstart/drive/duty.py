@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Final, Literal, cast, get_args
+from typing import Any, ClassVar, Final, Literal, Self, cast, get_args
 
 from softstart.drive.machine import LoadKind, Machine
 from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
 from softstart.input.files import Library
+from softstart.input.gear import Gear
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, Rows, component, parameter
+from softstart.input.parameters import Wording
 from softstart.quantities import show
 
 Do = Literal["start", "stop", "hold", "reverse", "jog", "load", "brake"]
@@ -32,6 +34,7 @@ KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 ENDS: Final = ("stop", "brake")  # steps that end a motion
 
 MOST_STEPS: Final = 10_000  # of one cycle
+MOST_SHIFTS: Final = 1098.0  # of a year: three on each of 366 days
 MOST_SPEED: Final = 2.0  # times rated or target speed; beyond, a motor in field weakening lacks torque
 
 library = Library("softstart.drive", "a duty", "duties", folder="duties")
@@ -173,6 +176,16 @@ class Shift(ParameterSet):
         "above 0", default=250.0)
     # fmt: on
 
+    def contradictions(self) -> Iterator[str]:
+        """Sentences on more hours than a day has, and on more shifts than a year has."""
+        if self.hours > 24.0:
+            yield f"hours = {self.hours:g}: a shift has at most 24; raise shifts_per_year instead."
+        if self.shifts_per_year > MOST_SHIFTS:
+            yield (
+                f"shifts_per_year = {self.shifts_per_year:g}: three shifts on each day are {MOST_SHIFTS:g}; "
+                "lower it."
+            )
+
 
 class Duty(ParameterFile):
     """One cycle of steps, which a machine repeats.
@@ -196,7 +209,7 @@ class Duty(ParameterFile):
     [(0, 'start'), (1, 'stop'), (0, 'start'), (1, 'stop'), (2, 'hold')]
     >>> Duty([DutyStep("stop")])
     Traceback (most recent call last):
-    softstart.errors.InputError: [duty] 1, do = "stop": the machine stands; a step "start" comes before it.
+    softstart.errors.InputError: [duty] 1, do = "stop": the machine stands; a step "start" must come ...
 
     References
     ----------
@@ -210,6 +223,32 @@ class Duty(ParameterFile):
     steps: Rows[DutyStep] = component(DutyStep, least=0, default=(), kw_only=False)
     shift: Shift | None = component(Shift, default=None)
     # fmt: on
+
+    @classmethod
+    def load_for(cls, machine: Machine, name: str, also: Mapping[str, object] | None = None) -> Duty:
+        """As `load`, with the gear of this machine for values "... at output".
+
+        >>> from softstart import Drive
+        >>> Duty.load_for(Drive.load("crane-4amtkf"), "hoist") == Duty.load("hoist")
+        True
+        """
+
+        class OfMachine(Duty):
+            @classmethod
+            def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
+                return machine.gear_with()
+
+        duty = OfMachine.load(name, also)
+        return cls(duty.steps, shift=duty.shift)
+
+    @classmethod
+    def _from_document(
+        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
+    ) -> Self:
+        if {"motor", "shaft", "mass"} & document.keys():
+            reason = "this is the file of a machine; give it as DRIVE, its [[duty]] is read with it"
+            raise InputError(Wording(where).sentence("", reason))
+        return super()._from_document(document, where, also)
 
     def contradictions(self) -> Iterator[str]:
         """Sentences on steps that cannot follow those before them."""
@@ -282,7 +321,7 @@ def _misplaced(step: DutyStep, started: int, direction: float) -> Iterator[str]:
         remedy = 'add a step "stop" before it' + ', or write "reverse"' * (step.do == "start")
         yield f"{subject}: the machine {what} at rest, and it runs since step {started}; {remedy}."
     if not started and step.do in (*ENDS, "reverse"):
-        yield f'{subject}: the machine stands; a step "start" comes before it.'
+        yield f'{subject}: the machine stands; a step "start" must come before it.'
     if step.do == "hold" and not started:
         for key in ("angle", "set_speed"):
             if (value := getattr(step, key)) is not None:
@@ -462,9 +501,12 @@ def _speed_mistakes(step: DutyStep, machine: Machine, holds_speed: bool, name: s
     speeds = (machine.target_speed, machine.motor.rated_speed)
     known = [speed for speed in speeds if speed is not None]
     if known and abs(step.set_speed) > MOST_SPEED * max(known):
+        # a bare number in a file is in rad/s
+        meant = abs(step.set_speed) * math.pi / 30.0 <= MOST_SPEED * max(known)
         yield (
-            f"set_speed = {step.set_speed!r}: it is above {MOST_SPEED:g} times the rated or target speed, "
-            f"{max(known):.4g} rad/s; in field weakening the motor lacks the torque assumed here."
+            f"set_speed = {step.set_speed:.6g} rad/s: it is above {MOST_SPEED:g} times the rated or target "
+            f"speed, {max(known):.4g} rad/s; in field weakening the motor lacks the torque assumed here"
+            + (f'; did you mean "{step.set_speed:g} rpm"?' if meant else ".")
         )
     if step.do == "hold" and not holds_speed:
         yield (

@@ -206,7 +206,7 @@ class Drive(ParameterFile, Machine):
         "speed of the motor at the start", '"0 rad/s"', default=0.0, follows="initial_speed")
 
     brake_torque: Number = parameter("brake.torque", "N*m",
-        "torque with which the brake of the motor slips; without it the brake never does", '"40 N*m"',
+        "torque with which the brake of the motor slips (without it the brake never does)", '"40 N*m"',
         "0 or more", default=None, infinite=True)
     closing_delay: Number = parameter("brake.closing_delay", "s",
         "time from the command until the brake is closed", '"60 ms"', "0 or more", default=0.0)

@@ -240,6 +240,8 @@ def table_text(table: DocumentTable, values: Mapping[str, object], *, units: boo
     for p in table.parameters:
         value = values.get(p.name)
         if value is not None:
+            if isinstance(value, float) and p.limit.startswith("a whole number"):
+                value = int(value)
             text = literal(value, p.unit, always=p.unit == "rad/s" and not units)
             unit = "" if p.unit == "1" or text.startswith('"') else f"{p.unit}: "
             lines.append(f"{p.key} = {text}" + (f"  # {unit}{p.meaning}" if p.unit and units else ""))

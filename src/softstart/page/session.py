@@ -340,7 +340,7 @@ class Session:
         >>> session = Session("conveyor-11kw")
         >>> session.set_duty(session.inputs.plan.moved(0, 2))
         >>> session.duty_result().trouble
-        '[duty] 2, do = "stop": the machine stands; a step "start" comes before it.'
+        '[duty] 2, do = "stop": the machine stands; a step "start" must come before it.'
         """
         if plan != self.inputs.plan:
             self._change(gesture, duty=plan)

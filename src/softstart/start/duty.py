@@ -440,7 +440,8 @@ def run_duty(
 
 def duty_of(machine: Machine, duty: Duty | str | None) -> Duty:
     """The duty that is given, by itself or by its file, or that of the machine."""
-    cycle = machine.duty if duty is None else duty if isinstance(duty, Duty) else Duty.load(duty)
+    cycle = machine.duty if duty is None else duty
+    cycle = cycle if isinstance(cycle, Duty | None) else Duty.load_for(machine, cycle)
     if cycle is None:
         raise InputError(
             f"duty is missing: {machine.name} has no [[duty]]; add one to its file, or give one of its own."

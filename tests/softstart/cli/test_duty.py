@@ -116,6 +116,25 @@ def test_options_reach_the_duty(as_json):
     assert own["steps"] == as_json(*RAMP)["steps"]
 
 
+@pytest.mark.parametrize("place_of_duty", ["duty.toml", "own"])
+def test_a_change_of_a_step_is_one_of_the_duty_in_use(place_of_duty, as_json, place):
+    """Whether the steps are in the file of the machine or in their own; the gear is that of the machine."""
+    steps = CYCLE.replace('do = "reverse"', 'do = "hold"\ntime = 1')
+    (place / "duty.toml").write_text(steps)
+    (place / "own.toml").write_text(CRANE + steps)
+    machine = ["own.toml"] if place_of_duty == "own" else ["crane.toml", "--duty", place_of_duty]
+    change = ("--set", "duty[2].time=0.7 s", "--set", "shift.hours=6", "--set", "load.inertia=0.2")
+    said = as_json("duty", *machine, "--controller", "ramp", "--cycles", "1", *change)
+    assert said["steps"][1]["time"] == pytest.approx(0.7)
+
+
+def test_a_wrong_step_names_its_file(refused, place):
+    (place / "fast.toml").write_text('[[duty]]\ndo = "start"\nset_speed = 880\n[[duty]]\ndo = "stop"\n')
+    says = ["fast.toml: [duty] 1, set_speed = 880 rad/s", 'did you mean "880 rpm"?']
+    refused(*RAMP, "--duty", "fast.toml", says=says)
+    refused(*RAMP, "--stop", "brake", says=['crane.toml: [duty] 3, do = "stop" by brake'])
+
+
 def test_several_strategies(done, as_json):
     said = as_json(*TWO)
     table = compare_duty(Drive.load("crane.toml"), ["ramp", "speed-ramp"])
@@ -168,6 +187,9 @@ REFUSED = {
     "duty crane.toml --controller ramp --estimate-damping gears=2": ["a damping of its own"],
     "duty crane.toml --controller ramp --duty nowhere.toml": ["nowhere.toml"],
     "duty crane.toml --controller ramp --cycles 0": ["--cycles"],
+    "duty bare.toml --controller ramp --set duty[2].time=1": ["the drive has no duty; add [[duty]]"],
+    "duty bare.toml --controller ramp --duty cycle.toml --set duty[9].time=1": ["duty[N].time with N from"],
+    "duty bare.toml --controller ramp --duty crane.toml": ["this is the file of a machine; give it as DRIVE"],
 }
 
 

@@ -48,6 +48,18 @@ def test_the_example_of_the_page_comes_out_as_by_hand():
     assert (drive.load_kind, drive.start_position) == (shipped.load_kind, shipped.start_position)
 
 
+def test_a_duty_belongs_in_the_drive_file(tmp_path):
+    """One sentence, where a drive is read and where a data sheet is."""
+    text = DataSheet.from_settings(GANTRY).to_toml() + '[brake]\ntorque = 40\n[[duty]]\ndo = "start"\n'
+    (tmp_path / "sheet.toml").write_text(text, encoding="utf-8")
+    for kind in (Drive, DataSheet):
+        with pytest.raises(
+            InputError, match=r"sheet\.toml: \[brake\] and \[\[duty\]\]: .*softstart init"
+        ) as error:
+            kind.load(tmp_path / "sheet.toml")
+        assert len(error.value.sentences) == 1
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     mass=st.floats(10.0, 1e5), radius=st.floats(0.02, 2.0), reeving=st.integers(1, 8),

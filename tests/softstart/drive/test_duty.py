@@ -158,9 +158,9 @@ def test_torque_proving_and_a_release_at_a_time_stay_as_they_are() -> None:
 @pytest.mark.parametrize(
     ("steps", "sentence"),
     [
-        ("stop", '[duty] 1, do = "stop": the machine stands; a step "start" comes before it.'),
+        ("stop", '[duty] 1, do = "stop": the machine stands; a step "start" must come before it.'),
         ("start; stop; brake", '[duty] 3, do = "brake": the machine stands; a step "start"'),
-        ("reverse", '[duty] 1, do = "reverse": the machine stands; a step "start" comes before it.'),
+        ("reverse", '[duty] 1, do = "reverse": the machine stands; a step "start" must come before it.'),
         ("hold angle=3", "[duty] 1, angle = 3.0: the machine stands; give a time, or start it before."),
         ("start; start", '[duty] 2, do = "start": the machine starts at rest, and it runs since step 1'),
         ("start; jog time=1", '[duty] 2, do = "jog": the machine is jogged at rest, and it runs'),
@@ -180,6 +180,7 @@ def test_torque_proving_and_a_release_at_a_time_stay_as_they_are() -> None:
         ("start set_speed=-9; reverse set_speed=-9", "[duty] 2, set_speed = -9.0: the machine runs back"),
         ("start set_speed=-9; hold time=1 set_speed=9", "[duty] 2, set_speed = 9.0: the machine runs backw"),
         ("start; reverse; hold time=1 set_speed=9", "[duty] 3, set_speed = 9.0: the machine runs backwards"),
+        ("start speed=3", "[duty] 1, speed = 3: [duty] has no key speed; did you mean set_speed?"),
         ("load", '[duty] 1, a step "load" changes torque, kind, inertia or friction of the load'),
         ("strat", '[duty] 1, do = "strat": the kind of the step is "start", "stop", '),
         ("jog tiem=3", "[duty] 1, tiem = 3: [duty] has no key tiem; did you mean time?"),
@@ -234,6 +235,32 @@ def test_whatever_stands_in_a_file_is_read_or_refused(key: str) -> None:
 def test_tables_of_another_kind(text: str) -> None:
     with pytest.raises(InputError):
         Drive.from_toml(CRANE.to_toml() + text)
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("pause", "hold"), ("wait", "hold"), ("brems", "brake"), ("halt", "stop"), ("strat", "start")],
+)
+def test_another_word_for_a_step(word: str, meant: str) -> None:
+    assert sentences(word)[0].endswith(f'did you mean "{meant}"?')
+
+
+def test_a_shift_lasts_a_day_at_most_and_a_day_has_three() -> None:
+    assert Shift(cycles_per_hour=1, hours=24, shifts_per_year=3 * 366)
+    for wrong in ({"hours": 24.1}, {"shifts_per_year": 3 * 366 + 1}):
+        with pytest.raises(InputError, match=f"^{next(iter(wrong))} = "):
+            Shift(cycles_per_hour=1, **wrong)
+
+
+def test_the_file_of_a_machine_is_no_duty() -> None:
+    for machine in (CRANE.replace(duty=SHIFT), CHAIN):
+        with pytest.raises(InputError, match=r"^my\.toml: this is the file of a machine; [^\n]*$"):
+            Duty.from_toml(machine.to_toml(), where="my.toml")
+
+
+def test_counts_are_written_as_whole_numbers() -> None:
+    assert "repeat = 8  #" in SHIFT.to_toml()
+    assert "cycles_per_hour = 6.25  #" in SHIFT.to_toml()
 
 
 # ---- with a machine and a strategy ----------------------------------------------------------------------
@@ -328,7 +355,7 @@ LOCK = CRANE.replace(closing_delay=0.1)
         (LIFT, [*BACK, TORQUE], None, '[duty] 2, by = "torque": the load, 7.16 N*m at the motor shaft besid'),
         (CRANE.replace(load_torque=0), CYCLE, "coast", '[duty] 2, do = "stop" by coast: nothing brakes the '),
         (LIFT, CYCLE, "strategy", '[duty] 2, do = "stop" by strategy: ramp cannot stop a machine; stop by'),
-        (LIFT, [DutyStep("start", set_speed=185)], None, "[duty] 1, set_speed = 185.0: it is above 2 times "),
+        (LIFT, [DutyStep("start", set_speed=185)], None, "[duty] 1, set_speed = 185 rad/s: it is above 2 "),
         (LIFT, [CYCLE[0], DutyStep("hold", time=1, set_speed=9)], None, "[duty] 2, set_speed = 9.0: ramp do"),
         (LIFT, [DutyStep("load", torque=5, mass="hook")], None, '[duty] 1, mass = "hook": a drive has one l'),
         (CHAIN, [DutyStep("load", torque=5, mass="cran")], None, '[duty] 1, mass = "cran": the chain has no '
@@ -401,6 +428,27 @@ def test_settings_of_steps() -> None:
     ]
     with pytest.raises(InputError, match=r"^duty\[1\].time=3: the drive has no duty; add \[\[duty\]\]"):
         CRANE.with_settings(["duty[1].time=3"])
+
+
+def test_a_duty_of_its_own_file_at_the_output_of_the_machine(tmp_path: Path) -> None:
+    """The same steps in the file of the machine say what is expected."""
+    steps = '[[duty]]\ndo = "start"\nset_speed = "2 rad/s at output"\n'
+    (tmp_path / "own.toml").write_text(steps, encoding="utf-8")
+    geared = CRANE.replace(gear_ratio=40, gear_efficiency=0.8)
+    own = Duty.load_for(geared, str(tmp_path / "own.toml"))
+    assert own == Drive.from_toml(geared.to_toml() + steps).duty
+    assert own.steps[0].set_speed == 80.0
+    for machine, says in ((CRANE, "without gear.ratio"), (CHAIN, "the gears of a chain")):
+        with pytest.raises(InputError, match=says):
+            Duty.load_for(machine, str(tmp_path / "own.toml"))
+
+
+def test_a_speed_that_was_meant_in_rpm() -> None:
+    (sentence,) = refused(LIFT, DutyStep("start", set_speed=880), DutyStep("stop", by="brake"))
+    assert sentence.startswith("[duty] 1, set_speed = 880 rad/s: it is above 2 times the rated or target")
+    assert sentence.endswith('; did you mean "880 rpm"?')
+    (sentence,) = refused(LIFT, DutyStep("start", set_speed=8800), DutyStep("stop", by="brake"))
+    assert sentence.endswith("the torque assumed here.")
 
 
 def test_values_at_the_output() -> None:

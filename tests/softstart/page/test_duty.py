@@ -141,9 +141,9 @@ def test_an_order_that_cannot_be_is_a_sentence_and_nothing_is_lost(page):
     page.take("duty_move", index=0, to=2)
     assert page.steps == ["hold", "stop", "start"]
     shown = page.duty()
-    assert 'a step "start" comes before it' in shown["trouble"]
+    assert 'a step "start" must come before it' in shown["trouble"]
     assert (shown["wrong"], shown["trace"], shown["toml"]) == (1, None, "")
-    with pytest.raises(InputError, match='a step "start" comes before it'):
+    with pytest.raises(InputError, match='a step "start" must come before it'):
         _ = page.session.inputs.machine_with_duty
     page.take("duty_move", index=2, to=0)
     assert page.duty()["trace"] is not None
