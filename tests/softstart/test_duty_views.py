@@ -252,7 +252,7 @@ def test_a_start_time_is_a_settled_time_where_the_speed_is_held() -> None:
     assert [one.name for one in run.margins_of(start)] == ["shaft torque", "settled time"]
     assert run.executed[0].start_time == simulate(CRANE, "speed-ramp").settled_time
     assert start.start_time == max(one.start_time for one in run.executed if one.number == 1)
-    assert how_of(run.rows[1]) == "strategy"
+    assert how_of(run, run.rows[1]) == "strategy"
     assert "settled\ns" in [column.heading for column in run.tables[0].columns]
 
 
@@ -261,16 +261,39 @@ def test_a_start_time_is_a_settled_time_where_the_speed_is_held() -> None:
 
 def test_the_table_says_how_each_step_was_done() -> None:
     run = ramp()
-    assert [how_of(row) for row in run.rows] == [
-        "strategy", "holding torque", "plugging", "torque (configured)", "torque (configured)",
+    assert [how_of(run, row) for row in run.rows] == [
+        "strategy", "holding torque", "plugging", "torque (default)", "torque (default)",
     ]  # fmt: skip
     text = text_of(run)
-    assert "ramp cannot stop: its stops are by torque, as configured." in text
+    assert "ramp cannot stop: its stops are by torque (default)." in text
     assert "Plugging: ramp cannot reverse" in text
     asked = Duty([DutyStep("start"), DutyStep("stop", by="coast")])
     other = run_duty(CRANE, "ramp", asked, stop="torque")
-    assert how_of(other.rows[1]) == "coast"
+    assert how_of(other, other.rows[1]) == "coast"
     assert "configured" not in text_of(other)
+
+
+def test_a_jog_that_does_not_move_the_load_is_not_gentle() -> None:
+    """An s-curve of 10 s is, in a jog of 0.1 s, hardly above the friction of the load; `direct` moves it."""
+    jog = Duty([DutyStep("jog", time=0.1, by="coast")])
+    slow = run_duty(CRANE, "s-curve", jog, parameters={"time": 10.0})
+    assert min(one.angle for one in slow.executed) < 0.01 * 0.1 * CRANE.target_speed
+    assert "Step 1, jog: the load hardly moves, or the wrong way, under s-curve" in text_of(slow)
+    assert "hardly moves" not in text_of(run_duty(CRANE, "direct", jog))
+
+
+def test_a_shift_that_leaves_no_time_for_a_cycle_is_said() -> None:
+    """3600 s an hour over the time of a cycle are the most cycles of an hour."""
+    most = 3600.0 / ramp().cycle_time
+    for share, says in ((0.999, False), (1.001, True)):
+        duty = THERE_AND_BACK.replace(shift=Shift(cycles_per_hour=share * most))
+        text = text_of(run_duty(CRANE, "ramp", duty))
+        assert ("for a cycle, which takes longer under ramp" in text) == says
+
+
+def test_a_stop_is_configured_where_it_is_not_the_default() -> None:
+    run = run_duty(CRANE, "ramp", THERE_AND_BACK, stop="coast")
+    assert how_of(run, run.rows[3]) == "coast (configured)"
 
 
 def test_a_step_in_words_has_the_units_of_the_machine() -> None:
@@ -337,6 +360,27 @@ def test_strategies_side_by_side() -> None:
     headings = [column.heading for column in shown.columns]
     assert headings[:6] == ["strategy", "K\n1 start", "K\n2 hold", "K\n3 reverse", "K\n4 stop", "K\n5 jog"]
     assert "ramp" in " ".join(table.notes)
+
+
+def test_what_no_strategy_keeps_is_named() -> None:
+    """A stop by the torque of the motor exceeds the limit, whatever the strategy."""
+    duty = Duty([DutyStep("start"), DutyStep("hold", time=0.2), DutyStep("stop", by="torque")])
+    table = compare_duty(CRANE.replace(permissible_start_time=None), ["ramp", "speed-ramp"], duty)
+    assert (
+        "No strategy keeps all limits; each exceeds one in step 3, stop (by torque, not by the strategy)."
+        in table.sheet.conclusions
+    )
+
+
+def test_a_sentence_of_several_strategies_stands_once() -> None:
+    duty = Duty([DutyStep("start"), DutyStep("stop")])
+    with pytest.raises(InputError):
+        compare_duty(CRANE.replace(minimum_torque=0.0), ["ramp", "direct"], duty, stop="torque")
+    table = compare_duty(
+        CRANE.replace(minimum_torque=0.0), ["ramp", "direct", "speed-ramp"], duty, stop="torque"
+    )
+    (note,) = (note for note in table.notes if "has no braking torque" in note)
+    assert note.startswith("ramp, direct: ")
 
 
 def test_the_map_strikes_out_what_exceeds_a_limit() -> None:

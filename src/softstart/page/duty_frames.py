@@ -79,7 +79,7 @@ def step_figures(run: DutyRun, row: StepRun, units: Units, shares: Vector | None
     largest, smallest = (0.0 if abs(T) < none else float(T) for T in (row.largest.max(), row.smallest.min()))
     return {
         "length": row.end - row.begin,
-        "how": how_of(row),
+        "how": how_of(run, row),
         "k_dyn": json_number(run.k_dyn_of(row)),
         "largest": json_number(largest),
         "smallest": json_number(smallest),

@@ -215,6 +215,12 @@ class DutyRun(Result, view="duties.duty_sheet"):
         return any(one.configured for one in self.executed)
 
     @property
+    def stop_setting(self) -> str:
+        """Whether `stop` is the "default" of the machine, or another one that was "configured"."""
+        usual = way_of_stop(DutyStep("stop"), self.drive, None, self.controller.can_stop)
+        return "default" if self.stop == usual else "configured"
+
+    @property
     def counted_cycles(self) -> int:
         """The number of cycles of the duty to which `turning_points` belong."""
         return max(self.cycles - 1, 1)
@@ -329,7 +335,7 @@ class DutyRun(Result, view="duties.duty_sheet"):
             "stop": self.stop,
             "cycles": self.cycles,
             "cycle_time": self.cycle_time,
-            "base": None if self.base is None else self.base.name,
+            "base": (self.base or self.drive).name,
             "base_torque": self.base_torque,
             "k_dyn": self.k_dyn,
             "worst_step": self.worst.number,

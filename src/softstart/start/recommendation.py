@@ -109,11 +109,13 @@ class Margin:
 
     @property
     def brief(self) -> str:
-        """Whether it is kept, and the margin: "kept 28.3 %", "exceeded -4.2 %", "exceeded x109"."""
+        """Whether it is kept, and the margin: "kept 28.3 %", "4.2 % over", "exceeded x109"."""
         if self.share < -1.0:
             return f"exceeded x{_times(self.share)}"
-        left = "-" if math.isnan(self.share) else f"{100.0 * self.share:.1f} %"
-        return f"{'kept' if self.kept else 'exceeded'} {left}"
+        if math.isnan(self.share):
+            return "exceeded"
+        percent = f"{100.0 * abs(self.share):.1f} %"
+        return f"kept {percent}" if self.kept else f"{percent} over"
 
     def summary(self) -> dict[str, object]:
         """As plain data."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from softstart.views.drawing import (
     line_of,
     new_figure,
 )
-from softstart.views.fatigue import SPECTRUM, counted, estimated_damping, factor, slope_sentence
+from softstart.views.fatigue import SPECTRUM, estimated_damping, slope_sentence
 from softstart.views.markdown import file_stem
 from softstart.views.numbers import DataColumn, TextTable, number, plural, short, units_of, with_unit
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
@@ -46,6 +46,8 @@ ASKED = {
     "brake_time": "s", "torque": "N m", "kind": "", "inertia": "kg m2", "friction": "N m", "mass": "",
 }  # fmt: skip
 ANEW = "strategy, anew in the other direction"  # `StepRun.how`
+ROUNDING = 1e-9  # of the mean torque
+IDLE = 0.01  # of set speed times time: the load hardly moves
 SAME_RATE = 0.01  # relative difference of two numbers of starts per hour that is no contradiction
 LETTER = 0.0085  # share of the figure that a letter of the label of a step needs
 PLOT_POINTS = 1500  # of one step
@@ -79,11 +81,11 @@ def asked_of(step: DutyStep, machine: Machine) -> str:
     return " ".join([step.do, ", ".join(parts)]).strip()
 
 
-def how_of(row: StepRun) -> str:
-    """How a step was carried out, and whether that is the configured stop."""
+def how_of(run: DutyRun, row: StepRun) -> str:
+    """How a step was carried out, and whether that is the stop by default or the configured one."""
     if row.how == ANEW:
         return "plugging"
-    return f"{row.how} (configured)" if row.configured else row.how
+    return f"{row.how} ({run.stop_setting})" if row.configured else row.how
 
 
 def against_limits(margins: Sequence[Margin]) -> str:
@@ -105,6 +107,11 @@ def name_of(row: StepRun) -> str:
     return f"{row.number}, {row.step.do}"
 
 
+def _torque(run: DutyRun, value: float) -> float:
+    """A torque without what is rounding."""
+    return float(value) if abs(value) > ROUNDING * run.base_torque else 0.0
+
+
 def place_of(row: StepRun | None) -> str:
     """Where a margin is: in a step, or, without one, in the life."""
     return "the life" if row is None else f"step {name_of(row)}"
@@ -117,10 +124,10 @@ def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
     return (
         DataColumn("step", lambda row: str(row.number)),
         DataColumn("to do", lambda row: asked_of(row.step, run.drive)),
-        DataColumn("how", how_of),
+        DataColumn("how", lambda row: how_of(run, row)),
         DataColumn("K_dyn", run.k_dyn_of, 3),
-        DataColumn("largest\ntorque N m", lambda row: float(row.largest.max())),
-        DataColumn("smallest\ntorque N m", lambda row: float(row.smallest.min())),
+        DataColumn("largest\ntorque N m", lambda row: _torque(run, row.largest.max())),
+        DataColumn("smallest\ntorque N m", lambda row: _torque(run, row.smallest.min())),
         DataColumn("margin\n%", lambda row: _least(run.margins_of(row), "share"), 1, optional=True),
         DataColumn("to the limit", lambda row: _least(run.margins_of(row), "name"), optional=True),
         DataColumn("damage\n%", lambda row: math.nan if shares is None else float(shares[row.number - 1]), 1,
@@ -151,13 +158,23 @@ def shaft_tables(run: DutyRun) -> list[TextTable]:
 
 # life ------------------------------------------------------------------------------------------------------
 
+
+def rough(value: float) -> str:
+    """A life, two digits: the last contacts of a rattling machine depend on more than is known of it.
+
+    >>> rough(31482.0), rough(2.519), rough(1.4163e6), rough(math.nan)
+    ('31000', '2.5', '1.4e+06', '-')
+    """
+    return short(float(f"{value:.2g}"))
+
+
 LIFE = (
     DataColumn("shaft", lambda one: one.shaft),
     DataColumn("equivalent\ntorque N m", lambda one: one.equivalent_torque),
-    DataColumn("cycles to\nfailure", lambda one: one.cycles, text=counted, optional=True),
-    DataColumn("hours", lambda one: one.hours, text=counted, optional=True),
-    DataColumn("shifts", lambda one: one.shifts, text=counted, optional=True),
-    DataColumn("years", lambda one: one.years, text=counted, optional=True),
+    DataColumn("cycles to\nfailure", lambda one: one.cycles, text=rough, optional=True),
+    DataColumn("hours", lambda one: one.hours, text=rough, optional=True),
+    DataColumn("shifts", lambda one: one.shifts, text=rough, optional=True),
+    DataColumn("years", lambda one: one.years, text=rough, optional=True),
 )
 
 
@@ -169,7 +186,7 @@ def life_table(life: DutyLife) -> TextTable:
 def life_length(one: ShaftLife) -> str:
     """A life in cycles, shifts and years; "" where it is not known."""
     parts = ((one.cycles, "cycles"), (one.hours, "h"), (one.shifts, "shifts"), (one.years, "years"))
-    return ", ".join(f"{counted(value)} {unit}" for value, unit in parts if not math.isnan(value))
+    return ", ".join(f"{rough(value)} {unit}" for value, unit in parts if not math.isnan(value))
 
 
 def life_or_reason(run: DutyRun, slope: float | None) -> tuple[DutyLife | None, str]:
@@ -259,12 +276,14 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     )
     if run.margins():
         yield "Margin: what a step leaves of the limit to which it comes nearest; negative: exceeded."
+    if run.drive.limits.output_torque is not None:
+        yield "Limit of the output torque: shaft torque times the gear ratio, without losses, the safe side."
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
     elif run.cycles == 1:
         yield "One cycle: its damage depends on where the machine stood before; compute two or more."
     if run.uses_configured_stop:
-        yield f"{name} cannot stop: its stops are by {run.stop}, as configured."
+        yield f"{name} cannot stop: its stops are by {run.stop} ({run.stop_setting})."
     if ANEW in hows:
         yield (
             f"Plugging: {name} cannot reverse; it is started again in the other direction while the machine "
@@ -275,6 +294,8 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     if len(run.drive.shaft_names) > 1:
         yield "Damage: of the shaft with the shortest life."
     yield from starts_note(run)
+    yield from hurry_notes([run])
+    yield from idle_notes([run])
     if len(run.drive.positions) > 1:
         yield "The start position is unknown: the first step is the worst of both flanks and mid-gap."
 
@@ -288,8 +309,52 @@ def starts_note(run: DutyRun) -> Iterator[str]:
     if abs(rate - asked) > SAME_RATE * asked:
         yield (
             f"[limits] starts_per_hour is {short(float(asked))}, the duty has {short(rate)}: "
-            f"{short(shift.cycles_per_hour)} cycles per hour with {plural(run.starts, 'start')}, reversals "
-            "and jogs included. Lives here are those of the duty."
+            f"{short(shift.cycles_per_hour)} cycles per hour with {plural(run.starts, 'start')} each, "
+            "counting reversals and jogs. Lives here are those of the duty."
+        )
+
+
+def grouped(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """The names that belong to each sentence or place."""
+    groups: dict[str, list[str]] = {}
+    for key, name in pairs:
+        groups.setdefault(key, []).append(name)
+    return groups
+
+
+def hurry_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
+    """Under which strategies a cycle takes longer than the shift has for it."""
+    if (shift := runs[0].duty.shift) is None:
+        return
+    every = SECONDS_PER_HOUR / shift.cycles_per_hour
+    if late := [f"{run.controller_name} ({run.cycle_time:.4g} s)" for run in runs if run.cycle_time > every]:
+        yield (
+            f"[shift] cycles_per_hour = {short(shift.cycles_per_hour)} leaves {every:.4g} s for a cycle, "
+            f"which takes longer under {', '.join(late)}: the life in hours, shifts and years is too short."
+        )
+
+
+def idle_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
+    """In which starts and jogs the load hardly moves, or the wrong way, so that they only seem gentle."""
+    idle: dict[tuple[str, str], float] = {}
+    for run in runs:
+        for one in run.executed:
+            step = one.step
+            if step.do in ("start", "jog"):
+                angle = one.angle * step.direction
+                speed = abs(step.set_speed or run.drive.target_speed)
+                if angle < IDLE * speed * (step.time or one.time):
+                    key = (name_of(one), run.controller_name)
+                    idle[key] = min(angle, idle.get(key, math.inf))
+    units = units_of(runs[0].drive)
+    shown = (
+        (place, f"{name} ({units.shown(angle, 'rad'):.3g} {units.of('rad')})")
+        for (place, name), angle in idle.items()
+    )
+    for place, names in grouped(shown).items():
+        yield (
+            f"Step {place}: the load hardly moves, or the wrong way, under {', '.join(names)}; K_dyn there "
+            "is not that of a motion."
         )
 
 
@@ -302,7 +367,7 @@ def duty_facts(run: DutyRun) -> list[list[str]]:
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)} in step {name_of(worst)}"],
         ["peak shaft torque", f"{with_unit(worst.peak_torque, 'N m')}{where}"],
-        ["the same at the output", output],
+        ["at the output, with losses", output],
         ["time of a cycle", with_unit(run.cycle_time, "s")],
     ]
 
@@ -495,10 +560,10 @@ COMPARED = (
     DataColumn("worst\nstep", _of_run(lambda row: name_of(row.run.worst), "-")),
     DataColumn("margin\n%", _nearest("share"), 1, optional=True),
     DataColumn("to the limit", _nearest("name"), optional=True),
-    DataColumn("life over\ndirect", lambda row: row.relative, text=factor, optional=True),
+    DataColumn("life over\ndirect", lambda row: row.relative, text=rough, optional=True),
     DataColumn("cycles to\nfailure", lambda row: math.nan if row.life is None else row.life.worst.cycles,
-               text=counted, optional=True),
-    DataColumn("years", lambda row: math.nan if row.life is None else row.life.worst.years, text=counted,
+               text=rough, optional=True),
+    DataColumn("years", lambda row: math.nan if row.life is None else row.life.worst.years, text=rough,
                optional=True),
     DataColumn("cycle\ns", _of_run(lambda row: row.run.cycle_time)),
 )  # fmt: skip
@@ -521,6 +586,7 @@ def duty_comparison_sheet(
         figures[f"duty-{stem}"] = partial(duty_figure, run)
         files[f"trace-{stem}.csv"] = run.to_csv
     lives = [row.life for row in rows if row.life is not None]
+    failed = ((row.reason, row.name) for row in rows if row.run is None)
     return Sheet(
         f"{machine.name}: strategies in a duty",
         [*machine_lines(machine, fitted_to), *duty_lines(runs[0])],
@@ -529,9 +595,11 @@ def duty_comparison_sheet(
         notes=[
             f"K: largest |T| of a step over {runs[0].base_torque:.4g} N m, the mean shaft torque under full "
             "starting torque; of all cycles and repetitions.",
-            *(f"{row.name}: {row.reason}" for row in rows if row.run is None),
+            *(f"{', '.join(names)}: {reason}" for reason, names in grouped(failed).items()),
             *stop_notes(runs),
             *starts_note(runs[0]),
+            *hurry_notes(runs),
+            *idle_notes(runs),
             *(life_notes(machine, lives[0]) if lives else [f"No life: {comparison.no_life}"]),
             f"{estimated_damping(machine, comparison.estimate)}." if comparison.estimate else "",
             *machine.warnings,
@@ -560,25 +628,36 @@ def comparison_conclusions(comparison: DutyComparison) -> list[str]:
     ]
     kept = [row.name for row in finished if row.limits_kept]
     if any(row.limits_kept is not None for row in finished):
-        text.append(f"All limits are kept by {', '.join(kept)}." if kept else "No strategy keeps all limits.")
+        text.append(f"All limits are kept by {', '.join(kept)}." if kept else _exceeded_by_all(finished))
     lasting = [row for row in finished if row.life is not None]
     if lasting:
         longest = min(lasting, key=lambda row: row.life.worst.damage if row.life else math.inf)
         assert longest.life is not None
-        over = "" if math.isnan(longest.relative) else f", {factor(longest.relative)} times that of direct"
+        over = "" if math.isnan(longest.relative) else f", {rough(longest.relative)} times that of direct"
         length = life_length(longest.life.worst)
         text.append(f"Longest life: {longest.name}{over}{', ' + length if length else ''}.")
     return text
 
 
+def _exceeded_by_all(rows: Sequence[DutyRow]) -> str:
+    """That no strategy keeps all limits, and in which steps none does."""
+    broken = [{place_of(step): step for step, margin in row.margins if not margin.kept} for row in rows]
+    places = []
+    for place in broken[0]:
+        if all(place in other for other in broken):
+            hows = {step.how for other in broken if (step := other[place]) is not None}
+            fixed = hows <= {"brake", "coast", "torque"} and hows
+            places.append(place + f" (by {' or '.join(sorted(hows))}, not by the strategy)" * bool(fixed))
+    where = f"; each exceeds one in {', '.join(places)}" if places else ""
+    return f"No strategy keeps all limits{where}."
+
+
 def stop_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
     """Which strategies use the configured stop, and which are plugged."""
-    ways: dict[str, list[str]] = {}
-    for run in runs:
-        if run.uses_configured_stop:
-            ways.setdefault(run.stop, []).append(run.controller_name)
+    configured = (run for run in runs if run.uses_configured_stop)
+    ways = grouped((f"{run.stop} ({run.stop_setting})", run.controller_name) for run in configured)
     for stop, names in ways.items():
-        yield f"Stops by {stop}, as configured, since they cannot stop: {', '.join(names)}."
+        yield f"Stops by {stop}, since they cannot stop: {', '.join(names)}."
     plugged = [run.controller_name for run in runs if any(row.how == ANEW for row in run.rows)]
     if plugged:
         yield f"Reversed by plugging, a start in the other direction out of the motion: {', '.join(plugged)}."

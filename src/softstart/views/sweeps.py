@@ -180,7 +180,7 @@ def start_table(results: xarray.Dataset) -> TextTable:
     if not set(ended) <= {status.name for status in Status if status.success}:
         shown.insert(axes + 1, (STATUS, [name.lower().replace("_", " ") for name in ended]))
     words = [heading for heading, column in shown if any(one[:1].isalpha() for one in column)]
-    return TextTable.of(f"Each {_what(results)}", dict(shown), words)
+    return TextTable.of(f"Each {_what(results)}", dict(shown), words, keys=axes)
 
 
 def _figures(values: list[float]) -> list[str]:

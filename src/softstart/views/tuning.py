@@ -101,8 +101,9 @@ def tuning_question(tuning: Tuning) -> str:
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
     duty = "" if q.plan is None else f" over the duty {q.plan.words()}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
+    what = "margin to the limits maximised" if q.metric == MARGIN else f"{_metric(tuning)} minimised"
     return (
-        f"{tuning.controller}: {_metric(tuning)} minimised{duty}, {q.time_name} {q.bound}, "
+        f"{tuning.controller}: {what}{duty}, {q.time_name} {q.bound}, "
         f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
         f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
     )
@@ -173,12 +174,21 @@ def _grid(tuning: Tuning, title: str, values: DataArray) -> TextTable:
     return TextTable(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
 
 
+def _digits(value: float) -> str:
+    """A figure in a sentence: three decimals, or three digits where these say nothing.
+
+    >>> _digits(1.0774), _digits(0.0), _digits(2.513e-8), _digits(3.21e14)
+    ('1.077', '0.000', '2.51e-08', '3.21e+14')
+    """
+    return f"{value:.3f}" if value == 0.0 or 0.1 <= abs(value) < 1e6 else f"{value:.3g}"
+
+
 def _between(values: ArrayLike) -> str:
     """Least to largest value."""
     numbers = np.asarray(values, dtype=np.float64)
     finite = numbers[np.isfinite(numbers)]
     ends = (finite.min(), finite.max()) if finite.size else ()
-    return " to ".join(dict.fromkeys(f"{end:.3f}" for end in ends)) or "none"
+    return " to ".join(dict.fromkeys(_digits(end) for end in ends)) or "none"
 
 
 def conclusions(tuning: Tuning) -> list[str]:
@@ -200,14 +210,14 @@ def conclusions(tuning: Tuning) -> list[str]:
         timing = "all in time" if one.feasible else f"{100 * one.excess:.1f} % late"
         shares.append(("one set for all", one.worst, one.worst_default))
         sentences.append(
-            f"One set for all: {metric} {kind} {one.worst:.3f} (defaults of the nominal drive "
-            f"{one.worst_default:.3f}); {timing}; {one.agreement} of {one.restarts} "
+            f"One set for all: {metric} {kind} {_digits(one.worst)} (defaults of the nominal drive "
+            f"{_digits(one.worst_default)}); {timing}; {one.agreement} of {one.restarts} "
             "searches agree."
         )
         if one.ends is not None:
             end = "stiff" if one.ends[0] >= one.ends[1] else "soft"
             ends = " and ".join(
-                f"{worst:.3f} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
+                f"{_digits(worst)} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
             )
             sentences.append(f"One set at both ends of the stiffness: {ends}. The {end} end is critical.")
     if tuning.problem.metric == MARGIN:

@@ -77,7 +77,7 @@ def test_one_strategy(done, as_json):
     assert shaft["hours"] == pytest.approx(shaft["cycles_to_failure"] / 30.0)
     out = done(*RAMP)
     assert f"Worst step: 3, stop, K_dyn {said['k_dyn']:.3f}" in out
-    assert "its stops are by torque, as configured" in " ".join(out.split())
+    assert "its stops are by torque (default)" in " ".join(out.split())
     assert max(map(len, out.splitlines())) <= 100
 
 

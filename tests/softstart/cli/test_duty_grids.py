@@ -45,6 +45,13 @@ def test_what_is_shown_speaks_of_duties(done: Any, machines: Path) -> None:
     assert "start" not in out.partition("Each duty")[2].replace("start time", "")
 
 
+def test_a_table_in_two_parts_has_all_axes_in_both(done: Any, machines: Path) -> None:
+    axes = (*AXIS, "--axis", "load.inertia=0.2,0.3")
+    out = done("sweep", "belt.toml", "--controller", "ramp", *axes, "--workers", "1", "--duty", "conveyor")
+    (first, second, *_) = (part.split("\n\n")[0].splitlines() for part in out.split("Each duty")[1:])
+    assert [line.split()[:2] for line in first[3:]] == [line.split()[:2] for line in second[3:]]
+
+
 @pytest.mark.slow
 def test_a_tuning_names_the_duty(done: Any, machines: Path) -> None:
     small = ("--gaps", "1x", "--inertias", "1x", "--restarts", "1", "--only", "robust", "--workers", "1")

@@ -87,7 +87,7 @@ def test_a_customer_reads_output_torques_years_and_doubts_and_nothing_that_is_fo
         assert sentence in text
     assert re.findall(r"--\w+|\[limits|[Gg]ive |softstart (?:compare|pareto|serve|optimize)", text) == []
     assert "times what is permitted" in text
-    assert re.findall(r"e\+\d+ %|exceeded -\d{3,}", text) == []  # of a limit that is exceeded a hundredfold
+    assert re.findall(r"e\+\d+ %|\d{3,}\.\d % over", text) == []  # of a limit that is exceeded a hundredfold
     assert not [row for one in read.tables for row in one[1:] if set(row[1:]) <= {"\N{EN DASH}", ""}]
     (style,) = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
     assert "@page { size: A4;" in style

@@ -172,7 +172,7 @@ export class Duty {
       const row = this.body.children[index];
       put(row.firstElementChild.firstElementChild, `${index + 1} ${step.do}${step.repeat > 1 ? ` \u00d7${step.repeat}` : ""}${index === worst ? ", worst" : ""}`);
       COLUMNS.forEach(([, , text], column) => put(row.children[column + 1], text(step)));
-      const [margin, limit] = (step.limits ?? "").replace("exceeded -", "over ").split(/(?=,)/); // which limit it is, where there is room
+      const [margin, limit] = (step.limits ?? "").split(/(?=,)/); // which limit it is, where there is room
       row.lastElementChild.replaceChildren(margin, element("span", { class: "spare" }, limit ?? ""));
       row.lastElementChild.title = step.limits ?? "";
       row.classList.toggle("worst", index === worst);

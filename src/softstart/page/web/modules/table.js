@@ -87,7 +87,7 @@ export class Table {
       if (!row || line.row === row) continue;
       line.row = row;
       line.cells.forEach((cell, index) => put(cell, FIGURES[index][3](row)));
-      const words = [row.limits.replace("exceeded -", "over "), row.flag].filter(Boolean); // a narrow column
+      const words = [row.limits, row.flag].filter(Boolean); // a narrow column
       put(line.flag, words.join("\n"));
       line.flag.classList.toggle("two", words.length > 1);
       line.flag.classList.toggle("kept", !row.flag && row.limits.startsWith("kept"));
