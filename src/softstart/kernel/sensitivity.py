@@ -144,7 +144,7 @@ def demand_hats(s: Record, knots: Vector, owners: Owners, at: int, t: float, h: 
     for p in range(after + 1):
         hat[0, p] = hat[0, p] + hat[1, p] if limited else 0.0
         hat[1, p] = 0.0
-    if limited:
+    if limited or middle < s.begins_at:  # until its brake is open the demand is 0
         return at
     share = 0.0 if at == last else max(t - knots[at], 0.0) / (knots[at + 1] - knots[at])
     rise = 0.0 if at == last or middle < knots[0] else h / (knots[at + 1] - knots[at])

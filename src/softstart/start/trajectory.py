@@ -175,7 +175,8 @@ class Trajectory:
         The `parts` of the state are twists, speeds, realised torque of the motor, and its angle.
         """
         when, begin = (np.ascontiguousarray(instants, dtype=np.float64) for instants in (times, marks))
-        demand = np.array(knots, dtype=np.float64)  # a copy: the kernel takes no read-only numbers
+        # by the clock of the controller; a copy, as the kernel takes no read-only numbers
+        demand = np.array(knots, dtype=np.float64) + self.input.machine.begins_at
         columns = np.arange(demand.size) if owners is None else np.ascontiguousarray(owners, dtype=np.int64)
         masses, count = self.input.count, int(columns[-1]) + 1
         first, end, _ = parts.indices(2 * masses + 1)

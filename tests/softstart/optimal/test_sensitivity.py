@@ -86,6 +86,7 @@ DRIVES: dict[str, Drive] = {
         motor_friction=2.0, motor_viscous_friction=0.05, minimum_torque=-40.0
     ),
     "torque proving, from the flank": HELD.replace(start_position="driving-flank", torque_lag=0.01),
+    "the brake opens late": HELD.replace(release=0.02, opening_delay=0.02, torque_lag=0.01),
     "release, lag": HELD.replace(release=0.02, torque_lag=0.01, start_position="mid-gap"),
 }
 
