@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softstart.reporting.project import Project
-from softstart.reporting.resolution import Resolution
 from softstart.reporting.result import Report, report
+from softstart.start.resolution import Resolution
 
 __all__ = ["Project", "Report", "Resolution", "report"]

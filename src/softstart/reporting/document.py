@@ -20,11 +20,11 @@ from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, limit
-from softstart.reporting.inverters import at_inverters, gain_base, inverters, speed_values
-from softstart.reporting.resolution import rated_torque
+from softstart.reporting.inverters import at_inverters, inverters, speed_values
 from softstart.start import fatigue
 from softstart.start.comparison import Comparison
 from softstart.start.recommendation import SLOW
+from softstart.start.resolution import gain_base, rated_torque
 from softstart.vibration import natural_vibration
 from softstart.views import chains, drives, duties, starts, traces
 from softstart.views import fatigue as lives

@@ -8,26 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from softstart.drive import Drive
-from softstart.reporting.resolution import rated_torque
+from softstart.start.resolution import gain_base, rated_torque
 from softstart.views.numbers import RPM, short
 
 
 def inverters() -> dict[str, Any]:
     """Names of functions in manuals, and what a parameter means at an inverter."""
     return tomllib.loads((Path(__file__).parent / "inverters.toml").read_text("utf-8"))
-
-
-def gain_base(drive: Drive) -> tuple[float, str]:
-    """The gain in N m s/rad that is 1 per cent of torque per per cent of speed, and what 100 % speed is.
-
-    >>> base, what = gain_base(Drive.load("crane-4amtkf"))
-    >>> round(base, 4), what
-    (0.2591, 'rated speed')
-    """
-    rated, torque = drive.rated_speed, rated_torque(drive)[0]
-    if rated is None or not rated > 0.0:
-        return torque / float(drive.target_speed), "target speed"
-    return torque / float(rated), "rated speed"
 
 
 def speed_values(values: Mapping[str, float], drive: Drive) -> dict[str, str]:

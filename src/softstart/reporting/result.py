@@ -27,7 +27,6 @@ from softstart.input.files import write_whole
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.project import Project
-from softstart.reporting.resolution import Resolution
 from softstart.reporting.sheet import ParameterSheet, make_sheet
 from softstart.results import Result
 from softstart.start.comparison import (
@@ -45,6 +44,7 @@ from softstart.start.demand import ControllerLike
 from softstart.start.duty_comparison import DutyComparison, compare_duty
 from softstart.start.fatigue import Fatigue, fatigue, undamped
 from softstart.start.recommendation import Row
+from softstart.start.resolution import Resolution
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.numbers import DASH, percent

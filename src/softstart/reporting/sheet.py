@@ -12,26 +12,21 @@ import numpy as np
 
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
-from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
 from softstart.linear.view import loop_in_words
-from softstart.reporting.inverters import gain_base
-from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
+from softstart.start.resolution import Resolution, nearest_step, rated_torque
 from softstart.start.results import limited_time
 from softstart.start.run import Run
+from softstart.start.settings import EVEN, Setting, rounded_settings, step_multiple
 from softstart.start.simulation import simulate
-from softstart.views.numbers import RPM, decimals_of, digits, fixed, short, unit
 
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
-OFF_AT_0 = ("preload", "filter_time")  # 0 is none of it, not a value that may be half a step off
-GAIN = "N*m*s/rad"  # of a speed controller
-KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 NEIGHBOURS = 3  # rounded values up to which every combination of steps beside them is tried
 _DATA = {
@@ -44,90 +39,13 @@ _DATA = {
 # data that such a drive simply has not
 _LEFT_OUT_AT_0 = ("damping", "load_friction", "torque_noise", "computing_delay")
 _PROBE = 1e-3  # relative
-EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
 GEAR_COUNTS, GEAR_CYCLE = 4000.0, 3.3e-3  # DCS 500B: counts of the nominal torque, cycle at 50 Hz in s
-COARSE = 0.1  # a step above this share of the value is said to be coarse
 
 
 def kind_of(controller: Controller) -> str:
     """The name of the strategy behind a controller, tuned or not."""
     inner = getattr(controller, "controller", controller)
     return str(type(inner).name or type(inner).__name__)
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One value of a strategy in SI: exact, and rounded to `step` (None: taken as it is)."""
-
-    name: str
-    meaning: str
-    unit: str
-    exact: float | str
-    rounded: float | str
-    step: float | None
-    least: float = 0.0
-    most: float = math.inf
-
-    @property
-    def coarse(self) -> bool:
-        """Whether the step is large against the value."""
-        return (
-            isinstance(self.exact, float)
-            and self.step is not None
-            and self.step > COARSE * abs(self.exact) > 0.0
-        )
-
-    def beside(self, steps: float) -> float:
-        """The value so many steps beside the nearest one, within what the parameter may be."""
-        assert self.step is not None
-        assert isinstance(self.rounded, float)
-        most = max(self.most, self.rounded)
-        return min(max(self.rounded + steps * self.step, self.least), most) if steps else self.rounded
-
-    def summary(self) -> dict[str, Any]:
-        """As plain data."""
-        return {key: getattr(self, key) for key in ("name", "unit", "exact", "rounded", "step")}
-
-    def shown(self, drive: Drive) -> tuple[str, str, str, str]:
-        """What to set, its unit, the same in another one, and the exact value."""
-        if isinstance(self.exact, str) or isinstance(self.rounded, str):
-            return str(self.rounded), "", "", str(self.exact)
-        factor, name, other = 1.0, unit(self.unit), ""
-        if self.unit == "s":
-            factor, name = 1e3, "ms"
-        elif self.unit == "rad/s":
-            factor, name = (0.5 / math.pi, "Hz") if "frequency" in self.name else (RPM, "rpm")
-            other = f"{digits(self.rounded)} rad/s"
-        elif self.unit == "N*m":
-            rated, basis = rated_torque(drive)
-            percent = step_multiple(100.0 * self.rounded / rated, self.step and 100.0 * self.step / rated)
-            other = f"{percent} % of the {basis}"
-        elif self.unit == GAIN:
-            other = f"{digits(self.rounded / gain_base(drive)[0])} % of torque per % of speed"
-        value, exact = factor * self.rounded, short(float(f"{factor * self.exact:.5g}"))
-        if self.name in KEPT:
-            digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
-            most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
-            return f"≤ {short(float(f'{most:.3g}'))}", name, "", exact
-        text = short(float(f"{value:.4g}")) if self.step is None else step_multiple(value, factor * self.step)
-        return text, name, other, exact
-
-
-def step_multiple(value: float, step: float | None) -> str:
-    """A multiple of a step: all its decimals if the step is a short decimal, else those that tell it apart.
-
-    >>> step_multiple(62.0, 0.5), step_multiple(34.5683, 0.0238732), step_multiple(123.4567, 0.0238732)
-    ('62.0', '34.57', '123.46')
-    """
-    if not step:
-        return short(value)
-    step = float(f"{step:.9g}")
-    if decimals_of(step) <= 6 and step == float(f"{step:.4g}"):
-        return fixed(value, decimals_of(step))
-    order = math.floor(math.log10(abs(value))) if value else 0
-    if not -4 <= order <= 6:
-        return digits(value, 7)
-    return fixed(value, min(max(math.ceil(-math.log10(step)), 3 - order, 0), max(6 - order, 0)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -251,7 +169,7 @@ def make_sheet(
     drive = machine.design_drive
     ready, own = controller.set_up(drive)
     rated = rated_torque(drive)[0]
-    name, settings = label_of(exact.controller or controller), _settings(ready, drive, resolution)
+    name, settings = label_of(exact.controller or controller), rounded_settings(ready, drive, resolution)
     torque_step = resolution.step("", "N*m", rated) or 0.0
     sheet = ParameterSheet(
         name, kind_of(controller), settings, own, exact, torque_step, computes_with(ready, own)
@@ -273,32 +191,6 @@ def make_sheet(
     except (SimulationError, InputError) as error:
         sheet = replace(sheet, failure=" ".join(str(error).split()))
     return sheet
-
-
-def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> tuple[Setting, ...]:
-    rated, found = rated_torque(drive)[0], []
-    for name, declared in declared_parameters(ready).items():
-        value, unit, meaning = getattr(ready, name), declared.unit, declared.meaning
-        if value is None or declared.python_only:
-            continue
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            found.append(Setting(name, meaning, unit, str(value), str(value), None))
-            continue
-        number = float(value)
-        step = None if name in KEPT else resolution.step(name, unit, rated)
-        if unit == GAIN:  # in shares of per cent of torque per per cent of speed
-            step = resolution.share * gain_base(drive)[0]
-        if name in OFF_AT_0 and number == 0.0:
-            step = None
-        if step is None or not math.isfinite(number):
-            found.append(Setting(name, meaning, unit, number, number, None))
-            continue
-        least, most = declared.between or (-math.inf if number < 0.0 else 0.0, math.inf)
-        most = float(drive.maximum_torque) if unit == "N*m" else float(most)
-        rounded = nearest_step(number, step, max(most, 0.0))
-        least = min(float(least), rounded)
-        found.append(Setting(name, meaning, unit, number, rounded, step, least, most))
-    return tuple(found)
 
 
 def _alone(count: int) -> list[tuple[int, ...]]:

@@ -16,7 +16,7 @@ from softstart.reporting import report
 from softstart.reporting.choice import robustness
 from softstart.reporting.document import text_answer
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
-from softstart.reporting.sheet import Setting
+from softstart.start.settings import Setting
 
 from .conftest import Page
 

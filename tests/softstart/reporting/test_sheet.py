@@ -13,8 +13,8 @@ from softstart import Drive, InputError, compare, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import Resolution, report
-from softstart.reporting.resolution import nearest_step, rated_torque
 from softstart.reporting.sheet import make_sheet
+from softstart.start.resolution import nearest_step, rated_torque
 
 
 def sheet_of(name, steps, **parameters):

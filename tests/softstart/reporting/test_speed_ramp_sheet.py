@@ -8,8 +8,9 @@ from tests.softstart.reporting.conftest import Page
 from softstart import Drive, report, simulate
 from softstart.controller import make_controller
 from softstart.reporting import Resolution
-from softstart.reporting.inverters import at_inverters, gain_base, inverters, speed_values
+from softstart.reporting.inverters import at_inverters, inverters, speed_values
 from softstart.reporting.sheet import make_sheet
+from softstart.start.resolution import gain_base
 
 CRANE = Drive.load("crane-4amtkf")
 

@@ -121,6 +121,19 @@ def rated_torque(drive: Drive) -> tuple[float, str]:
     return (float(drive.Ms), "starting torque") if rated is None else (float(rated), RATED)
 
 
+def gain_base(drive: Drive) -> tuple[float, str]:
+    """The gain in N m s/rad that is 1 per cent of torque per per cent of speed, and what 100 % speed is.
+
+    >>> base, what = gain_base(Drive.load("crane-4amtkf"))
+    >>> round(base, 4), what
+    (0.2591, 'rated speed')
+    """
+    rated, torque = drive.rated_speed, rated_torque(drive)[0]
+    if rated is None or not rated > 0.0:
+        return torque / float(drive.target_speed), "target speed"
+    return torque / float(rated), "rated speed"
+
+
 def nearest_step(value: float, step: float, most: float = math.inf) -> float:
     """The nearest multiple of `step` up to `most`; what is not 0 stays at least one step.
 
