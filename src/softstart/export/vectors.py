@@ -220,7 +220,7 @@ def make_vectors(
         if failure is not None and scenario.name == "nominal":
             raise failure
         rows += _without_constant_tail(recorder.rows)
-    drive = sample.drive
+    drive = _of_block(machine)
     room = ROOM_FLOAT32 * max(abs(float(drive.maximum_torque)), abs(float(drive.minimum_torque)))
     return Vectors(input_names(sample.controller.sensors), tuple(rows), room if real == "float32" else 0.0)
 
