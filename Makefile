@@ -8,6 +8,7 @@
 #   make slow                  the tests that `make test` leaves out: each takes 0.5 s of processor time or more
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': its speed
+#   make export-test           exports by a C compiler, FMU simulator and parser; ONLY='-m slow': Arm in emulation
 #   make pictures              the pictures of the README (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
 #   make pythons               every library has a wheel for each Python that softstart supports
@@ -25,11 +26,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 # uv installs in a third of pip's time; where there is none for a machine, pip does it
 UV := $(BIN)/uv pip install --quiet --python $(BIN)/python
 install = ($(PIP) install --only-binary :all: uv && $(UV) --editable '$(1)') || $(PIP) install --editable '$(1)'
-EVERYTHING := .[dev,docs,page,package]
+EVERYTHING := .[dev,docs,page,package,export-test]
 
 unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would recompile all modules
 
-.PHONY: compare test slow check fuzz everything floors pythons serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test slow check fuzz everything floors pythons serve lint types layers page export-test pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
@@ -65,7 +66,7 @@ floors: $(FLOORS)/.installed
 
 everything: $(VENV)/.installed-test
 	@$(call install,$(EVERYTHING))
-	@touch $(addprefix $(VENV)/.installed-,dev docs ui page package)
+	@touch $(addprefix $(VENV)/.installed-,dev docs ui page package export-test)
 
 serve: $(VENV)/.installed-ui
 	$(BIN)/softstart serve
@@ -73,6 +74,9 @@ serve: $(VENV)/.installed-ui
 page: $(VENV)/.installed-page
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page -m "not slow and not alone" \
 		-o cache_dir=.pytest_cache/page $(ONLY)
+
+export-test: $(VENV)/.installed-export-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/export --export -m "not slow" $(ONLY)
 
 pictures: $(VENV)/.installed-page
 	SOFTSTART_PICTURES=docs/_static $(BIN)/python -m pytest -q tests/page/test_pictures.py --page
@@ -137,6 +141,10 @@ $(VENV)/.installed-ui: $(VENV)/.installed
 
 $(VENV)/.installed-page: $(VENV)/.installed-test
 	@$(call install,.[page])
+	@touch $@
+
+$(VENV)/.installed-export-test: $(VENV)/.installed-test
+	@$(call install,.[export-test])
 	@touch $@
 
 $(VENV)/.installed-package: $(VENV)/.installed-test

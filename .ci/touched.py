@@ -26,7 +26,7 @@ def git(*words: str) -> list[str]:
 
 def touched(changed: list[str]) -> list[str]:
     """Test files for changed files, all relative to the root of the repository."""
-    apart = ("tests/page/", "tests/docs/")  # have commands of their own: make page, make docs-commands
+    apart = ("tests/page/", "tests/export/", "tests/docs/")  # have commands of their own: make page, ...
     paths = (path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("test_*.py"))
     texts = {name: (ROOT / name).read_text() for name in paths if not name.startswith(apart)}
     found = {name for name in changed if name in texts}

@@ -44,6 +44,7 @@ SLOW = 0.5  # s of processor time from which on a test belongs to `make slow`
 # folders whose tests run only with their option
 OPTIONAL = {
     "page": ("--page", "with the tests of the page in Chromium, which need playwright (`make page`)"),
+    "export": ("--export", "with the tests of exports by compilers and simulators (`make export-test`)"),
     "docs": ("--docs-commands", "with the commands of the documentation (`make docs-commands`)"),
 }
 SHARED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
