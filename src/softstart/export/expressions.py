@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from softstart.controller.compiled import keep_state
 from softstart.errors import InputError
 from softstart.export.source import REMEDIES, leaves, parsed, python_function
 from softstart.export.statements import (
@@ -23,6 +24,7 @@ from softstart.export.statements import (
     Element,
     Expression,
     Field,
+    For,
     If,
     Kind,
     Place,
@@ -55,6 +57,7 @@ from softstart.export.values import (
     power,
     truth,
 )  # fmt: skip
+from softstart.kernel.block import clear, take_state
 from softstart.kernel.jit import as_record
 from softstart.kernel.motor import gauss
 
@@ -64,6 +67,9 @@ if TYPE_CHECKING:
 MATH = {
     "sqrt", "exp", "log", "expm1", "log1p", "sin", "cos", "tan", "atan", "atan2", "hypot", "pow", "copysign",
 }  # fmt: skip
+
+
+MOVES = {python_function(one) for one in (keep_state, take_state, clear)}
 
 
 class ExpressionReader:
@@ -423,20 +429,19 @@ class ExpressionReader:
         made = python_function(function)
         if made is None or made is function:
             self.fail(node, "a call of this", "call functions of math, or compiled ones (`@compiled`)")
-        if made.__name__ == "keep_state":
-            return self._keep_state(node, arguments)
+        if made in MOVES:
+            return self._move_state(node, made.__name__, arguments)
         return self._invoke(node, made, arguments)
 
     def _record(self, node: ast.Call) -> Value:
         row, dtype = self.read_all(node.args)
         if isinstance(row, Row):
             row = row.head if row.head is not None else row
-        if (
-            isinstance(row, Expression)
-            and isinstance(dtype, Known)
-            and row.type == self.translator.structs.of(dtype.thing)
-        ):
-            return row
+        if isinstance(row, Expression) and isinstance(row.type, Struct) and isinstance(dtype, Known):
+            asked = self.translator.structs.of(dtype.thing)
+            same = [member.name for member in row.type.members[: len(asked.members)]]
+            if row.type == asked or same == [member.name for member in asked.members]:
+                return row  # it, or what it begins with
         self.fail(node, "another record than what is given", "use the records that `compiled_step` is given")
 
     def _plain(self, node: ast.Call, function: Any, arguments: list[Value]) -> Value | None:
@@ -480,19 +485,46 @@ class ExpressionReader:
                 return applied(name, numbers)
         self.fail(node, f"the function {name}", "use functions of math")
 
-    def _keep_state(self, node: ast.Call, arguments: list[Value]) -> Value:
-        state, command = (one.head if isinstance(one, Row) else one for one in arguments)
-        if (
-            isinstance(state, Expression)
-            and isinstance(command, Expression)
-            and isinstance(state.type, Struct)
-        ):
-            self._note_change(command)
-            for member in state.type.members:
-                place: Place = Field(command, member.name, member.type)
-                value = Field(state, member.name, member.type)
-                self.out.append(Assign(place, value) if isinstance(member.type, str) else Copy(place, value))
+    def _move_state(self, node: ast.Call, name: str, rows: list[Value]) -> Value:
+        """`keep_state`, `take_state` and `clear`: all fields of the state, copied or 0."""
+        heads = [row.head if isinstance(row, Row) else row for row in rows]
+        for one in heads:
+            if one is not None and not (isinstance(one, Expression) and isinstance(one.type, Struct)):
+                self.fail(node, "this call", "hand on rows that have records")
+        structs = [one for one in heads if isinstance(one, Expression)]
+        if len(structs) < len(rows):
+            return Tuple(())  # a strategy without a state
+        state, command = (structs[-1], structs[0]) if name != "keep_state" else (structs[0], structs[1])
+        assert isinstance(state.type, Struct)
+        target = command if name == "keep_state" else state
+        self._note_change(target)
+        for member in state.type.members:
+            place = Field(target, member.name, member.type)
+            source = Field(state if name == "keep_state" else command, member.name, member.type)
+            if name == "clear":
+                self._clear(place)
+            else:
+                self.out.append(
+                    Assign(place, source) if isinstance(member.type, str) else Copy(place, source)
+                )
         return Tuple(())
+
+    def _clear(self, place: Place) -> None:
+        """0 in a number, a record or an array."""
+        if isinstance(place.type, str):
+            self.out.append(Assign(place, converted(Constant(0, "whole"), place.type)))
+        elif isinstance(place.type, Struct):
+            for member in place.type.members:
+                self._clear(Field(place, member.name, member.type))
+        else:
+            element, (size, *rest) = place.type.element, place.type.shape
+            outer, self.out = self.out, []
+            index = Variable(f"{TEMPORARY}{len(place.type.shape)}_at", "whole")
+            self.kinds[index.name] = "whole"
+            self._clear(Element(place, (index,), Array(element, tuple(rest)) if rest else element))
+            body, self.out = tuple(self.out), outer
+            zero, end = Constant(0, "whole"), Constant(size, "whole")
+            self.out.append(For(index, zero, end, 1, body))
 
     def _invoke(self, node: ast.Call, function: Callable[..., Any], arguments: list[Value]) -> Value:
         def fail(sentence: str) -> NoReturn:

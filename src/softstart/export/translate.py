@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from softstart.errors import InputError
 from softstart.export.expressions import ExpressionReader
 from softstart.export.simplify import simplified
-from softstart.export.source import parsed
+from softstart.export.source import parsed, python_function
 from softstart.export.statements import (
     Array,
     Assign,
@@ -101,15 +101,19 @@ class Translator:
 
     def masked(self, function: Callable[..., Any]) -> set[str]:
         """Parameters whose bits are read: the function is translated for each of their values."""
-        if function not in self._masks:
-            self._masks[function] = {
-                one.id
-                for node in ast.walk(parsed(function))
-                if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitAnd)
-                for one in (node.left, node.right)
-                if isinstance(one, ast.Name)
-            }
-        return self._masks[function]
+        if function in self._masks:
+            return self._masks[function]
+        masks = self._masks[function] = set()
+        for node in ast.walk(parsed(function)):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitAnd):
+                masks |= {one.id for one in (node.left, node.right) if isinstance(one, ast.Name)}
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                called = python_function(function.__globals__.get(node.func.id))
+                names = inspect.signature(called).parameters if called and called is not function else ()
+                handed = [one.id if isinstance(one, ast.Name) else "" for one in node.args]
+                bits = self.masked(called) if called and called is not function else set()
+                masks |= {one for one, name in zip(handed, names, strict=False) if one and name in bits}
+        return masks
 
     def program(self, entry: Function) -> Program:
         """All that the entry needs, with names that differ from one another."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 from numba import from_dtype
@@ -19,6 +19,11 @@ MOST_PENDING: Final = 16  # answers of a controller that may wait for their comp
 MOST_POINTS: Final = 16  # of a load curve
 MOST_NOTED: Final = 2 * MOST_MASSES + 16  # events at one instant
 
+Double = Annotated[float, "double"]
+"""Of a field: 64 bits in single-precision exports too, as clocks and angles need."""
+_KINDS: dict[Any, str] = {"int": "whole", "bool": "truth", "Double": "double", int: "whole", bool: "truth"}
+_KINDS[Double] = "double"
+
 Part = int | tuple[int, ...] | np.dtype[np.void]
 Record = Any  # a record of one of these types, in compiled code
 
@@ -27,7 +32,8 @@ def record(*fields: type, whole: Sequence[str] = (), **parts: Part) -> np.dtype[
     """The NumPy type of a record: a float64 for each field of the classes, in order.
 
     A field named in `parts` is an array of so many numbers or of this shape, or a record within the record;
-    those named in `whole` hold int64.
+    those named in `whole` hold int64. Exports keep a field that is declared as `int`, `bool` or `Double` as a
+    whole number, a truth, or a number of 64 bits.
 
     >>> class Point:
     ...     x: float
@@ -42,7 +48,10 @@ def record(*fields: type, whole: Sequence[str] = (), **parts: Part) -> np.dtype[
         types.append((name, number, part) if isinstance(part, int | tuple) else (name, part or number))
     # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
     known = f"{fields[-1].__module__}.{fields[-1].__qualname__}".replace(".", "_")
-    scalar = type(known, (np.void,), {name: _field(name) for name, *_ in types} | {"__module__": __name__})
+    kinds = {name: _KINDS.get(kind, "real") for one in fields for name, kind in one.__annotations__.items()}
+    members = {name: _field(name) for name, *_ in types}
+    about = {"__module__": __name__, "kinds": kinds, "classes": fields}  # for exports
+    scalar = type(known, (np.void,), members | about)
     globals()[known] = scalar  # where another process finds it
     return np.dtype((scalar, np.dtype(types)))
 
@@ -93,7 +102,7 @@ class MachineRecord:
 class GuardLimits:
     """What is guarded under a sampled controller; see `kernel.guard`."""
 
-    period: float  # of the samples, s; 0 is not guarded
+    period: Double  # of the samples, s; 0 is not guarded
     low: float  # limits of the torque, N m
     high: float
     lag: float  # of the realised torque, with its decay in a period
@@ -115,17 +124,17 @@ class GuardLimits:
 class GuardState:
     """What has been seen so far."""
 
-    fault: float
+    fault: int
     begun: float
-    time: float  # of the last sample, with what was measured
-    angle: float
+    time: Double  # of the last sample, with what was measured
+    angle: Double
     torque: float
-    due: float  # when the next sample is due
+    due: Double  # when the next sample is due
     fastest: float  # speed so far
     moved: float
     still_speed: float  # that the machine should have, while the encoder stands still
     still_way: float
-    window: float  # beginning of the younger of two windows of demands, with their bounds
+    window: Double  # beginning of the younger of two windows of demands, with their bounds
     recent_high: float
     recent_low: float
     older_high: float
@@ -384,8 +393,8 @@ class Measured(NamedTuple):
     The stages: [G].
     """
 
-    time: float
-    motor_angle: float
+    time: Double
+    motor_angle: Double
     motor_speed: float
     motor_torque: float
     stage: float = math.nan
@@ -393,14 +402,14 @@ class Measured(NamedTuple):
     load_speed: float = math.nan
     run: float = 1.0
     set_speed: float = math.nan
-    command_time: float = math.nan
+    command_time: Double = math.nan
 
 
 class Reply:
     """What a controller answers; its new state follows."""
 
     torque: float
-    ask_again: float
+    ask_again: Double
     slope: float
 
 

@@ -8,24 +8,31 @@ from typing import NamedTuple
 import numpy as np
 
 from softstart.controller.base import (
-    NEVER,
-    SAME_SAMPLE,
     CompiledController,
     Controller,
     PlainController,
-    Sensor,
     period_of,
     reply_of,
-)  # fmt: skip
+)
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.kernel import records as rec
-from softstart.kernel.guard import FAULTS, bounded, check_row, follow_row
-from softstart.kernel.motor import M_MOTOR_ANGLE, M_RUN, M_SET_SPEED, M_STAGE, M_TIME, NEW_STATE
+from softstart.kernel.block import (
+    BLOCK_INPUT,
+    BLOCK_LIMITS,
+    BLOCK_OUTPUT,
+    BLOCK_STATE,
+    after_plain_step,
+    before_plain_step,
+    run_block,
+)  # fmt: skip
+from softstart.kernel.guard import FAULTS
+from softstart.kernel.motor import NEW_STATE
 from softstart.quantities import time_above_0
 from softstart.start.kernel_input import kernel_input
 
 CYCLE = 0.001  # s, of strategies that are not sampled
+LOST = 2**31  # cycles that have passed when the time is no number
 
 
 class BlockOutput(NamedTuple):
@@ -47,70 +54,73 @@ class ControlBlock:
     def __init__(self, controller: Controller, drive: Drive, period: float | None = None) -> None:
         self.controller, self.drive = controller.set_up(drive)
         self.period = period or period_of(self.controller) or CYCLE
-        self.compiled = isinstance(self.controller, CompiledController)
+        self.sees = int(self.controller.sensors)
         if isinstance(self.controller, CompiledController):
             self._kernel = self.controller.compiled_kernel()
-            self._numbers = np.array(self.controller.vector(self.drive), dtype=np.float64).ravel()
-            self._first = np.zeros(self.controller.state_size)
+            self.parameters = np.array(self.controller.vector(self.drive), dtype=np.float64).ravel()
+            self._state = np.zeros(self.controller.state_size)
         elif isinstance(self.controller, PlainController):
-            self._plain, self._first = self.controller, np.array(self.controller.initial_state, dtype=float)
+            self._plain = self.controller
+            self._state = np.array(self.controller.initial_state, dtype=float)
         else:
             raise InputError("controller: derive it from PlainController or CompiledController.")
-        self._limits, self._watch = np.zeros(rec.size(rec.GUARD_LIMITS)), np.zeros(rec.size(rec.GUARD_STATE))
-        limits = self._limits.view(rec.GUARD_LIMITS)
-        limits[0] = kernel_input(drive).guarded(self.period).machine.guard
-        limits["commanded"] = self.controller.can_stop or self.controller.can_reverse
-        self._low, self._high = float(limits["low"][0]), float(limits["high"][0])
-        self._runs, self._code = False, 0
-        self._begin(0.0, 0.0)
-
-    def _begin(self, time: float, angle: float) -> None:
-        """A new start, here and now."""
-        self._watch[:] = 0.0
-        self._state = self._first.copy()
-        self._time, self._angle = time, angle
-        self._asked, self._ask_at, self._torque, self._slope, self._stage = 0.0, 0.0, 0.0, 0.0, math.nan
+        self.limits = _limits(self.controller, self.drive, self.period)
+        self._block = np.zeros(rec.size(BLOCK_STATE))
+        self._command = np.zeros(NEW_STATE + self._state.size)
+        self._measured = np.zeros(rec.size(rec.MEASURED))
+        self._input, self._output = np.zeros(rec.size(BLOCK_INPUT)), np.zeros(rec.size(BLOCK_OUTPUT))
+        self._time: float | None = None  # of the first cycle
+        self._cycles = 0  # since then
 
     def step(self, measured: rec.Measured) -> BlockOutput:
-        """One cycle: what is measured, and what is then demanded."""
-        row = np.array(measured, dtype=np.float64)
-        reverses = float(row[M_SET_SPEED]) * self.drive.target_speed < 0.0
-        runs = bool(row[M_RUN] == 1.0) and (self.controller.can_reverse or not reverses)
-        if runs and not self._runs and (self._code or not self.controller.can_stop):
-            self._begin(float(row[M_TIME]), float(row[M_MOTOR_ANGLE]))
-        self._runs = runs
-        self._code = int(check_row(self._limits, self._watch, row, int(self.controller.sensors)))
-        torque, now = 0.0, float(row[M_TIME])
-        if self._code == 0:
-            if runs or self.controller.can_stop:
-                torque = self._demand(row)
-            follow_row(self._limits, self._watch, torque, now + self.period, 0.0)
-            self._code = int(self._watch.view(rec.GUARD_STATE)[0].fault)  # no number is demanded
-        return BlockOutput(float(bounded(torque, self._low, self._high)), FAULTS[self._code])
+        """One cycle: what is measured, and what is then demanded.
 
-    def _demand(self, row: np.ndarray) -> float:
-        """The demand now: of the strategy if it is to be asked, else the line that it has answered."""
-        row = row.copy()
-        row[M_TIME] -= self._time
-        row[M_MOTOR_ANGLE] -= self._angle
-        now = float(row[M_TIME])
-        seen, self._stage = self._stage, float(row[M_STAGE])
-        event = self.controller.sensors & Sensor.STAGE and seen != self._stage and self._ask_at != NEVER
-        if event or (self._ask_at != NEVER and now >= self._ask_at - SAME_SAMPLE * self.period):
-            self._asked = now
-            self._ask(row)
-        return self._torque if self._slope == 0.0 else self._torque + self._slope * (now - self._asked)
+        Its time only tells how many cycles have passed; the block itself counts the time of the command.
+        """
+        since = (measured.time - (self._time or 0.0)) / self.period
+        if self._time is None:
+            self._time, since = measured.time, 0.0
+        cycles = round(since) - self._cycles if math.isfinite(since) else LOST
+        self._cycles = round(since) if math.isfinite(since) else self._cycles
+        self._input[:] = (
+            measured.run, measured.set_speed, measured.motor_angle, measured.motor_speed,
+            measured.motor_torque, measured.stage, measured.shaft_torque, measured.load_speed,
+            cycles,
+        )  # fmt: skip
+        if isinstance(self.controller, CompiledController):
+            run_block(
+                self._kernel, self.sees, self.limits, self.parameters, self._block, self._state,
+                self._command, self._measured, self._input, self._output,
+            )  # fmt: skip
+        else:
+            self._plain_step()
+        torque, fault = self._output.tolist()
+        return BlockOutput(torque, FAULTS[int(fault)])
 
-    def _ask(self, row: np.ndarray) -> None:
-        if not self.compiled:
-            measured, state = rec.Measured(*row.tolist()), tuple(self._state.tolist())
-            self._torque, self._ask_at, after, self._slope = reply_of(self._plain, measured, state)
+    def _plain_step(self) -> None:
+        """The same with a strategy in plain Python."""
+        asked = before_plain_step(
+            self.limits, self._block, self._state, self._measured, self._input, self.sees
+        )
+        if asked and self._block.view(BLOCK_STATE)[0].asked == 0.0 == self._measured[0]:
+            self._state = np.array(self._plain.initial_state, dtype=float)
+        if asked:
+            measured, state = rec.Measured(*self._measured.tolist()), tuple(self._state.tolist())
+            torque, ask_at, after, slope = reply_of(self._plain, measured, state)
+            self._command[:NEW_STATE] = torque, ask_at, slope
             self._state = np.array(after, dtype=np.float64)
-            return
-        command = np.zeros(NEW_STATE + self._state.size)
-        self._kernel(self._numbers, row, self._state, command)
-        self._torque, self._ask_at, self._slope = command[:NEW_STATE].tolist()
-        self._state = command[NEW_STATE:].copy()
+        after_plain_step(self.limits, self._block, self._measured, self._command, asked, self._output)
+
+
+def _limits(controller: Controller, drive: Drive, period: float) -> np.ndarray:
+    """The numbers of the block that drive and strategy give."""
+    row = np.zeros(rec.size(BLOCK_LIMITS))
+    limits = row.view(BLOCK_LIMITS)[0]
+    limits["guard"] = kernel_input(drive).guarded(period).machine.guard
+    limits["guard"]["commanded"] = controller.can_stop or controller.can_reverse
+    limits["period"], limits["forward"] = period, math.copysign(1.0, drive.target_speed)
+    limits["can_stop"], limits["can_reverse"] = controller.can_stop, controller.can_reverse
+    return row
 
 
 def control_block(controller: Controller, drive: Drive, period: float | str | None = None) -> ControlBlock:
