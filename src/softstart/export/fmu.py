@@ -25,7 +25,7 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from softstart import __version__
-from softstart.export.statements import Kind
+from softstart.export.statements import Kind, Struct
 
 Version = Literal["2.0", "3.0"]
 COMPILERS = ("gcc", "cc", "clang")
@@ -91,6 +91,30 @@ class Model:
         return self.inputs + self.outputs
 
 
+def signals(struct: Struct, starts: Mapping[str, float] | None = None) -> tuple[Signal, ...]:
+    """The members of a structure of the C code as signals, but for `cycles`.
+
+    A unit stands before or behind a comma of the comment of the member.
+
+    >>> from softstart.export.statements import Member, Struct
+    >>> members = Member("speed", "real", "of the motor, rad/s"), Member("cycles", "whole", "1 normally")
+    >>> signals(Struct("Input", members), {"speed": 2.0})
+    (Signal(name='speed', kind='real', unit='rad/s', description='of the motor', start=2.0),)
+    """
+    found = []
+    for member in struct.members:
+        if member.name == "cycles":
+            continue
+        parts = member.comment.split(", ")
+        unit = next((part for part in parts if part in UNITS), "")
+        description = ", ".join(part for part in parts if part != unit)
+        assert isinstance(member.type, str), f"{member.name}: a signal is a number"
+        found.append(
+            Signal(member.name, member.type, unit, description, (starts or {}).get(member.name, 0.0))
+        )
+    return tuple(found)
+
+
 @dataclass(frozen=True)
 class FmuFile:
     """The bytes of an FMU, and why it has no binary, "" if it has one."""
@@ -106,14 +130,15 @@ def fmu(model: Model, version: Version) -> FmuFile:
     """
     source = f"softstart_fmi{version[0]}.c"
     folder = resources.files("softstart.export") / "fmi"
+    readme = f"{model.readme}\n{about(model)}"
     files = {
         **{f"sources/{name}": text for name, text in model.sources.items()},
         **{
             f"sources/{name}": (folder / name).read_text(encoding="utf-8")
             for name in ("softstart_fmu.c", source)
         },
-        "documentation/README.md": model.readme,
-        "documentation/index.html": _page(model),
+        "documentation/README.md": readme,
+        "documentation/index.html": _page(model, readme),
     }
     token = _token(model, version, files)
     files["sources/softstart_model.h"] = model_header(model, token)
@@ -142,11 +167,41 @@ def _token(model: Model, version: Version, files: Mapping[str, str]) -> str:
     return str(uuid.uuid5(uuid.NAMESPACE_URL, whole.hexdigest()))
 
 
-def _page(model: Model) -> str:
+def about(model: Model) -> str:
+    """The section of the documentation that says how a simulator uses the FMU."""
+    lines = ["## As an FMU", ""]
+    if model.period:
+        lines += [
+            f"The communication step is {model.period!r} s, the period of the control. In each step the",
+            "inputs as they are at its begin are sampled, and the outputs change. A longer step, a whole",
+            "multiple of the period, stands for missed samples; another one is refused. A simulator that",
+            "hands outputs on only after the step of all FMUs adds a dead time of one period.",
+        ]
+    else:
+        lines += [
+            "Communication steps have any length above 0; the inputs are held over a step. The solution does",
+            "not depend on the steps, but for the instants at which the inputs change.",
+        ]
+    if model.ended:
+        lines += [f"The simulation ends when `{model.ended}` becomes true."]
+    lines += [
+        "The state can be saved, restored and serialised.",
+        "",
+        "| variable | causality | unit | meaning |",
+    ]
+    lines += ["|---|---|---|---|"]
+    for number, signal in enumerate(model.signals):
+        side = "input" if number < len(model.inputs) else "output"
+        start = f" (start value {_start(signal)})" if side == "input" else ""
+        lines.append(f"| `{signal.name}` | {side} | {signal.unit} | {signal.description}{start} |")
+    return "\n".join(lines) + "\n"
+
+
+def _page(model: Model, readme: str) -> str:
     """The page that simulators show as documentation."""
     name = html.escape(model.name)
     head = f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{name}</title></head>\n'
-    return f"{head}<body><pre>\n{html.escape(model.readme)}</pre></body></html>\n"
+    return f"{head}<body><pre>\n{html.escape(readme)}</pre></body></html>\n"
 
 
 def model_header(model: Model, token: str) -> str:
