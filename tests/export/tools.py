@@ -9,7 +9,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 COMMANDS = ("gcc", "cmake", "arm-none-eabi-gcc", "qemu-system-arm", "SOFTSTART_ST_COMPILER")
-LIBRARIES = ("fmpy", "tree-sitter")
+LIBRARIES = ("fmpy", "tree-sitter", "tree-sitter-iec61131-3-st", "xmlschema")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off")
 
 
