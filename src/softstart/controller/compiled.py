@@ -86,6 +86,7 @@ def compiled_step(parameters: Any = None, state: Any = None) -> Any:
     def with_records(function: Callable[..., None]) -> Any:
         step = _compiled(function)
         step.records = parameters, 0 if state is None else size(state)
+        step.state_record = state
         return step
 
     return with_records

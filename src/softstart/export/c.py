@@ -116,6 +116,7 @@ class CWriter:
         self.types: dict[Any, str] = {
             "truth": "int", "whole": "int64_t", "real": f"{prefix}_real", "double": "double",
         }  # fmt: skip
+        self.renamed: dict[str, str] = {}  # names of structures
         self.helpers: dict[str, str] = {}
 
     # types ------------------------------------------------------------------------------------------
@@ -123,7 +124,7 @@ class CWriter:
     def type_of(self, kind: Type) -> str:
         """The name of a type; of an array, that of its elements."""
         if isinstance(kind, Struct):
-            return f"{self.prefix}_{kind.name}"
+            return f"{self.prefix}_{self.renamed.get(kind.name, kind.name)}"
         return self.type_of(kind.element) if isinstance(kind, Array) else self.types[kind]
 
     def declared(self, name: str, kind: Type) -> str:
@@ -368,26 +369,26 @@ class CWriter:
             if isinstance(member.type, Struct):
                 text = self.value(member.type, value, depth + 1)
             elif isinstance(member.type, Array):
-                text = self._nested(value, member.type)
+                text = self.nested(value, member.type)
             else:
                 text = self.constant(value, member.type)
             comment = f" /* {member.comment} */" if member.comment else ""
             lines.append(f"{pad}.{self.name(member.name)} = {text},{comment}\n")
         return "{\n" + "".join(lines) + "    " * (depth - 1) + "}"
 
-    def _nested(self, value: Any, kind: Array) -> str:
+    def nested(self, value: Any, kind: Array) -> str:
         if len(kind.shape) == 1:
             inner = [
                 self.constant(one, kind.element) if isinstance(kind.element, str) else one for one in value
             ]
         else:
-            inner = [self._nested(row, Array(kind.element, kind.shape[1:])) for row in value]
+            inner = [self.nested(row, Array(kind.element, kind.shape[1:])) for row in value]
         return "{ " + ", ".join(inner or ["0"]) + " }"
 
     def tables(self, tables: Mapping[str, tuple[Array, tuple[float, ...]]]) -> str:
         """Arrays of constants."""
         return "".join(
-            f"static const {self.declared(name, kind)} = {self._nested(values, kind)};\n"
+            f"static const {self.declared(name, kind)} = {self.nested(values, kind)};\n"
             for name, (kind, values) in tables.items()
         )
 

@@ -59,7 +59,7 @@ from softstart.export.values import (
 )  # fmt: skip
 from softstart.kernel.block import clear, take_state
 from softstart.kernel.jit import as_record
-from softstart.kernel.motor import gauss
+from softstart.kernel.motor import NEW_STATE, gauss
 
 if TYPE_CHECKING:
     from softstart.export.translate import Translator
@@ -493,6 +493,9 @@ class ExpressionReader:
                 self.fail(node, "this call", "hand on rows that have records")
         structs = [one for one in heads if isinstance(one, Expression)]
         if len(structs) < len(rows):
+            kinds = [one.type for one in structs]
+            if any(isinstance(kind, Struct) and len(kind.members) > NEW_STATE for kind in kinds):
+                self.fail(node, "a state without a record", "give `compiled_step` its record")
             return Tuple(())  # a strategy without a state
         state, command = (structs[-1], structs[0]) if name != "keep_state" else (structs[0], structs[1])
         assert isinstance(state.type, Struct)

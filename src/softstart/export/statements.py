@@ -237,6 +237,7 @@ class Program:
 
     structs: list[Struct] = field(default_factory=list)
     functions: list[Function] = field(default_factory=list)
+    tables: dict[str, tuple[Array, tuple[float, ...]]] = field(default_factory=dict)  # constant arrays
 
     @property
     def entry(self) -> Function:

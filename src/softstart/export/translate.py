@@ -99,6 +99,11 @@ class Translator:
             self._open.pop()
         return self._made[key]
 
+    @staticmethod
+    def constant(number: int) -> Constant:
+        """A whole number that is known."""
+        return Constant(number, "whole")
+
     def masked(self, function: Callable[..., Any]) -> set[str]:
         """Parameters whose bits are read: the function is translated for each of their values."""
         if function in self._masks:
@@ -128,7 +133,7 @@ class Translator:
             taken.add(function.name.lower())
             for variable in function.parameters:
                 _collect_structs(variable.type, structs)
-        return Program(list(structs.values()), functions)
+        return Program(list(structs.values()), functions, self.tables)
 
 
 def _collect(function: Function, found: list[Function]) -> None:

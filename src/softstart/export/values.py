@@ -263,6 +263,11 @@ class Structs:
         for prefix in ("softstart_controllers_", "softstart_kernel_records_", "softstart_kernel_"):
             base = base.removeprefix(prefix)
         words = [word[:1].upper() + word[1:] for word in base.split("_") if word]
+        words = [
+            word
+            for at, word in enumerate(words)
+            if not (at + 1 < len(words) and words[at + 1].startswith(word))
+        ]
         if dtype.names[:3] == ("torque", "ask_again", "slope") and len(dtype.names) > 3:
             words[-1:] = ["Command"]
         name, taken, count = "".join(words), {struct.name.lower() for struct in self._made.values()}, 2
