@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from softstart.export.block import KEPT, SCRATCH, BlockProgram
-from softstart.export.c import CWriter
+from softstart.export.c import STDC, CWriter
 from softstart.export.statements import Array, Struct
 from softstart.kernel.guard import FAULTS
 
 NAMES = {"given": "Input", "output": "Output"}
 KEPT_AS = {"block": "block", "state": "strategy"}
-STDC = """\
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#endif
-"""
 
 
 def block_c(block: BlockProgram, prefix: str, single: bool = False) -> dict[str, str]:

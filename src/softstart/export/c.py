@@ -95,6 +95,11 @@ static {t} {p}(const {t} seed, const {t} number)
     return ({t})(radius * cos(2.0 * 3.141592653589793 * (double)(b >> 11) * unit));
 }}""",
 }  # fmt: skip
+STDC = """\
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif
+"""
 LIBRARY = {
     "sqrt", "exp", "log", "expm1", "log1p", "sin", "cos", "tan", "atan", "atan2", "hypot", "pow", "copysign",
     "floor", "ceil", "nextafter",
@@ -136,6 +141,11 @@ class CWriter:
     def name(name: str) -> str:
         """A name that is no word of C."""
         return f"{name}_" if name in KEYWORDS else name
+
+    @staticmethod
+    def index(at: int) -> Constant:
+        """A constant index."""
+        return Constant(at, "whole")
 
     def struct(self, struct: Struct) -> str:
         """The definition of a structure."""

@@ -367,7 +367,6 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
 def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
     angular = s.by_angle[i] != 0.0
-    series = s.rotation[i] if angular else s.speed[i]
     faint = 1e-14 * h * influence(s, i) * (h if angular else 1.0)
     event = NO_EVENT
     for which in range(2):
@@ -376,7 +375,10 @@ def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, fl
         if piece < 0 or piece >= s.points[i]:
             continue
         point = s.at[i, piece]
-        set_line(s.f, series, n, sign * point, -sign)
+        if angular:
+            set_line(s.f, s.rotation[i], n, sign * point, -sign)
+        else:
+            set_line(s.f, s.speed[i], n, sign * point, -sign)
         zeros = 1 if s.passed[i] == -sign else 0
         if zeros == 0 and deviation_bound(s.f, n) < s.f[0]:
             continue

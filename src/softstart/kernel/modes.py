@@ -170,10 +170,10 @@ def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> Non
     for j in range(max(a - 1, 0), min(b + 1, s.n - 1)):
         s.leading_zeros[j] = 0  # speeds have jumped: nothing is zero by its nature any more
     for edge in range(2):
-        j = a - 1 if edge == 0 else b
-        if 0 <= j < s.n - 1 and s.mode[j] == PRESSED:
-            s.mode[j] = OPEN
-            note(s, s.time, OPENED, j, s.side[j], 0.0)
+        beside = a - 1 if edge == 0 else b
+        if 0 <= beside < s.n - 1 and s.mode[beside] == PRESSED:
+            s.mode[beside] = OPEN
+            note(s, s.time, OPENED, beside, s.side[beside], 0.0)
 
 
 @inner
