@@ -14,7 +14,7 @@ from softstart.controller import (
     compiled_step,
     parameter,
 )
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
+from softstart.controller.compiled import MEASURED, Double, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
 from softstart.kernel.motor import encoder_count
 from softstart_controllers.reduced import (
@@ -46,24 +46,24 @@ class Parameters:
 
     torque: float
     full_torque: float
-    period: float
+    period: Double
     J1: float
-    half: float
-    stride: float
+    half: int
+    stride: int
     threshold: float
-    wait: float
-    contact_timeout: float
+    wait: Double
+    contact_timeout: Double
 
 
 class State:
     """The free motor, and the ring of the last differences to it."""
 
-    sample: float
-    free_angle: float
-    free_speed: float
+    sample: int
+    free_angle: Double
+    free_speed: Double
     demand: float
     realised: float
-    raise_at: float
+    raise_at: Double
     ring: Vector
 
 

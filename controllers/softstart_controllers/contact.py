@@ -19,7 +19,7 @@ import math
 from typing import Any
 
 from softstart.controller import parameter
-from softstart.controller.compiled import Vector, compiled, inner, record
+from softstart.controller.compiled import Double, Doubles, Vector, compiled, inner, record
 from softstart.drive import Drive
 from softstart.kernel.motor import encoder_count
 from softstart_controllers.sampled import mean_torque
@@ -62,7 +62,7 @@ class Parameters:
     Mc and Mb are the load torque in forward and in backward motion (`load_acceleration`).
     """
 
-    period: float
+    period: Double
     Mc: float
     Mb: float
     load_speed: float
@@ -74,7 +74,7 @@ class Parameters:
     b_variance: float
     b_least: float
     b_most: float
-    samples: float
+    samples: int
     rounding: float
     detection_threshold: float
     free_noise: float
@@ -85,11 +85,11 @@ class Parameters:
     slew: float
     rate: float
     torque_lag: float
-    queued: float
+    queued: int
     rest: float
     wound: float
     proving: float
-    released: float
+    released: Double
     raising: float
 
 
@@ -104,17 +104,17 @@ class State:
     mean: float
     load_speed: float
     load_variance: float
-    load_time: float
+    load_time: Double
     b: float
     b_variance: float
-    kept: float
+    kept: int
     begun: float
     closed: float
     held: float
     free: Free
     now: Free
     shaft: ShaftEstimate
-    angles: Vector  # of the samples that `free` has not seen yet
+    angles: Doubles  # of the samples that `free` has not seen yet
     means: Vector
     leads: Vector
     contact_noises: Vector
@@ -282,7 +282,7 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, lead: float,
     m.means[kept] = mean
     m.leads[kept] = lead
     m.contact_noises[kept] = extra_noise
-    m.kept = kept + 1.0
+    m.kept = kept + 1
     free_after(p, m, kept + 1)
 
 
@@ -381,7 +381,7 @@ def opened(m: State, t: float) -> None:
     m.free.angle, m.free.speed = m.shaft.phi1, m.shaft.w1
     m.free.p00, m.free.p01, m.free.p11 = P[0, 0], P[0, 1], P[1, 1]
     m.free.p02, m.free.p12 = 0.0, 0.0
-    m.kept = 0.0
+    m.kept = 0
     copy(m.free, m.now)
 
 

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 
 from softstart import formulas
 from softstart.controller import CompiledController, Effort, Numbers, ParameterValues, parameter
-from softstart.controller.compiled import inner, record
+from softstart.controller.compiled import Double, inner, record
 from softstart.drive import Drive
 from softstart_controllers import contact
 from softstart_controllers.reduced import load_drift
@@ -45,7 +45,7 @@ class Parameters:
     approach_speed: float
     horizon: float
     drift: float
-    contact_timeout: float
+    contact_timeout: Double
     undetectable: float
 
 
@@ -53,7 +53,7 @@ class State:
     """The estimate, and how far the landing is."""
 
     estimator: contact.State
-    sample: float
+    sample: int
     phase: float
 
 
@@ -82,7 +82,7 @@ def landed(p: Parameters, x: State, m: Any) -> float:
 def sent(p: Parameters, x: State, torque: float, u: float) -> float:
     """Keep what this sample demands; the instant of the next one."""
     contact.send(p.estimator, x.estimator, torque, u)
-    x.sample += 1.0
+    x.sample += 1
     return x.sample * p.estimator.period
 
 

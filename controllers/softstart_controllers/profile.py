@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, compiled, record, size
+from softstart.controller.compiled import (
+    MEASURED,
+    NEVER,
+    Double,
+    Reply,
+    Vector,
+    as_record,
+    compiled,
+    record,
+    size,
+)
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.profile import TorqueProfile
@@ -21,18 +31,18 @@ FIRST, WAITING, SECOND = 0.0, 1.0, 2.0  # phases
 class Parameters:
     """Times and torques of the first profile follow, each in `room` places; then those of the second."""
 
-    period: float
-    knots: float
-    knots_after: float
-    room: float
+    period: Double
+    knots: int
+    knots_after: int
+    room: int
 
 
 class State:
     """The knot passed last, the phase, and the instant at which the second profile takes over."""
 
-    knot: float
+    knot: int
     phase: float
-    origin: float
+    origin: Double
 
 
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
@@ -41,7 +51,10 @@ N_PARAMETERS = size(PARAMETERS)
 
 @compiled
 def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot: int, y: Any) -> int:
-    """The line of the profile that holds at the instant y.ask_again, which becomes its end."""
+    """The line of the profile that holds at the instant y.ask_again, which becomes its end.
+
+    Its times are in `numbers` from `begin` on, its torques `room` places later.
+    """
     t = y.ask_again
     torques = begin + room
     while knot + 1 < count and origin + numbers[begin + knot + 1] <= t:
@@ -72,7 +85,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     t = m.time
     count_after = int(p.knots_after)
     room = int(p.room)
-    first = N_PARAMETERS
+    profiles = parameters[N_PARAMETERS:]
     knot = int(x.knot)
     phase = x.phase
     origin = x.origin
@@ -84,10 +97,10 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         knot = 0
     y.ask_again = t
     if phase == SECOND:
-        after = (parameters.shape[0] - first) // 2 - room
-        knot = play(parameters, first + 2 * room, after, count_after, origin, knot, y)
+        after = profiles.shape[0] // 2 - room
+        knot = play(profiles, 2 * room, after, count_after, origin, knot, y)
     else:
-        knot = play(parameters, first, room, int(p.knots), 0.0, knot, y)
+        knot = play(profiles, 0, room, int(p.knots), 0.0, knot, y)
         if phase == WAITING:
             y.ask_again = min(y.ask_again, origin)
     if y.ask_again == math.inf and (phase == SECOND or count_after == 0):

@@ -13,7 +13,16 @@ from softstart.controller import (
     compiled_step,
     parameter,
 )
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, inner, keep_state, record
+from softstart.controller.compiled import (
+    MEASURED,
+    Double,
+    Reply,
+    Vector,
+    as_record,
+    inner,
+    keep_state,
+    record,
+)
 from softstart.drive import Drive
 from softstart_controllers import contact
 from softstart_controllers.contact import (
@@ -53,7 +62,7 @@ class Parameters:
     delay: float
     damping_ratio: float
     stiffening: float
-    contact_timeout: float
+    contact_timeout: Double
     undetectable: float
 
 
@@ -61,14 +70,14 @@ class State:
     """The pulse and the hold."""
 
     estimator: contact.State
-    sample: float
+    sample: int
     phase: float
     held_back: float
     delay: float
     push: float
     level: float
     peak: float
-    openings: float
+    openings: int
     raised: float
 
 
@@ -111,7 +120,7 @@ def held_back(p: Parameters, m: State, u: float) -> float:
 def pulse(p: Parameters, m: State, b: float, u: float) -> float:
     """Torque in N m of the next sample: what the motor needs to its speed, less what is still to come."""
     a = m.estimator.free.inverse
-    wanted = m.estimator.load_speed + (gentle_speed(p, a, b) if m.openings > 0.0 else p.coast_speed)
+    wanted = m.estimator.load_speed + (gentle_speed(p, a, b) if m.openings > 0 else p.coast_speed)
     missing = (wanted - m.estimator.now.speed) / a - held_back(p, m, u)
     return min(max(missing / p.estimator.period, 0.0), p.Ms)
 
@@ -166,7 +175,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     if phase != RAISE:
         pulsing = 1.0 if phase == PULSE else 0.0
         event = observe(p.estimator, estimator, t, u, seen.motor_angle, seen.motor_speed, pulsing)
-    if m.sample == 0.0:
+    if m.sample == 0:
         phase = RAISE if p.undetectable != 0.0 else PULSE
         m.delay = p.delay
         m.held_back = -p.delay * u
@@ -180,7 +189,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         elif event == PUSHED:  # the load pushes the motor: there is no contact to wait for
             phase = RAISE
         elif event == OPENED:
-            m.openings += 1.0
+            m.openings += 1
             m.held_back = -m.delay * u
             phase = PULSE if m.openings <= MOST_OPENINGS else RAISE
     if t >= p.contact_timeout and phase != RAISE:
@@ -205,8 +214,8 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         demand = m.raised = min(m.raised + p.estimator.raising, p.Ms)
 
     m.torque = demand
-    m.ask_again = (m.sample + 1.0) * p.estimator.period
-    m.sample += 1.0
+    m.ask_again = (m.sample + 1) * p.estimator.period
+    m.sample += 1
     send(p.estimator, estimator, demand, u)
     m.phase = phase
 

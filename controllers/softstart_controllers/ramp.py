@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from softstart.controller import CompiledController, Effort, Numbers, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, record
+from softstart.controller.compiled import MEASURED, Double, Reply, Vector, as_record, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import full_torque_parameter, period_parameter, pulling_load
 
@@ -16,15 +16,15 @@ class Parameters:
 
     initial: float
     full_torque: float
-    time: float
+    time: Double
     rounding: float
-    period: float
+    period: Double
 
 
 class State:
     """How many samples were taken."""
 
-    sample: float
+    sample: int
 
 
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
@@ -37,7 +37,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     x = as_record(state, STATE)
     y = as_record(command, COMMAND)
     t = as_record(measured, MEASURED).time
-    y.sample = x.sample + 1.0
+    y.sample = x.sample + 1
     end = 0.5 * p.rounding  # each rounded end, as a share of the time
     if t < p.time:
         passed = t / p.time

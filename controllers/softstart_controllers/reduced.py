@@ -15,7 +15,7 @@ from typing import Any
 
 from softstart import formulas
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, NEVER, Reply, Vector, as_record, record
+from softstart.controller.compiled import MEASURED, NEVER, Double, Reply, Vector, as_record, record
 from softstart.drive import Drive
 from softstart.input.parameters import Limit
 from softstart_controllers.sampled import full_torque_parameter, pulling_load
@@ -29,13 +29,13 @@ class Parameters:
 
     torque: float
     full_torque: float
-    wait: float
+    wait: Double
 
 
 class State:
     """When the torque is raised; 0 before contact."""
 
-    raise_at: float
+    raise_at: Double
 
 
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)

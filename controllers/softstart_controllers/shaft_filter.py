@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.controller.compiled import compiled, inner
-from softstart.kernel.records import record
+from softstart.controller.compiled import Double, compiled, inner, record
 
 Matrix = NDArray[np.float64]
 N = 5
@@ -18,8 +17,8 @@ N = 5
 class Free:
     """The motor turning free: phi1, w1, 1/J1 and their covariances."""
 
-    angle: float
-    speed: float
+    angle: Double
+    speed: Double
     inverse: float
     p00: float
     p01: float
@@ -35,7 +34,7 @@ class ShaftEstimate:
     F and G are matrices to work in.
     """
 
-    phi1: float
+    phi1: Double
     w1: float
     z: float
     w2: float

@@ -32,15 +32,15 @@ class Parameters:
     """The landing and the steps."""
 
     landing: landing.Parameters
-    order: float
+    order: int
 
 
 class State:
     """The landing and the planned steps: levels of so many samples each, from the sample `first` on."""
 
     landing: landing.State
-    first: float
-    samples: float
+    first: int
+    samples: int
     levels: Vector
 
 
@@ -98,7 +98,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     elif now.phase == RAISING and y.torque == near.full_torque:
         now.phase = DONE
     elif now.phase == STEPPING:
-        level = int((now.sample - y.first) / y.samples)
+        level = int((now.sample - y.first) // y.samples)
         if level < int(p.order):
             y.torque = y.levels[level]
         else:

@@ -46,7 +46,6 @@ Measurement, and Control 112 (1990) 76-82. The state at contact and the closed f
 
 from __future__ import annotations
 
-import cmath
 import math
 
 from softstart.controller.compiled import compiled, inner
@@ -56,6 +55,7 @@ ROUNDING = 1e-9  # of the last level, by which levels may fall
 OVERSHOOT = 0.02  # of the last level, that T may leave its range by while the levels are played
 
 Levels = tuple[float, float, float, float]
+Complex = tuple[float, float]  # real and imaginary part: drives and PLCs have no complex numbers
 
 
 @compiled
@@ -75,47 +75,77 @@ def oscillation(z: float, v: float, mean: float, sigma: float, omega: float, s: 
 
 
 @compiled
-def vector(z: float, v: float, c: float, sigma: float, omega: float, lag: float, realised: float) -> complex:
+def product(x: Complex, y: Complex) -> Complex:
+    """Of two complex numbers.
+
+    >>> product((1.0, 2.0), (3.0, 4.0))
+    (-5.0, 10.0)
+    """
+    return x[0] * y[0] - x[1] * y[1], x[0] * y[1] + x[1] * y[0]
+
+
+@compiled
+def quotient(x: Complex, y: Complex) -> Complex:
+    """Of two complex numbers.
+
+    >>> quotient((-5.0, 10.0), (3.0, 4.0))
+    (1.0, 2.0)
+    """
+    square = y[0] * y[0] + y[1] * y[1]
+    return (x[0] * y[0] + x[1] * y[1]) / square, (x[1] * y[0] - x[0] * y[1]) / square
+
+
+@compiled
+def vector(z: float, v: float, c: float, sigma: float, omega: float, lag: float, realised: float) -> Complex:
     """W of the state: twist z, its rate v, mean torque `realised` by now; N m.
 
     >>> vector(0.0, 2.0, 10.0, 0.0, 5.0, 0.0, 3.0)
-    4j
+    (0.0, 4.0)
     """
-    pole = complex(sigma, omega)
     square = sigma * sigma + omega * omega
-    p = complex(v - sigma * z, omega * z)
-    return pole / square * (1.0 + pole * lag) * (c * p) + pole * (lag * realised)
+    lagging = product((sigma, omega), (1.0 + sigma * lag, omega * lag))
+    W = product(lagging, (v - sigma * z, omega * z))
+    share, pull = c / square, lag * realised
+    return share * W[0] + pull * sigma, share * W[1] + pull * omega
 
 
 @compiled
 def sensitivity(
     v: float, torque: float, inertia: float, sigma: float, omega: float, lag: float, realised: float
-) -> complex:
+) -> Complex:
     """D = dW/dlambda of a shaft that carries `torque` and twists at the rate v; N m s."""
-    pole = complex(sigma, omega)
-    return inertia * v * (1.0 + 2.0 * pole * lag) + lag * (realised - torque)
+    impact = inertia * v
+    return impact * (1.0 + 2.0 * sigma * lag) + lag * (realised - torque), impact * 2.0 * omega * lag
 
 
 @compiled
-def levels(order: int, W: complex, D: complex, last: float, sigma: float, omega: float, a: float) -> Levels:
+def levels(order: int, W: Complex, D: Complex, last: float, sigma: float, omega: float, a: float) -> Levels:
     """The levels that leave no swing, each for the time a; ZV has two.
 
-    >>> M0, M1, _, _ = levels(ZV, 0.4j, 0j, 1.0, 0.0, 2.0, 0.25 * math.pi)
+    >>> M0, M1, _, _ = levels(ZV, (0.0, 0.4), (0.0, 0.0), 1.0, 0.0, 2.0, 0.25 * math.pi)
     >>> round(M0, 12), round(M1, 12)
     (0.3, 0.7)
     """
-    E = cmath.exp(-complex(sigma, omega) * a)
-    Q = (-W - last * E**order) / (1.0 - E)
-    A1 = Q.imag / E.imag
-    A0 = Q.real - A1 * E.real
+    decay = math.exp(-sigma * a)
+    E = (decay * math.cos(omega * a), -decay * math.sin(omega * a))
+    rest = (1.0 - E[0], -E[1])
+    square = product(E, E)
     if order == ZV:
-        return A0, A1, last, last
-    slope = (D / (a * E) - order * last * E ** (order - 1) + Q) / (1.0 - E)
-    B = (slope - A1) / complex(0.0, 2.0 * E.imag)
-    B1 = B.imag / E.imag
-    B0 = B.real - B1 * E.real
-    m1 = 2.0 * E.real
-    m0 = E.real * E.real + E.imag * E.imag
+        Q = quotient((-W[0] - last * square[0], -W[1] - last * square[1]), rest)
+        A1 = Q[1] / E[1]
+        return Q[0] - A1 * E[0], A1, last, last
+    cube, fourth = product(square, E), product(square, square)
+    Q = quotient((-W[0] - last * fourth[0], -W[1] - last * fourth[1]), rest)
+    A1 = Q[1] / E[1]
+    A0 = Q[0] - A1 * E[0]
+    drift = quotient(D, (a * E[0], a * E[1]))
+    slope_0 = drift[0] - ZVD * last * cube[0] + Q[0]
+    slope_1 = drift[1] - ZVD * last * cube[1] + Q[1]
+    slope = quotient((slope_0, slope_1), rest)
+    B1 = 0.5 * (A1 - slope[0]) / (E[1] * E[1])
+    B0 = 0.5 * slope[1] / E[1] - B1 * E[0]
+    m1 = 2.0 * E[0]
+    m0 = E[0] * E[0] + E[1] * E[1]
     return A0 + B0 * m0, A1 - B0 * m1 + B1 * m0, B0 - B1 * m1, B1
 
 
@@ -143,19 +173,19 @@ def extremes(
 
 @compiled
 def plan_levels(
-    order: int, W: complex, D: complex, lowest: float, last: float, sigma: float, omega: float, period: float
+    order: int, W: Complex, D: Complex, lowest: float, last: float, sigma: float, omega: float, period: float
 ) -> tuple[int, float, float, float, float]:
     """Samples of each level and the levels; 0 samples where no plan has levels that rise.
 
     Nor may T leave the range from 0 to the last level meanwhile, once what the lag still owes is counted in.
 
-    >>> n, M0, M1, _, _ = plan_levels(ZV, 0j, 0j, 0.0, 1.0, 0.0, 2.0 * math.pi, 0.01)  # a quarter: 25 samples
-    >>> n, round(M0, 9), round(M1, 9)
+    >>> n, M0, M1, _, _ = plan_levels(ZV, (0.0, 0.0), (0.0, 0.0), 0.0, 1.0, 0.0, 2.0 * math.pi, 0.01)
+    >>> n, round(M0, 9), round(M1, 9)  # a quarter: 25 samples
     (25, 0.5, 0.5)
     """
-    p = W / complex(sigma, omega)  # of the state without lag that has this W
-    T = (sigma * sigma + omega * omega) * p.imag / omega
-    rate = (sigma * sigma + omega * omega) * (p.real + sigma * p.imag / omega)
+    p = quotient(W, (sigma, omega))  # of the state without lag that has this W
+    T = (sigma * sigma + omega * omega) * p[1] / omega
+    rate = (sigma * sigma + omega * omega) * (p[0] + sigma * p[1] / omega)
     slack = ROUNDING * abs(last)
     highest = max(T, last) + OVERSHOOT * abs(last)
     n = 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from softstart.controller import CompiledController, Effort, Numbers, compiled_step, parameter
 from softstart.controller.base import Regulation
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
+from softstart.controller.compiled import MEASURED, Double, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.kernel.motor import encoder_count
@@ -30,13 +30,13 @@ class Parameters:
 
     kp: float
     tn: float
-    period: float
+    period: Double
     filter_share: float  # of the distance to the measured speed, in a sample
     rate: float  # of the commanded speed, rad/s^2
     rounding: float
     inertia: float  # of the feed-forward, kg m2
     preload: float
-    preload_samples: float
+    preload_samples: int
     low: float  # limits of the torque, N m
     high: float
 
@@ -44,14 +44,14 @@ class Parameters:
 class State:
     """Loop and ramp; the ramp begins at the sample `begin`."""
 
-    sample: float
+    sample: int
     run: float
     set_speed: float
     taking_up: float  # 1 while the preload takes up the gap
-    begin: float
+    begin: int
     begin_speed: float
     speed: float  # filtered
-    integral: float  # N m
+    integral: Double  # N m; a sum over many samples
 
 
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Reply, State)
@@ -63,13 +63,13 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     p, x = as_record(parameters, PARAMETERS), as_record(state, STATE)
     m, y = as_record(measured, MEASURED), as_record(command, COMMAND)
     keep_state(state, command)
-    first = x.sample == 0.0
-    y.sample = x.sample + 1.0
+    first = x.sample == 0
+    y.sample = x.sample + 1
     y.ask_again = y.sample * p.period
     y.speed = m.motor_speed if first else x.speed + p.filter_share * (m.motor_speed - x.speed)
     y.run, y.set_speed = m.run, m.set_speed
     if m.run != 0.0 and (first or x.run == 0.0):
-        y.taking_up = 1.0 if p.preload_samples > 0.0 else 0.0
+        y.taking_up = 1.0 if p.preload_samples > 0 else 0.0
         y.begin, y.begin_speed = x.sample + p.preload_samples, y.speed
     elif m.run != x.run or (m.set_speed != x.set_speed and x.taking_up == 0.0):
         y.taking_up, y.begin, y.begin_speed = 0.0, x.sample, y.speed

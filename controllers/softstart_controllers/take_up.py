@@ -13,7 +13,7 @@ from softstart.controller import (
     compiled_step,
     parameter,
 )
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
+from softstart.controller.compiled import MEASURED, Double, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import (
     full_torque_parameter,
@@ -40,7 +40,7 @@ TAKING_UP, RISING, IMPATIENT = 0.0, 1.0, 2.0  # phases
 class Parameters:
     """Speeds, gains and times of `TakeUp`, and the gains of the observer before and after the load."""
 
-    period: float
+    period: Double
     J1: float
     c: float
     Mc: float
@@ -58,7 +58,7 @@ class Parameters:
     D1: float
     D2: float
     corner: float
-    contact_timeout: float
+    contact_timeout: Double
     first: Gains
     later: Gains
 
@@ -66,9 +66,9 @@ class Parameters:
 class State:
     """The estimate of motor angle and speed, T and T'; the impulse; the load's speed w2, as corrected."""
 
-    sample: float
+    sample: int
     phase: float
-    angle: float
+    angle: Double
     speed: float
     T: float
     rate: float
@@ -96,7 +96,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     keep_state(state, command)
     t, u, h = m.time, m.motor_torque, p.period
     phase = x.phase
-    if x.sample == 0.0:
+    if x.sample == 0:
         y.angle = m.motor_angle
         y.speed = m.motor_speed
     else:
@@ -137,8 +137,8 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         demand = y.low + (p.full_torque - y.low) * y.progress
 
     y.torque = min(max(demand, 0.0), p.Ms)
-    y.ask_again = (x.sample + 1.0) * h
-    y.sample = x.sample + 1.0
+    y.ask_again = (x.sample + 1) * h
+    y.sample = x.sample + 1
     y.demand = y.torque
     y.realised = u
     y.phase = phase

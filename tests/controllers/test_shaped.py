@@ -31,6 +31,7 @@ from softstart_controllers.shaping import (
 )
 
 FULL = 62.0
+NONE = (0.0, 0.0)
 
 
 def model(drive: Drive) -> tuple[float, float, float]:
@@ -85,10 +86,10 @@ def test_from_rest_they_are_the_textbooks(ratio: float) -> None:
     """Singer and Seering: amplitudes 1 : K and 1 : 2 K : K^2, half a damped period apart."""
     K = math.exp(-math.pi * ratio / math.sqrt(1.0 - ratio**2))
     sigma, omega = -ratio / math.sqrt(1.0 - ratio**2), 1.0
-    M = levels(ZV, 0j, 0j, 1.0, sigma, omega, 0.5 * math.pi)
+    M = levels(ZV, NONE, NONE, 1.0, sigma, omega, 0.5 * math.pi)
     assert M[:2] == pytest.approx((1.0 / (1.0 + K),) * 2, rel=1e-12)
     first, second = 1.0 / (1.0 + K) ** 2, (1.0 + 2.0 * K) / (1.0 + K) ** 2
-    M = levels(ZVD, 0j, 0j, 1.0, sigma, omega, 0.5 * math.pi)
+    M = levels(ZVD, NONE, NONE, 1.0, sigma, omega, 0.5 * math.pi)
     assert list(M) == pytest.approx([first, first, second, second], rel=1e-12)
 
 

@@ -13,11 +13,11 @@ from softstart.kernel.jit import OPTIONS, as_record, compiled_as, drop_stale
 from softstart.kernel.jit import unfused as compiled
 from softstart.kernel.jit import unfused_inner as inner
 from softstart.kernel.motor import NEW_STATE, STEP_SIGNATURE
-from softstart.kernel.records import MEASURED, Reply, record, size
+from softstart.kernel.records import MEASURED, Double, Doubles, Reply, record, size
 
 __all__ = [
-    "MEASURED", "NEVER", "Reply", "Vector", "as_record", "compiled", "compiled_step", "inner", "keep_state",
-    "record", "size",
+    "MEASURED", "NEVER", "Double", "Doubles", "Reply", "Vector", "as_record", "compiled", "compiled_step",
+    "inner", "keep_state", "record", "size",
 ]  # fmt: skip
 
 

@@ -13,6 +13,8 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 from numba import from_dtype
 
+from softstart.arrays import Vector
+
 MOST_MASSES: Final = 64
 ORDERS: Final = 36  # room for Taylor coefficients
 MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
@@ -23,6 +25,9 @@ Double = Annotated[float, "double"]
 """Of a field: 64 bits in single-precision exports too, as clocks and angles need."""
 _KINDS: dict[Any, str] = {"int": "whole", "bool": "truth", "Double": "double", int: "whole", bool: "truth"}
 _KINDS[Double] = "double"
+Doubles = Annotated[Vector, "double"]
+"""Of an array: the same for its numbers."""
+_KINDS |= {"Doubles": "double", Doubles: "double"}
 
 Part = int | tuple[int, ...] | np.dtype[np.void]
 Record = Any  # a record of one of these types, in compiled code
