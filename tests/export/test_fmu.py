@@ -116,9 +116,9 @@ def test_valid_without_a_message(model: Model, version: Version, tmp_path: Path)
 @pytest.mark.parametrize("model", [COUNT, TURN], ids=lambda model: model.prefix)
 def test_the_source_compiles_without_a_warning(model: Model, version: Version, tmp_path: Path) -> None:
     fmpy.extract(str(made(model, version, tmp_path)), tmp_path / "fmu")
-    source = f"softstart_fmi{version[0]}.c"
+    units = f"softstart_fmi{version[0]}.c", "softstart_model.c"
     tools.run(
-        "gcc", *tools.STRICT, "-Wpedantic", "-O2", "-fPIC", "-c", source, cwd=tmp_path / "fmu" / "sources"
+        "gcc", *tools.STRICT, "-Wpedantic", "-O2", "-fPIC", "-c", *units, cwd=tmp_path / "fmu" / "sources"
     )
 
 
@@ -348,7 +348,7 @@ def test_without_memory_errors(version: Version, tmp_path: Path) -> None:
     sources = tmp_path / "fmu" / "sources"
     (sources / "main.c").write_text(MAIN[version])
     flags = [*tools.STRICT, "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    tools.run("gcc", *flags, "main.c", "-o", "main", "-lm", cwd=sources)
+    tools.run("gcc", *flags, "main.c", "softstart_model.c", "-o", "main", "-lm", cwd=sources)
     assert tools.run(sources / "main") == "torque 4.82842712\n"
 
 

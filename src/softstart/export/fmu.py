@@ -128,14 +128,14 @@ def fmu(model: Model, version: Version) -> FmuFile:
 
     Without a C compiler, or elsewhere than on 64-bit Linux, it has the sources only; the note says so.
     """
-    source = f"softstart_fmi{version[0]}.c"
+    units = (f"softstart_fmi{version[0]}.c", "softstart_model.c")  # what is compiled
     folder = resources.files("softstart.export") / "fmi"
     readme = f"{model.readme}\n{about(model)}"
     files = {
         **{f"sources/{name}": text for name, text in model.sources.items()},
         **{
             f"sources/{name}": (folder / name).read_text(encoding="utf-8")
-            for name in ("softstart_fmu.c", source)
+            for name in ("softstart_fmu.c", *units)
         },
         "documentation/README.md": readme,
         "documentation/index.html": _page(model, readme),
@@ -143,17 +143,17 @@ def fmu(model: Model, version: Version) -> FmuFile:
     token = _token(model, version, files)
     files["sources/softstart_model.h"] = model_header(model, token)
     if version == "2.0":
-        files["modelDescription.xml"] = description_2(model, token, source)
+        files["modelDescription.xml"] = description_2(model, token, units)
     else:
         files["modelDescription.xml"] = description_3(model, token)
-        files["sources/buildDescription.xml"] = build_description(model, source)
+        files["sources/buildDescription.xml"] = build_description(model, units)
     contents = {name: text.encode() for name, text in files.items()}
     compiler, note = find_compiler()
     if compiler:
         sources = {
             name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")
         }
-        binary, note = compiled(compiler, sources, source)
+        binary, note = compiled(compiler, sources, units)
         if binary:
             contents[f"{BINARY[version]}/{model.prefix}.so"] = binary
     return FmuFile(packed(contents), note)
@@ -216,9 +216,7 @@ def model_header(model: Model, token: str) -> str:
             signal.kind, f"KIND_OF({of}_{side}, {signal.name})"
         )
         place = f"offsetof({of}_{side}, {signal.name})"
-        rows.append(
-            f"    {{{kind}, SIDE_{side.upper()}, {place}, {_number(signal.start)}}}, /* {number} */\n"
-        )
+        rows.append(f"    {{{kind}, SIDE_{side.upper()}, {place}, {_number(signal.start)}}}, /* {number} */")
     if model.period:
         first = "((void)(memory))"
         step = f"((memory)->input.cycles = (memory)->cycles, (void)(length), {call})"
@@ -227,7 +225,9 @@ def model_header(model: Model, token: str) -> str:
     return "".join(
         (
             f"/* Names and signals of {of}; generated. */\n",
-            f'#include "{of}.c"\n\n',
+            "#ifndef SOFTSTART_MODEL_H\n#define SOFTSTART_MODEL_H\n\n",
+            f'#include "{of}.h"\n\n',
+            f'#define MODEL_SOURCE "{of}.c"\n',
             f'#define MODEL_TOKEN "{token}"\n',
             f"#define MODEL_PERIOD {_number(model.period)} /* s, of a step; 0: any length */\n",
             *(f"#define MODEL_{word.upper()} {of}_{word}\n" for word in ("State", "Input", "Output")),
@@ -236,9 +236,9 @@ def model_header(model: Model, token: str) -> str:
             f"#define MODEL_STEP(memory, length) {step}\n",
             f"#define MODEL_ENDED(memory) "
             f"{f'((memory)->output.{model.ended} != 0)' if model.ended else '((void)(memory), false)'}\n\n",
-            "static const Variable variables[] = {\n",
-            *rows,
-            "};\n",
+            "#define MODEL_VARIABLES \\\n",
+            " \\\n".join(rows),
+            "\n\n#endif\n",
         )
     )
 
@@ -291,7 +291,7 @@ def _common(root: ElementTree.Element, model: Model) -> None:
     )
 
 
-def description_2(model: Model, token: str, source: str) -> str:
+def description_2(model: Model, token: str, units: tuple[str, ...]) -> str:
     """`modelDescription.xml` of FMI 2.0."""
     root = _root(model, "2.0", {"guid": token})
     interface = ElementTree.SubElement(
@@ -302,7 +302,9 @@ def description_2(model: Model, token: str, source: str) -> str:
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
     )
-    ElementTree.SubElement(ElementTree.SubElement(interface, "SourceFiles"), "File", name=source)
+    sources = ElementTree.SubElement(interface, "SourceFiles")
+    for name in units:
+        ElementTree.SubElement(sources, "File", name=name)
     _common(root, model)
     variables = ElementTree.SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
@@ -345,12 +347,13 @@ def description_3(model: Model, token: str) -> str:
     return _text(root)
 
 
-def build_description(model: Model, source: str) -> str:
+def build_description(model: Model, units: tuple[str, ...]) -> str:
     """`buildDescription.xml` of FMI 3.0."""
     root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
     build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=model.prefix)
     files = ElementTree.SubElement(build, "SourceFileSet", language="C99")
-    ElementTree.SubElement(files, "SourceFile", name=source)
+    for name in units:
+        ElementTree.SubElement(files, "SourceFile", name=name)
     return _text(root)
 
 
@@ -418,13 +421,13 @@ def find_compiler() -> tuple[list[str], str]:
     )
 
 
-def compiled(compiler: list[str], sources: Mapping[str, str], source: str) -> tuple[bytes, str]:
-    """The shared library, or why there is none; one source is compiled and includes the others."""
+def compiled(compiler: list[str], sources: Mapping[str, str], units: tuple[str, ...]) -> tuple[bytes, str]:
+    """The shared library, or why there is none; `units` are compiled and include the others."""
     with tempfile.TemporaryDirectory(prefix="softstart-fmu-") as name:
         folder = Path(name)
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8")
-        command = [*compiler, *FLAGS, source, "-o", "model.so", "-lm"]
+        command = [*compiler, *FLAGS, *units, "-o", "model.so", "-lm"]
         ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if ended.returncode:
             said = ended.stderr.strip().splitlines() or ["nothing"]

@@ -45,7 +45,8 @@ def test_without_a_compiler_there_are_the_sources(version: Version) -> None:
     source = f"softstart_fmi{version[0]}.c"
     wanted = {
         "modelDescription.xml", "documentation/README.md", "documentation/index.html", "sources/gentle.h",
-        "sources/gentle.c", "sources/softstart_model.h", "sources/softstart_fmu.c", f"sources/{source}",
+        "sources/gentle.c", "sources/softstart_model.h", "sources/softstart_fmu.c",
+        "sources/softstart_model.c", f"sources/{source}",
     }  # fmt: skip
     assert set(files) == wanted | ({"sources/buildDescription.xml"} if version == "3.0" else set())
     assert next(iter(files)) == "modelDescription.xml"
@@ -98,7 +99,8 @@ def test_variables_and_structure(version: Version, unknown: str) -> None:
 
 def test_the_header_says_how_the_code_is_called() -> None:
     text = module.model_header(MODEL, "a-token")
-    assert '#include "gentle.c"' in text
+    assert '#include "gentle.h"' in text
+    assert '#define MODEL_SOURCE "gentle.c"' in text
     assert '#define MODEL_TOKEN "a-token"' in text
     assert "(memory)->input.cycles = (memory)->cycles" in text
     assert "{KIND_TRUTH, SIDE_INPUT, offsetof(gentle_Input, run), 1.0}, /* 1 */" in text

@@ -1,7 +1,7 @@
 /* What FMI 2.0 and FMI 3.0 have in common: the memory of an instance, its variables, a step.
 
-   Included by softstart_fmi2.c and softstart_fmi3.c, each of which is compiled alone: the one source of its
-   FMU. softstart_model.h is generated; it tells the names, the variables and how the C code is called. */
+   Included by softstart_fmi2.c and softstart_fmi3.c. An FMU consists of one of these and softstart_model.c.
+   softstart_model.h is generated; it tells the names, the variables and how the C code is called. */
 
 #include <math.h>
 #include <stdarg.h>
@@ -11,12 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__)
-#pragma GCC optimize("fp-contract=off") /* no a * b + c in one rounding: same numbers on every machine */
-#endif
 
 typedef enum { KIND_FLOAT, KIND_DOUBLE, KIND_WHOLE, KIND_TRUTH } Kind;
 typedef enum { SIDE_INPUT, SIDE_OUTPUT } Side;
@@ -33,8 +27,6 @@ typedef struct {
 #define KIND_OF(structure, member) \
     (sizeof(((structure *)0)->member) == sizeof(float) ? KIND_FLOAT : KIND_DOUBLE)
 
-/* The C code of the model is part of this unit; only the functions of FMI are visible outside. The headers that
-   it includes stand above, so that they are not hidden. */
 #if defined(__GNUC__)
 #pragma GCC visibility push(hidden)
 #endif
@@ -42,6 +34,8 @@ typedef struct {
 #if defined(__GNUC__)
 #pragma GCC visibility pop
 #endif
+
+static const Variable variables[] = { MODEL_VARIABLES };
 
 #define VARIABLES (sizeof variables / sizeof variables[0])
 #define SAME 1e-3 /* of a step: rounding of communication points that are sums or products of steps */
