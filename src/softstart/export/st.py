@@ -7,6 +7,7 @@ could fail it is evaluated in an IF. Functions without a value answer TRUE, sinc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from softstart.export.st_expressions import Scope, assigned, needs_if
@@ -37,6 +38,15 @@ from softstart.export.statements import (
     Variable,
     While,
 )  # fmt: skip
+
+SENSED = ("stage", "shaft_torque", "load_speed")
+UNSEEN = Constant(math.inf, "real")  # of a sensor that is not there, NaN in Python; nothing reads it
+
+
+def _is_unseen(place: Expression, value: Expression) -> bool:
+    """Whether it stores what no sensor sees."""
+    is_nan = isinstance(value, Constant) and isinstance(value.value, float) and math.isnan(value.value)
+    return is_nan and isinstance(place, Field) and place.name in SENSED
 
 
 class FunctionWriter(Scope):
@@ -99,7 +109,7 @@ class FunctionWriter(Scope):
         """One statement."""
         match statement:
             case Assign(place, value):
-                value = self.settled(value)
+                value = UNSEEN if _is_unseen(place, value) else self.settled(value)
                 self.say(f"{self.write(place)} := {self.write(value)};")
             case Copy(place, value):
                 self.copy(place, value)

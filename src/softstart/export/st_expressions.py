@@ -127,13 +127,15 @@ class Scope:
         """Its text, and how strongly it holds together."""
         match expression:
             case Constant(value, kind):
-                return self._constant(value, kind), ATOM
+                return self.constant(value, kind), ATOM
             case Variable(name):
                 return self.names.of(name), ATOM
             case Field(base, name):
                 assert isinstance(base.type, Struct)
                 return f"{self.write(base)}.{self.text.field_name(base.type, name)}", ATOM
             case Element(base, indices):
+                if isinstance(base, Element) and isinstance(base.type, Array):  # of a row
+                    return self._written(Element(base.base, base.indices + indices, expression.type))
                 assert isinstance(base.type, Array)
                 if len(indices) != len(base.type.shape):
                     raise InputError(
@@ -151,7 +153,8 @@ class Scope:
             case Binary():
                 return self._binary(expression)
 
-    def _constant(self, value: float, kind: Kind) -> str:
+    def constant(self, value: float, kind: Kind) -> str:
+        """A number as it is written; notes that an infinity must be declared."""
         text = literal(value, kind, self.text.single)
         if INFINITY_NAME in text:
             real = self.text.type_name(kind)
@@ -183,7 +186,7 @@ class Scope:
         if before == after:
             return self._within(operand, ATOM)
         if isinstance(operand, Constant):
-            return self._constant(float(operand.value), kind)
+            return self.constant(float(operand.value), kind)
         if before == "BOOL":
             text = f"{self.text.helper('from_truth')}({self.write(operand)})"
             return text if after == "LINT" else f"LINT_TO_{after}({text})"
