@@ -460,9 +460,9 @@ def send(p: Parameters, m: State, demand: float, u: float) -> None:
 
 
 @compiled
-def predicted_state(p: Parameters, m: State, u: float) -> tuple[float, float, float, float]:
+def predicted_state(p: Parameters, m: State, realised: float) -> tuple[float, float, float, float]:
     """w1, z, w2 and motor torque when a demand made now begins to act; until then those sent before do."""
-    w1, z, w2 = m.shaft.w1, m.shaft.z, m.shaft.w2
+    u, w1, z, w2 = realised, m.shaft.w1, m.shaft.z, m.shaft.w2
     length = p.rest
     for i in range(int(p.queued), -1, -1):
         if length > 0.0:

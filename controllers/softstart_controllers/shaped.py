@@ -50,14 +50,14 @@ COMMAND = record(Reply, State, landing=landing.STATE, levels=4)
 
 
 @compiled
-def torque_after_contact(p: Parameters, u: float, y: State) -> float:
+def torque_after_contact(p: Parameters, realised: float, y: State) -> float:
     """Plan the steps from the state that the first of them meets, or let the swing die out; the torque now.
 
     With M = (u J2 + Mc J1)/(J1 + J2), the mean torque of the shaft under the motor torque u.
     """
     near, shaft = p.landing.estimator, y.landing.estimator.shaft
     a, b, c, d = near.a, shaft.b, near.c, near.d
-    w1, z, w2, u = predicted_state(near, y.landing.estimator, u)
+    w1, z, w2, u = predicted_state(near, y.landing.estimator, realised)
     if y.landing.estimator.held != 0.0:  # by the brake, under the torque that holds the load
         return p.landing.low_torque
     if near.Mb != near.Mc and w2 == 0.0 and c * z + d * w1 <= near.Mc:
