@@ -301,7 +301,10 @@ class CWriter:
         if len(function.returns) < 2:
             stored = f"{self.name(places[0].name)} = " if places and places[0] else ""
             return f"{stored}{self.function_name(function)}({', '.join(handed)})"
-        handed += [f"&{self.name(one.name) if one else 'unused'}" for one in places]
+        handed += [
+            f"&{self.name(one.name) if one else f'unused_{kind}'}"
+            for one, kind in zip(places, function.returns, strict=True)
+        ]
         return f"{self.function_name(function)}({', '.join(handed)})"
 
     # functions --------------------------------------------------------------------------------------
@@ -329,11 +332,14 @@ class CWriter:
             f"{comment}static {result} {self.function_name(function)}({', '.join(head) or 'void'})\n{{\n"
         )
         local = self._locals(function)
-        if any(
-            isinstance(one, Call) and None in one.places and len(one.places) > 1
+        unused = {
+            kind
             for one in walk(function.body)
-        ):
-            local.append(f"    {self.prefix}_real unused;")
+            if isinstance(one, Call) and len(one.places) > 1
+            for place, kind in zip(one.places, one.function.returns, strict=True)
+            if place is None
+        }
+        local += [f"    {self.types[kind]} unused_{kind};" for kind in sorted(unused)]
         unread = [f"    (void){self.name(name)};" for name in self._unread(function)]
         return opening + "\n".join([*local, *unread, *lines]) + "\n}\n"
 
