@@ -53,7 +53,7 @@ def feedback(p: Parameters, u: float, y: State) -> float:
     estimator = y.landing.estimator
     near, shaft = p.landing.estimator, estimator.shaft
     a, b, c = near.a, shaft.b, near.c
-    w1, z, w2, u = predicted_state(near, estimator, u)
+    w1, z, w2, torque = predicted_state(near, estimator, u)
     share, load = a / (a + b), near.Mc * b / (a + b)  # of the motor torque, in the mean torque of the shaft
     Omega = math.sqrt(c * (a + b))
     low, full = share * p.landing.low_torque + load, share * ROOM * p.landing.full_torque + load
@@ -63,7 +63,7 @@ def feedback(p: Parameters, u: float, y: State) -> float:
         y.progress = min(1.0, y.progress + near.period / p.rise)
     mean = reference + near.d / c * rate - p.f_twist * (c * z - reference)
     mean -= p.f_rate * (c * (w1 - w2) - rate) / Omega
-    mean -= p.f_torque * (share * u + load - reference)
+    mean -= p.f_torque * (share * torque + load - reference)
     return min(max((mean - load) / share, 0.0), p.landing.full_torque)
 
 

@@ -21,6 +21,7 @@ PAGES = {
     "softstart.drive": ("theory/stages", "theory/contact-laws"),
     "softstart.drive.data_sheet": ("howto/own-drive",),
     "softstart.drive.machine_table": ("howto/python-in-a-notebook",),
+    "softstart.export": ("howto/put-it-on-a-plc",),
     "softstart.identification": ("identification",),
     "softstart.kernel.records": ("howto/add-a-controller", "theory/feedback"),
     "softstart.linear": ("linear-view",),

@@ -34,6 +34,7 @@ from softstart.drive.data_sheet import DataSheet as DataSheet
 from softstart.drive.machine_table import MachineTable as MachineTable
 from softstart.errors import InputError as InputError
 from softstart.errors import SimulationError as SimulationError
+from softstart.export.controller import export_controller as export_controller
 from softstart.identification.logs import Log as Log
 from softstart.identification.planning import plan_experiments as plan_experiments
 from softstart.identification.result import Identification as Identification

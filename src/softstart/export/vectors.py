@@ -213,20 +213,20 @@ def make_vectors(
     (('scenario', 'cycles', 'run', 'set_speed'), 62.0)
     """
     rows: list[VectorRow] = []
-    sample = ControlBlock(controller, _of_block(machine), period)
+    sample = ControlBlock(controller, block_drive(machine), period)
     for scenario in scenarios(sample.controller, machine, sample.period):
-        block = ControlBlock(controller, _of_block(machine), period)
+        block = ControlBlock(controller, block_drive(machine), period)
         recorder, failure = record(scenario, block, real == "float32")
         if failure is not None and scenario.name == "nominal":
             raise failure
         rows += _without_constant_tail(recorder.rows)
-    drive = _of_block(machine)
+    drive = block_drive(machine)
     room = ROOM_FLOAT32 * max(abs(float(drive.maximum_torque)), abs(float(drive.minimum_torque)))
     return Vectors(input_names(sample.controller.sensors), tuple(rows), room if real == "float32" else 0.0)
 
 
-def _of_block(machine: Machine) -> Drive:
-    """The machine as the block knows it."""
+def block_drive(machine: Machine) -> Drive:
+    """The drive by whose limits a block guards: the machine itself, or the two masses of a chain."""
     return machine if isinstance(machine, Drive) else machine.design_drive
 
 

@@ -53,7 +53,12 @@ def record(*fields: type, whole: Sequence[str] = (), **parts: Part) -> np.dtype[
         types.append((name, number, part) if isinstance(part, int | tuple) else (name, part or number))
     # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
     known = f"{fields[-1].__module__}.{fields[-1].__qualname__}".replace(".", "_")
-    kinds = {name: _KINDS.get(kind, "real") for one in fields for name, kind in one.__annotations__.items()}
+    # a NamedTuple has its annotations wrapped
+    kinds = {
+        name: _KINDS.get(getattr(kind, "__forward_arg__", kind), "real")
+        for one in fields
+        for name, kind in one.__annotations__.items()
+    }
     members = {name: _field(name) for name, *_ in types}
     about = {"__module__": __name__, "kinds": kinds, "classes": fields}  # for exports
     scalar = type(known, (np.void,), members | about)
