@@ -163,6 +163,7 @@ class CWriter:
         if kind == "truth":
             return str(int(value))
         if kind == "whole":
+            value = int(value)
             return str(value) if abs(value) < 2**31 else f"INT64_C({value})"
         if math.isnan(value):
             return "NAN"

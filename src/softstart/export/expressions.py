@@ -83,6 +83,7 @@ class ExpressionReader:
     out: list[Statement]
     changed: set[str]
     temporaries: int
+    places: dict[str, str]  # variables in the place of such parameters
 
     def __init__(
         self, translator: Translator, function: Callable[..., Any], arguments: Sequence[Value]
@@ -92,6 +93,7 @@ class ExpressionReader:
         self.first, self.file = function.__code__.co_firstlineno, function.__code__.co_filename
         self.arguments = arguments
         self.kinds: dict[str, Kind] = {}
+        self.widened: dict[str, Kind] = {}  # parameters that become another kind of number
         self.returns: tuple[Kind, ...] | None = None
         self.assigned = {
             node.id
@@ -202,7 +204,7 @@ class ExpressionReader:
                 self._refuse(node)
 
     def _name(self, node: ast.Name) -> Value:
-        name = node.id
+        name = self.places.get(node.id, node.id)
         if name in self.env:
             return self.env[name]
         if name in self.kinds:

@@ -212,6 +212,7 @@ class Reader(ExpressionReader):
     def _pass(self) -> None:
         self.env: dict[str, Value] = {}
         self.kinds = {name: kind for name, kind in self.kinds.items() if not name.startswith(TEMPORARY)}
+        self.places = {}
         self.parameters: list[Variable] = []
         self.taken: list[bool] = []
         self.changed: set[str] = set()
@@ -244,6 +245,10 @@ class Reader(ExpressionReader):
             self.fail(self.tree, "one of two records as an argument", "call the function in each branch")
         else:
             variable = self._parameter(name, argument.type)
+            if name in self.widened:
+                self.places[name] = f"{name}_changed"
+                place = Variable(self.places[name], self.widened[name])
+                self.out.append(Assign(place, converted(variable, self.widened[name])))
             if isinstance(argument.type, str):
                 self.kinds[name] = argument.type
             else:
@@ -367,7 +372,7 @@ class Reader(ExpressionReader):
         )
 
     def _store_name(self, target: ast.Name, value: Value) -> None:
-        name = target.id
+        name = self.places.get(target.id, target.id)
         if name == "_":
             return
         if any(
@@ -381,8 +386,10 @@ class Reader(ExpressionReader):
         self.env.pop(name, None)
         kind = joined(kind_of(value), self.kinds.get(name, kind_of(value)))
         given = {parameter.name: parameter.type for parameter in self.parameters}
-        if given.get(name, kind) != kind:
-            self.fail(target, "another kind of number in a parameter", "give it a new name")
+        if given.get(name, kind) != kind:  # of a parameter: a variable takes its place in the next pass
+            self.widened[name] = joined(kind, self.widened.get(name, kind))
+            self.kinds[f"{name}_changed"] = self.widened[name]
+            return
         self.kinds[name] = kind
         self.out.append(Assign(Variable(name, kind), converted(value, kind)))
 

@@ -198,3 +198,10 @@ def views(row: Any, x: float) -> float:
     o = as_record(row, OUTER)
     o.x = x
     return o.x + o.inner.low
+
+
+def widened(n: int, x: float) -> float:
+    before = n * 2
+    n = n + x
+    n += 1
+    return n + before
