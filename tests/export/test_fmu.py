@@ -21,69 +21,13 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from tests.export import tools
 from tests.export.blocks import COUNT, TURN
+from tests.export.fmu_instance import Instance, made
 
 from softstart.export.fmu import BINARY, Model, Version, fmu
 
 VERSIONS: tuple[Version, ...] = ("2.0", "3.0")
 DISCARD, ERROR = 2, 3
 RUN, SPEED, ANGLE, TORQUE, FAULT = 1, 2, 3, 4, 5  # value references
-
-
-class Instance:
-    """An instance of an FMU; the same calls for both versions, and the status of each."""
-
-    def __init__(self, path: Path, folder: Path, name: str = "one") -> None:
-        self.description = fmpy.read_model_description(str(path))
-        self.folder = folder / name
-        fmpy.extract(str(path), self.folder)
-        self.new = self.description.fmiVersion == "3.0"
-        kind = FMU3Slave if self.new else FMU2Slave
-        self.fmu: Any = kind(
-            guid=self.description.guid,
-            unzipDirectory=str(self.folder),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self.fmu.instantiate()
-
-    def begin(self, start: float = 0.0) -> Instance:
-        if self.new:
-            self.fmu.enterInitializationMode(startTime=start)
-        else:
-            self.fmu.setupExperiment(startTime=start)
-            self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-        return self
-
-    def get(self, *references: int, kind: str = "Float64") -> list[float]:
-        older = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}
-        return list(getattr(self.fmu, f"get{kind if self.new else older[kind]}")(references))
-
-    def set(self, reference: int, value: float, kind: str = "Float64") -> None:
-        older = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}
-        getattr(self.fmu, f"set{kind if self.new else older[kind]}")([reference], [value])
-
-    def step(self, point: float, length: float) -> Any:
-        return self.fmu.doStep(point, length)
-
-    @property
-    def state(self) -> Any:
-        return self.fmu.getFMUState() if self.new else self.fmu.getFMUstate()
-
-    def restore(self, state: Any) -> None:
-        (self.fmu.setFMUState if self.new else self.fmu.setFMUstate)(state)
-
-    def free(self, state: Any) -> None:
-        (self.fmu.freeFMUState if self.new else self.fmu.freeFMUstate)(state)
-
-
-def made(model: Model, version: Version, folder: Path) -> Path:
-    """The FMU as a file."""
-    file = fmu(model, version)
-    assert file.note == ""
-    path = folder / f"{model.prefix}-{version}.fmu"
-    path.write_bytes(file.content)
-    return path
 
 
 @pytest.fixture(params=VERSIONS)

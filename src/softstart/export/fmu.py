@@ -11,6 +11,7 @@ import html
 import io
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
@@ -94,7 +95,7 @@ class Model:
 def signals(struct: Struct, starts: Mapping[str, float] | None = None) -> tuple[Signal, ...]:
     """The members of a structure of the C code as signals, but for `cycles`.
 
-    A unit stands before or behind a comma of the comment of the member.
+    A unit stands alone between commas or semicolons of the comment of the member.
 
     >>> from softstart.export.statements import Member, Struct
     >>> members = Member("speed", "real", "of the motor, rad/s"), Member("cycles", "whole", "1 normally")
@@ -105,7 +106,7 @@ def signals(struct: Struct, starts: Mapping[str, float] | None = None) -> tuple[
     for member in struct.members:
         if member.name == "cycles":
             continue
-        parts = member.comment.split(", ")
+        parts = re.split("[,;] ", member.comment)
         unit = next((part for part in parts if part in UNITS), "")
         description = ", ".join(part for part in parts if part != unit)
         assert isinstance(member.type, str), f"{member.name}: a signal is a number"

@@ -29,6 +29,7 @@ class PlantOutput:
     motor_torque: float  # realised torque, with the noise of its measurement, N m
     shaft_torque: float  # of the shaft at the motor, N m
     load_speed: float  # rad/s
+    stage: float  # as strategies see it, 1, 2, ...: odd with the gap open
     gap: float  # free motion left to the driving flank of that shaft, rad; 0 in contact
     peak_shaft_torque: float  # the largest |torque| of all shafts so far, N m
     reached: bool  # the load has had its target speed
@@ -48,7 +49,7 @@ def give_output(s: Record, m: Record, o: Record, tones: Matrix) -> None:
     o.motor_angle, o.motor_speed, o.motor_torque = m.motor_angle, m.motor_speed, m.motor_torque
     o.load_speed = m.load_speed
     o.shaft_torque = sign * torque_now(s, k, tones)
-    o.gap = 0.0
+    o.stage, o.gap = s.stage, 0.0
     if s.mode[k] == OPEN:
         o.gap = max(s.half_gap[k] - sign * s.theta[k], 0.0)
     o.peak_shaft_torque = 0.0
