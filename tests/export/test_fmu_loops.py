@@ -12,6 +12,8 @@ from tests.export.fmu_instance import Instance, made
 from softstart import Chain, Drive, TorqueProfile, simulate
 from softstart.controller import Controller, make_controller
 from softstart.drive.machine import Machine
+from softstart.export import drive
+from softstart.export.drive import export_drive
 from softstart.export.fmu import Version
 from softstart.export.fmu_models import block_model, machine_model
 from softstart.export.vectors import run_in_cycles
@@ -84,6 +86,27 @@ def test_a_machine_and_its_strategy(name: str, version: Version, tmp_path: Path)
     same_start(plant, block, controlled, run)
     if name in ("crane", "worn"):  # elsewhere the strategy changes its demand within a cycle
         assert run.k_dyn == pytest.approx(simulate(machine, strategy).k_dyn, rel=SAME)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", CASES)
+def test_an_exported_machine_meets_its_vectors(name: str, version: Version, tmp_path: Path) -> None:
+    export = export_drive(CASES[name][0], prefix="machine")
+    assert export.notes == ()
+    path = tmp_path / f"machine_{drive.VERSIONS[version]}.fmu"
+    path.write_bytes(bytes(export.files[path.name]))
+    assert validate_fmu(str(path)) == []
+    head, *lines = str(export.files["vectors.csv"]).splitlines()
+    names = head.split(",")
+    expected = np.array([[float(one) for one in line.split(",")] for line in lines])
+    machine = Instance(path, tmp_path).begin()
+    found = [[machine[one] for one in names[2:]]]
+    for (time, *_), (_, torque, *_) in zip(expected, expected[1:], strict=False):
+        machine.give({"torque": torque})
+        machine.step(time, drive.STEP)
+        found.append([machine[one] for one in names[2:]])
+    off = np.abs(np.array(found) - expected[:, 2:]).max(0) / np.abs(expected[:, 2:]).max(0).clip(1e-300)
+    assert off.max() <= drive.SAME
 
 
 @pytest.fixture(scope="module")

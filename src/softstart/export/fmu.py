@@ -193,8 +193,9 @@ def about(model: Model) -> str:
     lines += ["|---|---|---|---|"]
     for number, signal in enumerate(model.signals):
         side = "input" if number < len(model.inputs) else "output"
+        described = signal.description.replace("|", "\\|")
         start = f" (start value {_start(signal)})" if side == "input" else ""
-        lines.append(f"| `{signal.name}` | {side} | {signal.unit} | {signal.description}{start} |")
+        lines.append(f"| `{signal.name}` | {side} | {signal.unit} | {described}{start} |")
     return "\n".join(lines) + "\n"
 
 

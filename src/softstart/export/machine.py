@@ -36,7 +36,7 @@ NAMES = {"given": "Input", "output": "Output"}
 
 def machine_c(machine: Machine, prefix: str) -> dict[str, str]:
     """The header and the source, by file name."""
-    given = _without_end(kernel_input(machine))
+    given = endless(machine)
     program = _program(given)
     state = np.zeros(rec.N_WORK)
     start.begin(state, *given.first, FOREVER, False)
@@ -94,12 +94,13 @@ def _program(given: KernelInput) -> Program:
     return program
 
 
-def _without_end(given: KernelInput) -> KernelInput:
-    """The same for motion without end; the strategy outside sees it from t = 0 on."""
+def endless(machine: Machine) -> KernelInput:
+    """A machine whose motion has no end; a strategy outside sees it from t = 0 on."""
+    given = kernel_input(machine)
     given = replace(given, machines=given.machines.copy())
-    machine = given.machine
-    machine.time_limit = machine.longest = machine.event_cap = FOREVER
-    machine.begins_at = 0.0
+    row = given.machine
+    row.time_limit = row.longest = row.event_cap = FOREVER
+    row.begins_at = 0.0
     return given
 
 
