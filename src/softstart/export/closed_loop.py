@@ -9,13 +9,14 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import gettempdir
 from types import TracebackType
 from typing import Any, Self
 
 from softstart.export.design import Design
-from softstart.export.vectors import WHOLE, input_names, run_in_cycles
+from softstart.export.vectors import WHOLE, VectorRow, Vectors, input_names, run_in_cycles
 from softstart.kernel.guard import FAULTS
 from softstart.kernel.records import Measured
 from softstart.start.block import BlockOutput
@@ -106,10 +107,14 @@ class CompiledBlock:
         """One cycle."""
         cycles = 1.0 if math.isnan(self._last) else round((measured.time - self._last) / self.period)
         self._last = measured.time
-        values = {**measured._asdict(), "cycles": cycles}
-        self._in[:] = [values[name] for name in self.names]
+        torque, fault = self.answer({**measured._asdict(), "cycles": cycles})
+        return BlockOutput(torque, FAULTS[fault])
+
+    def answer(self, inputs: Mapping[str, float]) -> tuple[float, int]:
+        """Torque and code of the fault for these inputs."""
+        self._in[:] = [inputs[name] for name in self.names]
         self._library.softstart_step(self._memory, self._in, self._out)
-        return BlockOutput(float(self._out[0]), FAULTS[int(self._out[1])])
+        return float(self._out[0]), int(self._out[1])
 
 
 def k_dyn_in_c(
@@ -125,6 +130,19 @@ def k_dyn_in_c(
                 each.append(float(run_in_cycles(machine, block).k_dyn))
             found.append(max(each))
     return tuple(found)
+
+
+def replayed(design: Design, sources: Mapping[str, str], prefix: str, vectors: Vectors) -> Vectors:
+    """The vectors with what the C code answers to the same inputs."""
+    rows, scenario = list[VectorRow](), ""
+    with CompiledBlock(design, sources, prefix) as block:
+        for row in vectors.rows:
+            if row.scenario != scenario:
+                block.begin()
+            scenario = row.scenario
+            torque, fault = block.answer(row.inputs)
+            rows.append(row._replace(torque=torque, fault=fault))
+    return replace(vectors, rows=tuple(rows))
 
 
 def k_dyn_in_python(design: Design, gap_factors: tuple[float, ...] = (1.0,)) -> tuple[float, ...]:

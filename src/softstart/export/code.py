@@ -9,9 +9,12 @@ from typing import Any
 from softstart.controller.tuned import meanings_of
 from softstart.export.block import BlockProgram, block_program
 from softstart.export.block_c import block_c
+from softstart.export.block_st import block_st
 from softstart.export.c import KEYWORDS as C_KEYWORDS
 from softstart.export.costs import bytes_of, operations
 from softstart.export.design import Design
+from softstart.export.fmu import Version, find_compiler, fmu
+from softstart.export.fmu_models import block_model
 from softstart.export.self_test import test_program
 from softstart.export.statements import Program, Struct
 from softstart.export.vectors import Vectors
@@ -54,6 +57,7 @@ class BlockCode:
     c_sources: Mapping[str, str]
     figures: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    program: BlockProgram | None = None
 
 
 def written(design: Design, vectors: Vectors, language: str, prefix: str, real: str) -> BlockCode:
@@ -66,8 +70,30 @@ def written(design: Design, vectors: Vectors, language: str, prefix: str, real: 
     """
     made, single = described(block_program(design.block()), design), real == "float32"
     sources = block_c(made, prefix, single)
-    files: dict[str, str | bytes] = {**sources, **test_program(prefix, vectors)}
-    return BlockCode(prefix, language, real, files, sources, costs_of(made, single))
+    files: dict[str, str | bytes] = {}
+    notes: tuple[str, ...] = ()
+    if language == "c":
+        files = {**sources, **test_program(prefix, vectors)}
+    elif language == "st":
+        files = {**block_st(made, prefix, vectors, single)}
+    else:
+        note = find_compiler()[1]
+        notes = (note,) if note else ()
+    return BlockCode(prefix, language, real, files, sources, costs_of(made, single), notes, made)
+
+
+def fmus(design: Design, code: BlockCode, readme: str) -> dict[str, str | bytes]:
+    """The FMUs of a strategy with its guard, for both versions of FMI, with this documentation."""
+    model = block_model(
+        design.block(), code.prefix, f"{design.name}, {design.machine.name}", readme,
+        code.real == "float32", code.program,
+    )  # fmt: skip
+    return {name: fmu(model, version).content for version, name in fmu_names(code.prefix).items()}
+
+
+def fmu_names(prefix: str) -> dict[Version, str]:
+    """The file for each version of FMI."""
+    return {"2.0": f"{prefix}_fmi2.fmu", "3.0": f"{prefix}_fmi3.fmu"}
 
 
 def described(made: BlockProgram, design: Design) -> BlockProgram:

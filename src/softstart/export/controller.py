@@ -10,8 +10,8 @@ from typing import Any
 from softstart.chain.machines import MachineLike
 from softstart.controller.finding import Named, make_controller
 from softstart.errors import SimulationError
-from softstart.export.closed_loop import TOLERABLE, compiler, k_dyn_in_c, k_dyn_in_python
-from softstart.export.code import KEYWORDS, BlockCode, written
+from softstart.export.closed_loop import TOLERABLE, compiler, k_dyn_in_c, k_dyn_in_python, replayed
+from softstart.export.code import KEYWORDS, BlockCode, fmu_names, fmus, written
 from softstart.export.design import Design, design_for, figures_of
 from softstart.export.guide import guide
 from softstart.export.package import (
@@ -97,8 +97,9 @@ def export_controller(
     code = written(design, vectors, language, chosen, real)
     figures: dict[str, Any] = {**figures_of(design), **code.figures}
     notes = [*code.notes, *_period_notes(design)]
-    if real == "float32" and code.c_sources:
-        notes += _single_precision(design, code, chosen, figures)
+    if real == "float32":
+        vectors, said = _single_precision(design, vectors, code, figures)
+        notes += said
     export = Export(chosen, language, real, _files(design, vectors, code, figures, notes, origin), figures,
                     tuple(notes))  # fmt: skip
     if folder is None:
@@ -117,10 +118,10 @@ def _files(
 ) -> dict[str, str | bytes]:
     """All files of the export."""
     files: dict[str, str | bytes] = {**code.files, "vectors.csv": vectors.csv()}
-    readme = guide(
-        design, vectors, code.prefix, code.language, code.real, figures, notes, origin, sorted(files)
-    )
-    return {**files, README: readme}
+    fmu = code.language == "fmu"
+    names = sorted([*files, *(fmu_names(code.prefix).values() if fmu else ())])
+    readme = guide(design, vectors, code.prefix, code.language, code.real, figures, notes, origin, names)
+    return {**files, README: readme, **(fmus(design, code, readme) if fmu else {})}
 
 
 def _period_notes(design: Design) -> list[str]:
@@ -133,25 +134,38 @@ def _period_notes(design: Design) -> list[str]:
     ]
 
 
-def _single_precision(design: Design, code: BlockCode, prefix: str, figures: dict[str, Any]) -> list[str]:
-    """What single precision does to K_dyn, of the start as it is and with a worn gap, by the code itself."""
+def _single_precision(
+    design: Design, vectors: Vectors, code: BlockCode, figures: dict[str, Any]
+) -> tuple[Vectors, list[str]]:
+    """What single precision does, by the C code itself: its vectors, and notes; K_dyn among the figures.
+
+    In the vectors a strategy that decides a cycle later, by a rounding, goes on differently with the same
+    inputs. So what they expect is what this code answers, and how far it is from the double one is a figure.
+    """
     if not compiler():
-        return ["float32 was not checked in closed loop, as there is no C compiler here: install gcc."]
+        return vectors, [
+            "float32 was not checked, as there is no C compiler here (install gcc): vectors.csv is from "
+            "float64, and a strategy may decide otherwise after a rounding."
+        ]
     gap = float(getattr(design.machine, "gap", 0.0) or 0.0)
     factors = (1.0, WORN) if gap > 0.0 else (1.0,)
     names = ("as it is", f"gap x{WORN:g}")[: len(factors)]
     try:
-        single = k_dyn_in_c(design, code.c_sources, prefix, factors)
+        single = k_dyn_in_c(design, code.c_sources, code.prefix, factors)
         double = k_dyn_in_python(design, factors)
+        answers = replayed(design, code.c_sources, code.prefix, vectors)
     except (OSError, SimulationError) as error:
-        return [f"float32 was not checked in closed loop: {' '.join(str(error).split())[:300]}"]
+        return vectors, [f"float32 was not checked in closed loop: {' '.join(str(error).split())[:300]}"]
     figures["k_dyn_float32"] = dict(zip(names, single, strict=True))
     changes = {name: abs(one - other) for name, one, other in zip(names, single, double, strict=True)}
     figures["k_dyn_change_float32"] = changes
+    pairs = zip(answers.rows, vectors.rows, strict=True)
+    off = [abs(one.torque - other.torque) for one, other in pairs]
+    figures["rows_off_float32"] = sum(one > vectors.room for one in off)
     worst = max(changes, key=lambda name: changes[name])
     if changes[worst] <= TOLERABLE:
-        return []
-    return [
+        return answers, []
+    return answers, [
         f"float32 changes K_dyn by {changes[worst]:.2g} ({worst}), more than {TOLERABLE:g}: use float64 if "
         "the target has it."
     ]
