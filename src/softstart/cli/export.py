@@ -98,7 +98,8 @@ def _machine(
         raise InputError(f"{what}: it belongs to a strategy; add --controller, or leave {what} out.")
     made: Export
     with working("translating the machine ..."):
-        made = import_module("softstart.export.drive").export_drive(drive, folder, prefix=prefix)
+        module = import_module("softstart.export.drive")
+        made = module.export_drive(drive, folder, prefix=prefix, origin=_origin())
     return made
 
 

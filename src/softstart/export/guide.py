@@ -190,9 +190,7 @@ def _cycles(design: Design) -> str:
     )
 
 
-def _test(
-    vectors: Vectors, prefix: str, language: str, real: str, figures: Mapping[str, Any]
-) -> str:
+def _test(vectors: Vectors, prefix: str, language: str, real: str, figures: Mapping[str, Any]) -> str:
     text = (
         f"`vectors.csv` has {len(vectors.rows)} cycles of {len(vectors.scenarios)} starts in closed loop on "
         f"the exact machine ({', '.join(vectors.scenarios)}), each on a block that begins anew: inputs, and "
@@ -209,8 +207,8 @@ def _test(
         text += (
             "What is expected is from float64."
             if off is None
-            else f"What is expected is from this code, compiled here; with the same inputs float64 differs by "
-            f"more in {off} cycles, behind a decision that a rounding has moved."
+            else "What is expected is from this code, compiled here; with the same inputs float64 differs "
+            f"by more in {off} cycles, behind a decision that a rounding has moved."
         )
     if language == "c":
         text += f" `make test` compiles and compares them and prints the time of a step (`test_{prefix}.c`)."
