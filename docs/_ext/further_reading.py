@@ -21,7 +21,7 @@ PAGES = {
     "softstart.drive": ("theory/stages", "theory/contact-laws"),
     "softstart.drive.data_sheet": ("howto/own-drive",),
     "softstart.drive.machine_table": ("howto/python-in-a-notebook",),
-    "softstart.export": ("howto/put-it-on-a-plc",),
+    "softstart.export": ("howto/put-it-on-a-plc", "howto/use-an-fmu"),
     "softstart.identification": ("identification",),
     "softstart.kernel.records": ("howto/add-a-controller", "theory/feedback"),
     "softstart.linear": ("linear-view",),

@@ -35,6 +35,7 @@ from softstart.drive.machine_table import MachineTable as MachineTable
 from softstart.errors import InputError as InputError
 from softstart.errors import SimulationError as SimulationError
 from softstart.export.controller import export_controller as export_controller
+from softstart.export.drive import export_drive as export_drive
 from softstart.identification.logs import Log as Log
 from softstart.identification.planning import plan_experiments as plan_experiments
 from softstart.identification.result import Identification as Identification

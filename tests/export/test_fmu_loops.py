@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_an_exported_machine_meets_its_vectors(name: str, version: Version, tmp_
     expected = np.array([[float(one) for one in line.split(",")] for line in lines])
     machine = Instance(path, tmp_path).begin()
     found = [[machine[one] for one in names[2:]]]
-    for (time, *_), (_, torque, *_) in zip(expected, expected[1:], strict=False):
+    for (time, *_), (_, torque, *_) in itertools.pairwise(expected):
         machine.give({"torque": torque})
         machine.step(time, drive.STEP)
         found.append([machine[one] for one in names[2:]])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import click
@@ -96,11 +95,10 @@ def _machine(
     if params or period is not None:
         what = "--param" if params else "--period"
         raise InputError(f"{what}: it belongs to a strategy; add --controller, or leave {what} out.")
-    made: Export
+    from softstart.export.drive import export_drive
+
     with working("translating the machine ..."):
-        module = import_module("softstart.export.drive")
-        made = module.export_drive(drive, folder, prefix=prefix, origin=_origin())
-    return made
+        return export_drive(drive, folder, prefix=prefix, origin=_origin())
 
 
 def _strategy(controller: str | None, gains: str | None, params: dict[str, str]) -> Controller:

@@ -58,6 +58,17 @@ def test_refusals(words, sentence, refused):
     refused("export", "good.toml", *words, "--out", "out", says=[sentence])
 
 
+def test_a_machine_as_fmu(as_json, place):
+    data = as_json("export", "--as", "fmu", "--prefix", "crane", "--out", "out")
+    assert {"crane_fmi2.fmu", "crane_fmi3.fmu", "README.md"} <= set(data["files"])
+    assert "softstart export --as fmu --prefix crane" in (place / "out" / "README.md").read_text()
+
+
+def test_a_strategy_as_fmu(as_json):
+    data = as_json("export", "--controller", "ramp", "--as", "fmu", "--out", "out")
+    assert {"ramp_fmi2.fmu", "ramp_fmi3.fmu", "README.md", "vectors.csv"} == set(data["files"])
+
+
 def test_an_unknown_language_is_refused(run):
     code, _, err = run("export", "--controller", "ramp", "--as", "pascal", "--out", "out")
     assert code == 2
