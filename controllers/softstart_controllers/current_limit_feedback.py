@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from softstart.controller import Numbers, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, Reply, Vector, as_record, keep_state, record
+from softstart.controller.compiled import MEASURED, Double, Reply, Vector, as_record, keep_state, record
 from softstart.drive import Drive
 from softstart_controllers import landing
 from softstart_controllers.contact import predicted_state
@@ -23,14 +23,14 @@ class Parameters:
 
     landing: landing.Parameters
     feedback: float
-    rise: float
+    rise: Double
 
 
 class State:
     """The landing, and how far the limit has risen."""
 
     landing: landing.State
-    progress: float
+    progress: Double
 
 
 PARAMETERS = record(Parameters, landing=landing.PARAMETERS)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from softstart.controller import Numbers, compiled_step, parameter
 from softstart.controller.compiled import (
     MEASURED,
+    Double,
     Reply,
     Vector,
     as_record,
@@ -29,7 +30,7 @@ class Parameters:
     """The landing, and the weights f of the feedback."""
 
     landing: landing.Parameters
-    rise: float
+    rise: Double
     f_twist: float
     f_rate: float
     f_torque: float
@@ -39,7 +40,7 @@ class State:
     """The landing, and how far the reference has risen."""
 
     landing: landing.State
-    progress: float
+    progress: Double
 
 
 PARAMETERS = record(Parameters, landing=landing.PARAMETERS)

@@ -54,7 +54,7 @@ class Parameters:
     leak: float
     full_torque: float
     Ms: float
-    rise: float
+    rise: Double
     D1: float
     D2: float
     corner: float
@@ -77,7 +77,7 @@ class State:
     least: float
     correction: float
     low: float
-    progress: float
+    progress: Double
     demand: float
     realised: float
 
