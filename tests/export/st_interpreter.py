@@ -284,8 +284,8 @@ class Writer:
                 codes.append(self.expression(named[name], declared))
             else:
                 code, given, _ = self.place(named[name])
-                if given != declared:
-                    raise StError(named[name], "a variable of another type")
+                if given != declared or (isinstance(declared, Array) and not declared.name):
+                    raise StError(named[name], "a variable of another type, or of one without a name")
                 codes.append(code)
         return ", ".join(codes)
 
@@ -362,9 +362,7 @@ class Writer:
             raise StError(node, "copy of another type")
         if isinstance(declared, Struct):
             return self.say(depth, f"{code}.assign({other})")
-        if len(declared.shape) > 1 or isinstance(declared.element, Struct):
-            raise StError(node, "copies of arrays of one dimension, of numbers")
-        return self.say(depth, f"{code}[:] = {other}")
+        raise StError(node, "arrays are copied element by element")
 
     def call_with_outputs(
         self, node: tree_sitter.Node, call: tree_sitter.Node, function: Unit, depth: int

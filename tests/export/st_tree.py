@@ -51,6 +51,7 @@ class StError(ValueError):
 class Array:
     shape: tuple[int, ...]
     element: Type
+    name: str = ""  # two types are the same if their names are; without names they are not
 
 
 @dataclass
@@ -127,6 +128,7 @@ class Source:
     """All declarations of a text; names are kept in small letters."""
 
     structs: dict[str, Struct] = field(default_factory=dict)
+    arrays: dict[str, Array] = field(default_factory=dict)
     units: dict[str, Unit] = field(default_factory=dict)
 
     def read(self, text: str) -> Source:
@@ -159,13 +161,15 @@ class Source:
         return name
 
     def _globals(self) -> set[str]:
-        return {*self.structs, *self.units}
+        return {*self.structs, *self.arrays, *self.units}
 
     def _type(self, node: tree_sitter.Node) -> Type:
         if node.type == "elementary_type" and text_of(node) in ELEMENTARY:
             return text_of(node)
         if node.type == "identifier" and text_of(node).lower() in self.structs:
             return self.structs[text_of(node).lower()]
+        if node.type == "identifier" and text_of(node).lower() in self.arrays:
+            return self.arrays[text_of(node).lower()]
         if node.type == "array_type":
             element = self._type(child(node, "element_type"))
             if isinstance(element, Array):
@@ -186,6 +190,11 @@ class Source:
             raise StError(node, "one structure in a TYPE block")
         name = self._name(child(definitions[0], "name"), self._globals())
         inline = child(definitions[0], "definition")
+        if inline.type == "array_type":
+            array = self._type(inline)
+            assert isinstance(array, Array)
+            self.arrays[name.lower()] = Array(array.shape, array.element, name)
+            return
         if inline.type != "structure_type_inline":
             raise StError(node, "structures only")
         struct, taken = Struct(name), set[str]()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
+import types
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.export.st_interpreter import Program as Interpreter
+from tests.softstart.export import translated
+from tests.softstart.export.test_translate import NAMES, Attributes, filled, function_of
 
 from softstart.errors import InputError
 from softstart.export.st import add_program
@@ -425,3 +429,70 @@ def test_names_that_a_tool_would_not_take() -> None:
     program = Interpreter(text)
     inputs = list(program.source.units["case_run_it"].inputs)
     assert run(function([Return((total,))], parameters, "real"), **dict.fromkeys(inputs, 1.0)) == len(names)
+
+
+def put(place: Any, text: Text, kind: Struct, held: dict[str, Any]) -> None:
+    """Numbers of dicts and lists into a structure."""
+    for member in kind.members:
+        name = f"{text.field_name(kind, member.name).lower()}_"
+        if isinstance(member.type, Struct):
+            put(getattr(place, name), text, member.type, held[member.name])
+        else:
+            setattr(place, name, copy.deepcopy(held[member.name]))
+
+
+def taken(place: Any, text: Text, kind: Struct) -> dict[str, Any]:
+    """The numbers of a structure as dicts and lists."""
+    found = {}
+    for member in kind.members:
+        value = getattr(place, f"{text.field_name(kind, member.name).lower()}_")
+        found[member.name] = taken(value, text, member.type) if isinstance(member.type, Struct) else value
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_translated_functions_mean_what_they_mean_in_python(name: str) -> None:
+    """All that can be translated, from Python to executed Structured Text."""
+    made, translator = function_of(getattr(translated, name))
+    in_python = {key: getattr(one, "py_func", one) for key, one in vars(translated).items()}
+    function = types.FunctionType(getattr(translated, name).__code__, in_python)
+    text = Text("case")
+    add_program(text, translator.program(made))
+    program, random = Interpreter(str(text)), np.random.default_rng(5)
+    signature = text.signatures[made.name]
+    compared = 0
+    for _ in range(60):
+        given: dict[str, Any] = {}
+        python: list[Any] = []
+        records = []
+        for parameter, to in zip(made.parameters, signature.inputs, strict=True):
+            if isinstance(parameter.type, Struct):
+                held = filled(parameter.type, random)
+                place = program.new(text.type_name(parameter.type))
+                put(place, text, parameter.type, held)
+                python.append(Attributes(held))
+                records.append((place, parameter.type, held))
+                given[to.lower()] = place
+            else:
+                value = random.choice([0.0, 1.0, -1.0, 2.0, 0.25, 1e-9, float(random.uniform(-4.0, 4.0))])
+                number = (
+                    int(random.integers(0 if records else -2, 9))
+                    if parameter.type == "whole"
+                    else float(value)
+                )
+                python.append(number)
+                given[to.lower()] = number
+        try:
+            wanted = function(*python)
+        except (ZeroDivisionError, ValueError, IndexError):
+            continue
+        result = program.call(signature.name, **given)
+        values = wanted if isinstance(wanted, tuple) else () if wanted is None else (wanted,)
+        found = result if len(made.returns) == 1 else result[1:]
+        limited = [min(max(value, -(2.0**126)), 2.0**126) for value in map(float, values)]
+        room = 1e-15 if name == "powers" else 0.0  # Python rounds x**3 once, not twice
+        assert [float(one) for one in found] == pytest.approx(limited, rel=room, abs=0.0), given
+        for place, kind, held in records:
+            assert taken(place, text, kind) == held
+        compared += 1
+    assert compared > 20

@@ -38,7 +38,11 @@ def plcopen_xml(text: Text, version: str, created: str = NO_DATE) -> str:
     data, units = ET.SubElement(types, "dataTypes"), ET.SubElement(types, "pous")
     for one in text.types:
         entry = ET.SubElement(data, "dataType", {"name": one.name})
-        _variables(ET.SubElement(ET.SubElement(entry, "baseType"), "struct"), one.fields)
+        base = ET.SubElement(entry, "baseType")
+        if one.array:
+            _type(base, one.array)
+        else:
+            _variables(ET.SubElement(base, "struct"), one.fields)
         _remark(entry, one.comment)
     for unit in text.units:
         _unit(units, unit)

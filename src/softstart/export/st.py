@@ -33,10 +33,12 @@ from softstart.export.statements import (
     Program,
     Return,
     Statement,
-    Struct,
     Unary,
     Variable,
     While,
+    expressions,
+    parts,
+    walk,
 )  # fmt: skip
 
 SENSED = ("stage", "shaft_torque", "load_speed")
@@ -47,6 +49,12 @@ def _is_unseen(place: Expression, value: Expression) -> bool:
     """Whether it stores what no sensor sees."""
     is_nan = isinstance(value, Constant) and isinstance(value.value, float) and math.isnan(value.value)
     return is_nan and isinstance(place, Field) and place.name in SENSED
+
+
+def _variables(body: tuple[Statement, ...]) -> set[str]:
+    """Names of all variables in a body."""
+    found = (one for statement in walk(body) for one in expressions(statement))
+    return {part.name for one in found for part in parts(one) if isinstance(part, Variable)}
 
 
 class FunctionWriter(Scope):
@@ -75,6 +83,18 @@ class FunctionWriter(Scope):
             self.given["VAR_OUTPUT"] = dict(zip(self.outputs, kinds, strict=True))
         for local, kind in function.locals.items():
             self.declared[self.names.of(local)] = text.type_name(kind)
+        for table in sorted(_variables(function.body) & text.tables.keys()):
+            self._table(table, *text.tables[table])
+
+    def _table(self, name: str, kind: Array, values: tuple[float, ...]) -> None:
+        """Constant arrays are written otherwise in each tool: here a variable, filled at each call."""
+        own = self.names.of(name)
+        self.declared[own] = self.text.type_name(kind)
+        for k, value in enumerate(values):
+            place = divmod(k, kind.shape[1]) if len(kind.shape) == 2 else (k,)
+            number = int(value) if kind.element == "whole" else value
+            assert isinstance(kind.element, str)
+            self.say(f"{own}[{', '.join(map(str, place))}] := {self.constant(number, kind.element)};")
 
     def unit(self) -> Unit:
         """The whole function."""
@@ -130,25 +150,17 @@ class FunctionWriter(Scope):
                 self.call(statement)
 
     def copy(self, place: Expression, value: Expression) -> None:
-        """A structure, an array, or a row of a matrix."""
-        if isinstance(place, Element | Variable | Field) and not any(
-            isinstance(one, Element) and isinstance(one.type, Array) for one in (place, value)
-        ):
+        """A structure; an array element by element, as not all tools take two arrays for the same type."""
+        kind = place.type
+        if not isinstance(kind, Array):
             self.say(f"{self.write(place)} := {self.write(value)};")
             return
-        assert isinstance(place.type, Array)
         k = Variable(f"k {len(self.declared)}", "whole")
         self.declared[self.names.of(k.name)] = "LINT"
-        element = place.type.element
-        sides = (
-            Element(one.base, (*one.indices, k), element)
-            if isinstance(one, Element)
-            else Element(one, (k,), element)
-            for one in (place, value)
-        )
-        to, what = sides
-        copied = Copy(to, what) if isinstance(element, Struct) else Assign(to, what)
-        self.loop(For(k, Constant(0, "whole"), Constant(place.type.shape[0], "whole"), 1, (copied,)))
+        inner = Array(kind.element, kind.shape[1:]) if len(kind.shape) > 1 else kind.element
+        to, what = Element(place, (k,), inner), Element(value, (k,), inner)
+        copied = Assign(to, what) if isinstance(inner, str) else Copy(to, what)
+        self.loop(For(k, Constant(0, "whole"), Constant(kind.shape[0], "whole"), 1, (copied,)))
 
     def branches(self, statement: If) -> None:
         """IF with its ELSIFs; a condition that needs statements before it gets an IF of its own."""
@@ -234,6 +246,9 @@ def add_function(text: Text, function: Function) -> None:
 
 def add_program(text: Text, program: Program) -> None:
     """Write all structures and functions of a program."""
+    text.tables |= program.tables
+    given = (one.type for function in program.functions for one in function.parameters)
+    text.handed_on |= {kind for kind in given if isinstance(kind, Array)}
     for struct in program.structs:
         text.add_struct(struct)
     for function in program.functions:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from softstart.errors import InputError
 from softstart.export.st import add_program
 from softstart.export.st_expressions import Scope
 from softstart.export.st_names import comment as remark
@@ -15,8 +14,6 @@ from softstart.export.st_units import Declared, Unit, function_of
 from softstart.export.statements import Array, Member, Program, Struct, Type
 
 FIRST_VALUES = {"cycles": "1"}  # of inputs that need not be connected
-TESTED = 200  # rows of the test program
-SAME = 1e-9  # of the largest torque: sin, exp and the like may round otherwise on another processor
 CHECK = """
 FUNCTION {name} : LINT
 VAR_INPUT
@@ -72,10 +69,6 @@ def write_block(
     InputError
         For what Structured Text does not have, as a function without a counterpart.
     """
-    if tables := getattr(program, "tables", None):
-        raise InputError(
-            f"{', '.join(tables)}: Structured Text has no constant arrays; put it into the parameters."
-        )
     text = Text(prefix, single)
     add_program(text, program)
     structs = {struct.name: struct for struct in program.structs}

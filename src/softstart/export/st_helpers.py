@@ -124,9 +124,9 @@ VAR_INPUT
     number : {real};
 END_VAR
 VAR CONSTANT
-    infinity : {real} := {infinity};
+    unlimited : {real} := {infinity};
 END_VAR
-{name} := (number < infinity) AND (number > -infinity);
+{name} := (number < unlimited) AND (number > -unlimited);
 END_FUNCTION
 """
 # ATAN2 came with the third edition, and not to all tools

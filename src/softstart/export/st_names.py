@@ -12,7 +12,7 @@ from softstart.export.statements import Kind
 
 LONGEST = 32  # characters of a name, which some tools cut off
 INFINITY = 2.0**126  # the largest power of two that REAL and LREAL share, so that both find it equal
-INFINITY_NAME = "infinity"
+INFINITY_NAME = "unlimited"  # INFINITY is a word of the C that some tools make
 
 # keywords of IEC 61131-3, of its Instruction List and of actions, names of types and standard functions, and
 # words that one tool or another reserves besides
@@ -23,17 +23,18 @@ WORDS = """
     concat configuration constant continue cos ctd ctu ctud d date date_and_time delete dint div divtime
     do ds dt dword else elsif en end_action end_case end_class end_configuration end_for end_function
     end_function_block end_if end_interface end_method end_namespace end_program end_property end_region
-    end_repeat end_resource end_step end_struct end_transition end_type end_var end_while eno eq exit exp
-    expt extends f_edge f_trig false final find floor for from function function_block ge goto gt if
-    implements in indexof ini initial_step insert int interface internal interval jmp jmpc jmpcn l ld
-    ldate ldn ldt le left len limit lint ln log lower_bound lreal lt ltime ltod lword max method mid min
-    mod move mul mux n namespace ne non_retain not null of on or orn override p pi pointer priority
-    private program program_type property protected public r r1 r_edge r_trig read_only read_write real
-    ref ref_to reference region repeat replace resource ret retain retc retcn return right rol ror round
-    rs s s1 sd sel shl shr sign sin single sint sizeof sl sqr sqrt sr st step stn string struct sub super
-    t tan task then this time time_of_day to tod tof ton tp transition true trunc type udint uint ulint
-    union until upper_bound using usint ustring var var_access var_config var_external var_global
-    var_in_out var_input var_inst var_output var_stat var_temp wchar while with word wstring xor
+    end_repeat end_resource end_step end_struct end_transition end_type end_var end_while eno eof eq exit
+    exp expt extends f_edge f_trig false final find floor for from function function_block ge goto gt if
+    implements in indexof infinity ini initial_step insert int interface internal interval jmp jmpc jmpcn
+    l ld ldate ldn ldt le left len limit lint ln log lower_bound lreal lt ltime ltod lword max method mid
+    min mod move mul mux n namespace nan ne non_retain not null of on or orn override p pi pointer
+    priority private program program_type property protected public r r1 r_edge r_trig read_only
+    read_write real ref ref_to reference region repeat replace resource ret retain retc retcn return
+    right rol ror round rs s s1 sd sel shl shr sign sin single sint sizeof sl sqr sqrt sr st step stn
+    string struct sub super t tan task then this time time_of_day to tod tof ton tp transition true trunc
+    type udint uint ulint union until upper_bound using usint ustring var var_access var_config
+    var_external var_global var_in_out var_input var_inst var_output var_stat var_temp wchar while with
+    word wstring xor
 """
 RESERVED = frozenset(WORDS.split())
 
@@ -89,7 +90,7 @@ def literal(value: bool | float, kind: Kind, single: bool) -> str:
     >>> literal(1e-5, "real", False), literal(3, "whole", False), literal(-0.1, "real", True)
     ('1.0E-5', '3', '(-0.1)')
     >>> literal(float("-inf"), "double", False)
-    '(-infinity)'
+    '(-unlimited)'
     """
     if kind == "truth":
         return "TRUE" if value else "FALSE"

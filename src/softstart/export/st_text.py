@@ -34,9 +34,12 @@ class Text:
     names: Names = field(default_factory=Names)
     types: list[TypeBlock] = field(default_factory=list)
     units: list[Unit] = field(default_factory=list)
+    handed_on: set[Array] = field(default_factory=set)
+    _arrays: dict[Array, str] = field(default_factory=dict)
     _structs: dict[str, str] = field(default_factory=dict)
     _fields: dict[str, Names] = field(default_factory=dict)
     _helpers: dict[str, str] = field(default_factory=dict)
+    tables: dict[str, tuple[Array, tuple[float, ...]]] = field(default_factory=dict)
     signatures: dict[str, Signature] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -49,11 +52,24 @@ class Text:
                 self._structs[kind.name] = self.names.new(prefixed(self.prefix, kind.name))
             return self._structs[kind.name]
         if isinstance(kind, Array):
+            if kind in self.handed_on:
+                return self._array_name(kind)
             ranges = ", ".join(f"0..{size - 1}" for size in kind.shape)
             return f"ARRAY[{ranges}] OF {self.type_name(kind.element)}"
         return {"truth": "BOOL", "whole": "LINT", "double": "LREAL"}.get(kind) or (
             "REAL" if self.single else "LREAL"
         )
+
+    def _array_name(self, kind: Array) -> str:
+        """The type of an array that functions are handed: two are the same if they have the same name."""
+        if kind not in self._arrays:
+            element = self.type_name(kind.element).removeprefix(f"{self.prefix}_")
+            plain = "_".join(["array", *map(str, kind.shape), element])
+            name = self._arrays[kind] = self.names.new(prefixed(self.prefix, plain))
+            ranges = ", ".join(f"0..{size - 1}" for size in kind.shape)
+            array = f"ARRAY[{ranges}] OF {self.type_name(kind.element)}"
+            self.types.append(TypeBlock(name, (), array=array))
+        return self._arrays[kind]
 
     def field_name(self, struct: Struct, name: str) -> str:
         """A field as it is written."""

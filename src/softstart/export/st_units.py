@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from softstart.export.st_names import comment
 
-BLOCKS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR CONSTANT", "VAR")  # in the order in which they stand
+# in the order in which they stand; one tool takes all for constant that stands behind constants
+BLOCKS = ("VAR_IN_OUT", "VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
 DECLARATION = re.compile(r" *(\w+) : ([^:;]+?)(?: := ([^;]+))?;")
 
 
@@ -28,7 +29,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class TypeBlock:
-    """A structure.
+    """A structure, or a name for an array.
 
     >>> print(TypeBlock("gains", (Declared("kp", "LREAL", comment="N m s/rad"),), "of the speed loop"))
     TYPE (* of the speed loop *)
@@ -42,8 +43,11 @@ class TypeBlock:
     name: str
     fields: tuple[Declared, ...]
     comment: str = ""
+    array: str = ""
 
     def __str__(self) -> str:
+        if self.array:
+            return f"TYPE\n    {self.name} : {self.array};\nEND_TYPE\n"
         fields = [f"        {one}" for one in self.fields]
         head = [f"TYPE{comment(self.comment)}", f"    {self.name} : STRUCT"]
         return "\n".join([*head, *fields, "    END_STRUCT;", "END_TYPE", ""])
