@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import Any
 
 from softstart.controller.tuned import meanings_of
 from softstart.export.block import BlockProgram, block_program
 from softstart.export.block_c import block_c
+from softstart.export.block_st import block_st
 from softstart.export.c import KEYWORDS as C_KEYWORDS
 from softstart.export.costs import bytes_of, operations
 from softstart.export.design import Design
@@ -75,7 +75,7 @@ def written(design: Design, vectors: Vectors, language: str, prefix: str, real: 
     if language == "c":
         files = {**sources, **test_program(prefix, vectors)}
     elif language == "st":
-        files = import_module("softstart.export.block_st").block_st(made, prefix, vectors, single)
+        files = {**block_st(made, prefix, vectors, single)}
     else:
         note = find_compiler()[1]
         notes = (note,) if note else ()

@@ -91,6 +91,17 @@ def test_a_strategy_with_a_sensor_has_it_as_input() -> None:
     )
 
 
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_structured_text(real: Any) -> None:
+    export = export_controller("ramp", CRANE, "st", real=real)
+    assert sorted(export.files) == ["README.md", "ramp.st", "ramp.xml", "vectors.csv"]
+    assert "FUNCTION_BLOCK ramp" in text(export, "ramp.st")
+    readme = text(export, "README.md")
+    assert "TEST_ramp" in readme
+    assert ("| `motor_torque` | in | REAL |" in readme) == (real == "float32")
+    assert "| `motor_angle` | in | LREAL |" in readme
+
+
 @dataclass(frozen=True)
 class Plain(PlainController):
     name = "plain"

@@ -17,7 +17,7 @@ from softstart.export.statements import (
     While,
 )  # fmt: skip
 
-X, I = Variable("x", "real"), Variable("i", "whole")
+X, K = Variable("x", "real"), Variable("i", "whole")
 ADD = Assign(X, Binary("+", X, Constant(1.0, "real"), "real"))  # 2 operations: sum and store
 ROOT = Assign(X, Apply("sqrt", (X,), "real"))
 LESS = Binary("<", X, Constant(0.0, "real"), "truth")
@@ -31,7 +31,7 @@ def test_operations() -> None:
     assert cost(ADD) == 2
     assert cost(ROOT) == 1 + FUNCTION
     assert cost(If(LESS, (ADD, ADD), (ADD,))) == 2 + 4  # the longer branch
-    assert cost(For(I, Constant(0, "whole"), Constant(6, "whole"), 2, (ADD,))) == 1 + 3 * (2 + 2)
+    assert cost(For(K, Constant(0, "whole"), Constant(6, "whole"), 2, (ADD,))) == 1 + 3 * (2 + 2)
     assert cost(While(LESS, (ADD,))) is None
 
 
