@@ -31,7 +31,6 @@ from softstart.kernel.jit import unfused
 from softstart.kernel.records import Measured
 from softstart.plugins import CONTROLLERS, registered
 from softstart.start.block import BlockOutput
-from softstart.start.simulation import DriveCommand
 
 STRATEGIES = sorted(registered(CONTROLLERS))
 CRANE = Drive.load("crane-4amtkf")
@@ -195,11 +194,9 @@ def loop(name: str, drive: Drive, stops: bool) -> list[tuple[BlockOutput, BlockO
     """All answers of the block in Python and of that in C, in closed loop."""
     design = design_for(controller_of(name), drive)
     code = written(design, Vectors(("cycles",), ()), "c", "block", "float64")
-    commands = None
-    until = None
-    if stops:
-        until = 2.0 * float(drive.elastic_period) + 0.4
-        commands = [DriveCommand(0.6 * until, run=False), DriveCommand(0.8 * until, run=True)]
+    until = 2.0 * float(drive.elastic_period) + 0.4 if stops else None
+    speed = float(drive.target_speed)
+    commands = [(0.6 * until, 0, speed), (0.8 * until, 1, speed)] if until else []
     with CompiledBlock(design, code.c_sources, "block") as block:
         both = Both((design.block(), block), design.period, design.sensors)
         simulate(drive, both, until=until, commands=commands)
