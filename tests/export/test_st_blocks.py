@@ -27,6 +27,7 @@ from softstart import Drive
 from softstart.controller import Controller, make_controller
 from softstart.controller.finding import ready_controller_names
 from softstart.export.block import BlockProgram, block_program
+from softstart.export.controller import export_controller
 from softstart.export.plcopen import NAMESPACE, plcopen_xml
 from softstart.export.st_block import add_test, write_block
 from softstart.export.st_text import Text
@@ -168,6 +169,16 @@ def test_plcopen_xml_holds_the_same_text(name: str, real: Precision) -> None:
         assert sorted(map(str, declared)) == sorted(
             one.name for group in unit.blocks.values() for one in group
         )
+
+
+def test_an_export_holds_source_test_program_and_xml(tmp_path: Path) -> None:
+    export_controller("ramp", "crane-4amtkf", "st", tmp_path / "export")
+    assert {one.name for one in (tmp_path / "export").iterdir()} == {
+        "README.md", "ramp.st", "ramp.xml", "vectors.csv",
+    }  # fmt: skip
+    executed = Interpreter((tmp_path / "export" / "ramp.st").read_text("ascii"))
+    assert executed.block("TEST_ramp")() == {"finished": True, "ok": True, "first_difference": -1}
+    assert "TEST_ramp" in (tmp_path / "export" / "README.md").read_text("utf-8")
 
 
 def test_the_test_program_names_the_first_difference() -> None:
