@@ -16,10 +16,11 @@ from softstart.export.design import Design
 from softstart.export.fmu import Version, find_compiler, fmu
 from softstart.export.fmu_models import block_model
 from softstart.export.self_test import test_program
+from softstart.export.st_names import RESERVED
 from softstart.export.statements import Program, Struct
 from softstart.export.vectors import Vectors
 
-KEYWORDS = frozenset(C_KEYWORDS)
+KEYWORDS = frozenset(C_KEYWORDS) | RESERVED
 # what a signal is, with its unit: of inputs and outputs, in all languages
 SIGNALS = {
     "cycles": ("", "cycles since the last call: 1, after a missed one 2; counted by you"),

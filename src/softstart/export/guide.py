@@ -214,8 +214,8 @@ def _test(vectors: Vectors, prefix: str, language: str, real: str, figures: Mapp
         text += f" `make test` compiles and compares them and prints the time of a step (`test_{prefix}.c`)."
     if language == "st":
         text += (
-            f" The program `TEST_{prefix}` plays the begin of the first start inside the PLC: run it once and "
-            "read `ok`; it needs no file."
+            f" The program `TEST_{prefix}` plays the begin of the first start inside the PLC: run it once "
+            "and read `ok`; it needs no file."
         )
     return text
 

@@ -117,6 +117,7 @@ class Plain(PlainController):
         ({"language": "pascal"}, 'language = "pascal"'),
         ({"real": "float16"}, 'real = "float16"'),
         ({"prefix": "int"}, "keyword"),
+        ({"prefix": "end_if"}, "keyword"),
         ({"prefix": "a b"}, "prefix"),
         ({"period": "-1 ms"}, "period"),
     ],
