@@ -126,7 +126,9 @@ def _files(
 
 def _period_notes(design: Design) -> list[str]:
     own = getattr(design.ready, "period", None)
-    if own is None or float(own) == design.period:
+    if not own:  # not sampled: asked when it wants to be, here at the next cycle
+        return [f"The strategy is not sampled; here it acts in cycles of {1e3 * design.period:.6g} ms."]
+    if float(own) == design.period:
         return []
     return [
         f"The strategy was designed for a cycle of {1e3 * float(own):.6g} ms and is called every "

@@ -83,6 +83,11 @@ def test_another_cycle_than_the_one_of_the_strategy_is_said() -> None:
     assert export.notes[0] in text(export, "README.md")
 
 
+def test_a_strategy_that_is_not_sampled_acts_in_cycles() -> None:
+    export = export_controller("direct", CRANE, "c")
+    assert any("not sampled" in note for note in export.notes)
+
+
 def test_a_strategy_with_a_sensor_has_it_as_input() -> None:
     export = export_controller("reduced-first-stage", CRANE, "c", prefix="first")
     assert "first_real stage;" in text(export, "first.h")
