@@ -91,7 +91,7 @@ docs-commands: $(VENV)/.installed-test
 
 pythons: $(VENV)/.installed-dev
 	for version in 3.11 3.12 3.13 3.14; do $(BIN)/uv pip compile --quiet --python-version $$version \
-		--only-binary :all: --all-extras pyproject.toml >/dev/null && echo "all wheels for Python $$version" || exit 1; done
+		--only-binary :all: --no-binary tree-sitter-iec61131-3-st --all-extras pyproject.toml >/dev/null && echo "all wheels for Python $$version" || exit 1; done
 
 package: $(VENV)/.installed-package
 	rm -rf dist
