@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
 
-from softstart import Chain, DataSheet, Drive, simulate
+from softstart import Chain, DataSheet, Drive, export_controller, simulate
+from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
 SHEET = {
@@ -86,6 +88,18 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     name, content = saved(files, "report-file")
     assert (name, content.decode()) == (report.value.suggested_filename, html)
+
+
+def test_a_program_of_the_selected_strategy(files: Any, tmp_path: Path) -> None:
+    """The ZIP file has what `export_controller` gives."""
+    with files.expect_download(lambda it: it.suggested_filename.endswith(".zip"), timeout=120_000) as zipped:
+        files.get_by_test_id("program-go").click()
+    assert zipped.value.suggested_filename == "crane-travel-drive-4amtkf-h-112l6-direct-c99.zip"
+    expected = export_controller(make_controller("direct"), CRANE, "c").files
+    with zipfile.ZipFile(zipped.value.path()) as archive:
+        assert sorted(archive.namelist()) == sorted(expected)
+        assert archive.read("direct.c").decode() == expected["direct.c"]
+    comes_to(lambda: "under the program" in files.get_by_test_id("program-answer").inner_text(), True)
 
 
 def test_a_drive_from_its_data_sheet(page: Any) -> None:

@@ -127,7 +127,7 @@ def _row(structs: Structs, name: str, dtype: Any, numbers: int = 0) -> Row:
     tail = numbers - (0 if dtype is None else size(dtype))
     return Row(
         None if dtype is None else Variable(name, structs.of(dtype)),
-        Variable(f"{name}_tail", Array("real", (tail,))) if tail > 0 else None,
+        Variable(f"{name}_tail", Array("double", (tail,))) if tail > 0 else None,
     )
 
 

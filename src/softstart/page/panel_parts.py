@@ -25,7 +25,8 @@ TERMINALS = {
     "reached": "load at target speed",
     "steady": "both, and shaft torque at rest",
 }
-MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html"}
+MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html",
+         ".zip": "application/zip"}  # fmt: skip
 
 
 def box(classes: str) -> Element:
@@ -125,10 +126,13 @@ def hint(text: str) -> Element:
     return ui.html(written, sanitize=False).classes("panel-hint")
 
 
-def save(text: str, name: str) -> None:
-    """Let the browser save a text as a file."""
+def save(content: str | bytes, name: str) -> None:
+    """Let the browser save a text or bytes as a file."""
     suffix = name[name.rindex(".") :]
-    ui.download.content(text, name, f"{MEDIA.get(suffix, 'text/plain')}; charset=utf-8")
+    if isinstance(content, bytes):
+        ui.download.content(content, name, MEDIA[suffix])
+        return
+    ui.download.content(content, name, f"{MEDIA.get(suffix, 'text/plain')}; charset=utf-8")
 
 
 def few(sentences: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ gives back plain data.
 
 from __future__ import annotations
 
+import html
 import math
 import os
 import re
@@ -31,6 +32,7 @@ from softstart.start.fatigue import fatigue
 from softstart.start.simulation import simulate
 
 if TYPE_CHECKING:
+    from softstart.export.package import Language, Real
     from softstart.identification.logs import TorqueIs
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
@@ -43,13 +45,13 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 
 @dataclass(frozen=True)
 class TaskResult:
-    """The result of a task: HTML to show, texts of files by their names, and what may be taken over from it.
+    """The result of a task: HTML to show, contents of files by name, and what may be taken over from it.
 
     `controllers` may join the strategies, by label; `drive` may become that of the page.
     """
 
     html: str
-    files: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
     controllers: Mapping[str, Controller] = field(default_factory=dict)
     drive: Machine | None = None
 
@@ -296,3 +298,30 @@ def report_task(
         drive, controllers=controllers, progress=progress, command=command, budget=budget or None
     )
     return TaskResult("", {file: report.to_html()})
+
+
+def program_task(
+    drive: Machine,
+    controller: Controller | None,
+    language: Language,
+    real: Real,
+    file: str,
+    *,
+    progress: Progress,
+) -> TaskResult:
+    """A strategy with its guard as a program, or without a controller the machine as FMU, as a ZIP file."""
+    from softstart.export.controller import export_controller
+    from softstart.export.drive import export_drive
+    from softstart.export.fmu import packed
+
+    progress(None, "translating, and starting the drive in cycles")
+    if controller is None:
+        made = export_drive(drive)
+    else:
+        made = export_controller(controller, drive, language, real=real)
+    contents = {name: text if isinstance(text, bytes) else text.encode() for name, text in made.files.items()}
+    texts = [f"{file}: {', '.join(sorted(contents))}.", *made.notes]
+    if (cycles := made.figures.get("k_dyn_in_cycles")) is not None:
+        texts.insert(1, f"K_dyn {cycles:.4g} under the program, {made.figures['k_dyn_simulated']:.4g} here.")
+    shown_texts = "".join(f"<p>{html.escape(page_sentence(text))}</p>" for text in texts)
+    return TaskResult(shown_texts, {file: packed(contents)})
