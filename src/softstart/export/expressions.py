@@ -7,7 +7,7 @@ import builtins
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from softstart.export.statements import (
     Expression,
     Field,
     For,
+    Function,
     If,
     Kind,
     Place,
@@ -41,6 +42,7 @@ from softstart.export.values import (
     Known,
     NoRows,
     Row,
+    Structs,
     Tuple,
     Value,
     applied,
@@ -61,15 +63,28 @@ from softstart.kernel.block import clear, take_state
 from softstart.kernel.jit import as_record
 from softstart.kernel.motor import NEW_STATE, gauss
 
-if TYPE_CHECKING:
-    from softstart.export.translate import Translator
-
 MATH = {
     "sqrt", "exp", "log", "expm1", "log1p", "sin", "cos", "tan", "atan", "atan2", "hypot", "pow", "copysign",
 }  # fmt: skip
 
 
 MOVES = {python_function(one) for one in (keep_state, take_state, clear)}
+
+
+class Translations(Protocol):
+    """What translates the functions that an expression calls."""
+
+    structs: Structs
+    tables: dict[str, tuple[Array, tuple[float, ...]]]  # constant arrays
+    taken: dict[Function, list[bool]]  # of the arguments of a function, which ones are handed on
+
+    def function(
+        self, function: Callable[..., Any], arguments: Sequence[Value], fail: Any = None
+    ) -> Function:
+        """The statements of a function for arguments of these types."""
+
+    def masked(self, function: Callable[..., Any]) -> set[str]:
+        """The names of parameters whose bits are read."""
 
 
 class ExpressionReader:
@@ -86,7 +101,7 @@ class ExpressionReader:
     places: dict[str, str]  # variables in the place of such parameters
 
     def __init__(
-        self, translator: Translator, function: Callable[..., Any], arguments: Sequence[Value]
+        self, translator: Translations, function: Callable[..., Any], arguments: Sequence[Value]
     ) -> None:
         self.translator, self.function = translator, function
         self.tree = parsed(function)
