@@ -76,7 +76,7 @@ page: $(VENV)/.installed-page
 		-o cache_dir=.pytest_cache/page $(ONLY)
 
 export-test: $(VENV)/.installed-export-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/export --export -m "not slow" $(ONLY)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/export --export -n auto --dist worksteal -m "not slow" $(ONLY)
 
 pictures: $(VENV)/.installed-page
 	SOFTSTART_PICTURES=docs/_static $(BIN)/python -m pytest -q tests/page/test_pictures.py --page

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
 
-from softstart import Chain, DataSheet, Drive, export_controller, simulate
+from softstart import Chain, DataSheet, Drive, TorqueProfile, export_controller, simulate
 from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
@@ -26,7 +26,7 @@ SHEET = {
 def put(page: Any, name: str, content: bytes) -> None:
     # the one before is cleared away by the server: what is chosen meanwhile would go with it
     page.wait_for_function("document.querySelectorAll('.q-uploader__file').length === 0")
-    page.locator('input[type="file"]').set_input_files(
+    page.locator('input[type="file"]').first.set_input_files(
         {"name": name, "mimeType": "application/toml", "buffer": content}
     )
 
@@ -88,6 +88,25 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     name, content = saved(files, "report-file")
     assert (name, content.decode()) == (report.value.suggested_filename, html)
+
+
+def test_what_the_page_saves_of_a_strategy_it_loads(files: Any, tmp_path: Path) -> None:
+    """A profile comes back as it was; a wrong file is refused in a sentence."""
+    profile = TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 30.0])
+    profile.to_toml(tmp_path / "own-profile.toml")
+    upload = files.locator('input[type="file"]').nth(1)
+    content = (tmp_path / "own-profile.toml").read_bytes()
+    upload.set_input_files({"name": "own-profile.toml", "mimeType": "text/plain", "buffer": content})
+    caption = files.get_by_test_id("export-strategy")
+    comes_to(caption.inner_text, "Selected: own-profile")
+    name, saved_profile = saved(files, "export-profile-toml")
+    assert name == "own-profile.toml"
+    (tmp_path / name).write_bytes(saved_profile)
+    again = TorqueProfile.load(tmp_path / name)
+    assert (again.time.tolist(), again.torque.tolist()) == (profile.time.tolist(), profile.torque.tolist())
+    upload.set_input_files({"name": "wrong.csv", "mimeType": "text/plain", "buffer": b"nothing"})
+    files.get_by_test_id("strategy-trouble").get_by_text("wrong.csv").first.wait_for()
+    comes_to(caption.inner_text, "Selected: own-profile")
 
 
 def test_a_program_of_the_selected_strategy(files: Any, tmp_path: Path) -> None:

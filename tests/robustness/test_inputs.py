@@ -59,6 +59,7 @@ QUICK = {
     "identify": f"identify nowhere.csv --drive {CRANE}",
     "wear": "wear found-2024 found-2026",
     "plan": f"plan {CRANE} --set load.kind=reactive --standard",
+    "export": f"export {CRANE} --controller direct --as st --out made",
     "drives": "drives",
     "controllers": "controllers",
     "study": "study",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -110,6 +111,11 @@ def _strategy(controller: str | None, gains: str | None, params: dict[str, str])
 
     if params:
         raise InputError(f'--param: the gains of "{gains}" are given; change them in that file.')
+    if not Path(gains).is_file():
+        raise InputError(
+            f'--gains = "{gains}": there is no such file; softstart tune --out DIR writes robust.toml and '
+            "schedule.toml."
+        )
     if not is_gain_file(gains):
         raise InputError(f'--gains = "{gains}": give a file that softstart tune has written (.toml).')
     (tuned,) = controllers_from_options([gains], {}, several=False)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Hashable
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import ClassVar
 
 from nicegui import ui
 
 from softstart.chain.machines import is_chain_text
+from softstart.controller.base import Controller
+from softstart.controller.finding import make_controller
 from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError
 from softstart.input.documents import parsed
@@ -29,6 +33,7 @@ from softstart.page.job_panel import JobPanel, Task
 from softstart.page.machines import Loaded, machine_from
 from softstart.page.panel_parts import POLL, Troubles, action, box, choice, follow, hint, notify, save, upload
 from softstart.page.session import Session
+from softstart.profile import TorqueProfile
 from softstart.views.numbers import cut
 
 LARGEST = 64 * 1024  # bytes of a drive file
@@ -41,6 +46,7 @@ class FilesPanel:
     def __init__(self, session: Session, user: Hashable) -> None:
         parts = {
             "Drive": (DriveFiles,),
+            "Strategies": (StrategyFiles,),
             "Export": (Exports, ProgramPanel, ReportPanel),
             "Command line": (command_line,),
         }
@@ -107,6 +113,46 @@ def machine_of(content: bytes, name: str) -> Loaded:
     if not is_chain_text(text) and DataSheet.describes(parsed(text, Wording(style="toml"), "a drive")):
         return DataSheet.from_toml(text).possible
     return machine_from(text)
+
+
+class StrategyFiles:
+    """Tuned gains and torque profiles, as the page and the commands save them, join the strategies."""
+
+    def __init__(self, session: Session, user: Hashable) -> None:
+        self._session = session
+        with box("panel-form") as form:
+            vars(form)["panel"] = self  # an upload does not keep what it calls
+            remedy = "gains and profiles have fewer"
+            upload(
+                "Load a strategy ...", "strategy", ".toml,.csv", LARGEST, remedy, self._uploaded, self._refuse
+            )
+        hint("Tuned gains (TOML) or a torque profile (TOML, CSV), as they are saved here.")
+        self._troubles = Troubles("strategy")
+
+    def _uploaded(self, content: bytes, name: str) -> None:
+        self._troubles.say(())
+        label = self._session.add(Path(name).stem, strategy_of(content, name))
+        notify(f"{cut(label)} joins the strategies.")
+
+    def _refuse(self, name: str, error: InputError) -> None:
+        self._troubles.say(error.sentences, f"{cut(name)} was not loaded; the strategies are unchanged.")
+
+
+def strategy_of(content: bytes, name: str) -> Controller:
+    """The tuned gains or the player of the torque profile in the bytes of a file.
+
+    >>> strategy_of(b"time,torque\\n0,20\\n0.1,62\\n", "mine.csv").profile.torque.tolist()
+    [20.0, 62.0]
+    """
+    with tempfile.TemporaryDirectory(prefix="softstart-") as folder:
+        path = Path(folder) / Path(name).name
+        path.write_bytes(content)
+        try:
+            if path.suffix.lower() == ".toml" and b"kind" in content:
+                return make_controller(str(path))
+            return make_controller("profile", {"profile": TorqueProfile.load(path)})
+        except InputError as error:  # the user knows the file by its name
+            raise InputError([text.replace(str(path), name) for text in error.sentences]) from None
 
 
 class Exports:

@@ -52,6 +52,7 @@ def test_tuned_gains(as_json, run, place):
         (["--controller", "nope", "--as", "c"], "--controller"),
         (["--controller", "own.py:Good", "--as", "c"], "plain Python"),
         (["--controller", "ramp", "--as", "c", "--gains", "gains.csv"], "--gains"),
+        (["--as", "c", "--gains", "nothing.toml"], "there is no such file"),
     ],
 )
 def test_refusals(words, sentence, refused):
